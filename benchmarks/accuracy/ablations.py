@@ -71,7 +71,7 @@ def leave_out(part: str, method: Method) -> Method:
     - depth: the initial density is even along the rays, without detail (settings leave out the detail alone)
     - sources: smoke that enters is taken for motion
     - projection: the predicted velocity keeps its divergence
-    - pictures: no motion in the pictures corrects the velocity
+    - pictures: the velocity of one view is estimated as that of several, and no motion in the pictures corrects it
 
     Raises
     ------

@@ -21,6 +21,7 @@ from smokelift.density import (
     DepthEstimate,
     FittedDensity,
     ObservedClip,
+    Smoke,
     Start,
     ViewSet,
     empty_density,
@@ -135,16 +136,9 @@ class FixedRateDescent:
 class AllCarried:
     """The paper's temporal prior: the fit starts from the carried density as it is."""
 
-    def start(
-        self,
-        views: ViewSet,
-        depth: DepthEstimate,
-        carried: Volume,
-        before: Volume,
-        carried_smooth: Volume | None = None,
-    ) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The carried density; see `smokelift.density.TemporalPrior`."""
-        return Start(carried, {})
+        return Start(carried.density, {})
 
 
 def _squares(images: Sequence[Image]) -> float:

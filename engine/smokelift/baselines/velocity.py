@@ -75,3 +75,7 @@ class PaperVelocity:
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""
         return predict_velocity(velocity, dt)
+
+    def of_one_view(self) -> PaperVelocity:
+        """Return itself."""
+        return self

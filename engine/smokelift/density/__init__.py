@@ -19,7 +19,14 @@ from smokelift.density.fit import (
     reconstruct_density,
 )
 from smokelift.density.observation import Observation, ObservedClip, View, ViewSet
-from smokelift.density.temporal_prior import BlendCarried, GuidedSimulation, NothingCarried, Start, TemporalPrior
+from smokelift.density.temporal_prior import (
+    BlendCarried,
+    GuidedSimulation,
+    NothingCarried,
+    Smoke,
+    Start,
+    TemporalPrior,
+)
 
 __all__ = [
     "AxisEstimate",
@@ -37,6 +44,7 @@ __all__ = [
     "Observation",
     "ObservedClip",
     "RoundDepth",
+    "Smoke",
     "Start",
     "TemporalPrior",
     "View",

@@ -35,7 +35,16 @@ MIN_SHAPE = 0.05
 
 
 class Detail(Protocol):
-    """What makes up detail that no camera shows."""
+    """What makes up detail that no camera shows.
+
+    Attributes
+    ----------
+    smooth : (nx, ny, nz) float32
+        A density that shows about what the pictures do, without it.
+    """
+
+    @property
+    def smooth(self) -> Volume: ...
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         """Return a density (nx, ny, nz) with detail, as far as the cameras' pictures allow.
@@ -69,16 +78,13 @@ class DepthEstimate:
         Of each view, the share of every ray's smoke that lies inside the domain.
     views
         The pictures to fit, against the voxels where it expects smoke.
-    smooth : (nx, ny, nz) float32, optional
-        A density that shows about what the pictures do, without what the prior makes up; None if it makes nothing up.
     detail
-        What makes that up; None as well.
+        What makes up detail, and the density without it; None if the prior makes nothing up.
     """
 
     density: Volume
     inside: tuple[NDArray[np.float32], ...]
     views: ViewSet
-    smooth: Volume | None = None
     detail: Detail | None = None
 
 

@@ -129,7 +129,6 @@ class DetailedDepth:
         return replace(
             estimate,
             density=self._noisy(smooth, level, self.texture),
-            smooth=smooth,
             detail=EveryView(self.texture, level, smooth, self.detail),
         )
 

@@ -81,7 +81,7 @@ class FittedDensity:
         root mean square of the input's differences over that of what the smoke changes there: 1 if nothing is fitted,
         however faint the smoke; ``iterations``; ``hull_share``, the hull's share of the voxels.
     smooth : (nx, ny, nz) float32, optional
-        The depth prior's `DepthEstimate.smooth`.
+        The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
     steady : (nx, ny, nz) float32, optional
         The density before the descent, which a next frame carries along; None if that is `density`. What the descent
         makes of single pixels would pile up along the rays from frame to frame.
@@ -133,9 +133,9 @@ class GradientFit:
         start = inside(hull, depth.density if initial is None else initial)
         # The terms take turns, so several cameras need as many times more iterations.
         iterations = settings.fit_iterations * len(cameras)
-        plausible = None
+        plausible = smooth = None
         if depth.detail is not None:
-            plausible, fresh = depth.density, initial is None
+            plausible, smooth, fresh = depth.density, depth.detail.smooth, initial is None
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(
@@ -151,11 +151,11 @@ class GradientFit:
             settings.patience,
             bound=max(settings.bound * expected, started),
             recorded=scaled.recorded,
-            expected=depth.density if depth.smooth is None else depth.smooth,
+            expected=depth.density if smooth is None else smooth,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
-        steady = scaled.density if depth.detail is not None else None
-        return FittedDensity(without_traces(final.density, where), hull, figures, depth.smooth, steady)
+        steady = None if smooth is None else scaled.density
+        return FittedDensity(without_traces(final.density, where), hull, figures, smooth, steady)
 
 
 def reconstruct_density(

@@ -47,6 +47,21 @@ at the support's edge shows a shell (docs/experiments/level-layers.md)."""
 
 
 @dataclass(frozen=True, eq=False)
+class Smoke:
+    """The smoke of a moment.
+
+    Attributes
+    ----------
+    density : (nx, ny, nz) float32
+    smooth : (nx, ny, nz) float32, optional
+        The same without what the depth prior makes up; None if that is all of it.
+    """
+
+    density: Volume
+    smooth: Volume | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Start:
     """Where the fit of a frame starts.
 
@@ -64,14 +79,7 @@ class Start:
 class TemporalPrior(Protocol):
     """What is taken over from the frame before."""
 
-    def start(
-        self,
-        views: ViewSet,
-        depth: DepthEstimate,
-        carried: Volume,
-        before: Volume,
-        carried_smooth: Volume | None = None,
-    ) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """Where the fit starts.
 
         Parameters
@@ -80,10 +88,8 @@ class TemporalPrior(Protocol):
             The pictures of the frame.
         depth
             What the depth prior says of them.
-        carried, before : (nx, ny, nz)
-            The density of the frame before, carried along by the predicted velocity, and as it was.
-        carried_smooth : (nx, ny, nz), optional
-            The smooth answer of the frame before, carried along too; None where nothing is made up.
+        carried, before
+            The smoke of the frame before, carried along by the predicted velocity, and as it was.
         """
 
 
@@ -91,14 +97,7 @@ class TemporalPrior(Protocol):
 class NothingCarried:
     """Every frame starts from its own pictures."""
 
-    def start(
-        self,
-        views: ViewSet,
-        depth: DepthEstimate,
-        carried: Volume,
-        before: Volume,
-        carried_smooth: Volume | None = None,
-    ) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The depth prior's density; see `TemporalPrior`."""
         return Start(depth.density, {})
 
@@ -115,24 +114,17 @@ class BlendCarried:
 
     largest: float
 
-    def start(
-        self,
-        views: ViewSet,
-        depth: DepthEstimate,
-        carried: Volume,
-        before: Volume,
-        carried_smooth: Volume | None = None,
-    ) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The prior's density, mixed with the carried one; see `TemporalPrior`.
 
         Its figures are ``share`` of the density and ``amounts``, the share of the rays' optical depths, with
         what decided them: ``loss_prior``, ``loss_carried`` and ``loss_before`` (sums of squares over the input's
         picture, linear radiance).
         """
-        prior, view = depth.density, views.views[0]
-        if not (prior.any() and carried.any()):
+        prior, moved, view = depth.density, carried.density, views.views[0]
+        if not (prior.any() and moved.any()):
             return Start(prior, {"share": 0.0, "amounts": 0.0})
-        somewhere = (prior > 0) | (carried > 0) | (before > 0)
+        somewhere = (prior > 0) | (moved > 0) | (before.density > 0)
         renderer = views.optics.renderer(view.camera, view.plate.image, somewhere)
 
         def judged(density: Volume) -> tuple[float, Image]:
@@ -141,14 +133,14 @@ class BlendCarried:
             along_rays = -np.log(np.maximum(renderer.transmittance, TINY))
             return float(np.sum(np.square(difference, dtype=np.float64))), along_rays
 
-        (loss_prior, optical_depth), (loss_carried, carried_optical_depth) = judged(prior), judged(carried)
-        loss_before, _ = judged(before)
+        (loss_prior, optical_depth), (loss_carried, carried_optical_depth) = judged(prior), judged(moved)
+        loss_before, _ = judged(before.density)
         noise = float(np.sum(np.square(view.noise, dtype=np.float64)))
         amounts = self.largest * _skill(loss_carried, loss_prior + noise)
         share = self.largest * _skill(loss_carried, loss_before + noise)
         corrected = _with_optical_depth(prior, view, optical_depth, carried_optical_depth, amounts)
         return Start(
-            np.float32(1 - share) * corrected + np.float32(share) * carried,
+            np.float32(1 - share) * corrected + np.float32(share) * moved,
             {
                 "share": share,
                 "amounts": amounts,
@@ -185,28 +177,21 @@ class GuidedSimulation:
     largest: float
     kept: float = 0.97
 
-    def start(
-        self,
-        views: ViewSet,
-        depth: DepthEstimate,
-        carried: Volume,
-        before: Volume,
-        carried_smooth: Volume | None = None,
-    ) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The carried density in the smooth answer's amounts; see `TemporalPrior`.
 
         Its figure ``share`` is the share of the smoke that is taken over.
         """
-        if depth.smooth is None or depth.detail is None or not views.hull.any():
+        if depth.detail is None or not views.hull.any():
             return BlendCarried(self.largest).start(views, depth, carried, before)
-        where = views.where
-        wanted, have = (depth.detail.amounts(values) for values in (depth.smooth, carried))
+        where, detail = views.where, depth.detail
+        wanted, have = (detail.amounts(values) for values in (detail.smooth, carried.density))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
-        if carried_smooth is not None:
-            came, smooth = (values.ravel()[where] for values in (carried_smooth, depth.smooth))
+        if carried.smooth is not None:
+            came, smooth = (values.ravel()[where] for values in (carried.smooth, detail.smooth))
             faint = (MIN_NEW_DENSITY * smooth.mean()) ** 2 + TINY
             reached *= np.minimum(1, (np.float32(LARGEST_GAIN) * came * smooth + faint) / (smooth**2 + faint))
-        taken_over = carried.ravel()[where] * reached / np.maximum(have, TINY)
+        taken_over = carried.density.ravel()[where] * reached / np.maximum(have, TINY)
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density.ravel()[where]
         total = float(started.sum(dtype=np.float64))
         share = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0

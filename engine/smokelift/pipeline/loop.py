@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.density import FittedDensity, ViewSet
+from smokelift.density import FittedDensity, Smoke, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
 from smokelift.footage.images import Picture
@@ -99,15 +99,16 @@ class Carried:
 def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator[Frame]:
     """Yield a shot's frames after one, or all; the first waits until the second gives it a velocity."""
     count = len(shot.clip)
+    follows = method.follows_picture and shot.alone
+    estimator = method.velocity_estimator.of_one_view() if follows else method.velocity_estimator
     with products_on_one_thread():
-        method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
-    if before is not None and before.followed is None:  # a run that goes on
-        with products_on_one_thread():
-            before = replace(before, followed=_followed(_seen(before.number - 1, shot), shot, method))
+        method = replace(method, depth_prior=method.depth_prior.of_clip(shot), velocity_estimator=estimator)
+        if before is not None and follows and before.followed is None:  # a run that goes on
+            before = replace(before, followed=_followed(_seen(before.number - 1, shot)))
     first: Frame | None = None
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
-            frame = _frame(index, before, shot, method)
+            frame = _frame(index, before, shot, method, follows=follows)
         before = Carried.of(frame)
         if index == 0 and count > 1:
             first = frame
@@ -119,20 +120,17 @@ def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator
         del frame  # velocities take most of the memory
 
 
-def _frame(index: int, before: Carried | None, shot: Shot, method: Method) -> Frame:
+def _frame(index: int, before: Carried | None, shot: Shot, method: Method, *, follows: bool) -> Frame:
     """One frame, counted from 0, from its pictures and the frame before."""
     began = time.perf_counter()
     domain, dt = shot.optics.domain, 1.0 / shot.clip.fps
-    predicted = carried = None
+    predicted = None
     # from where there was no smoke nothing is carried
     if before is not None and index >= 2 and before.density.any():
         predicted = method.velocity_estimator.predict(before.estimated, dt)
-        # what a moving camera does not see no picture corrects, so that its mass has to be kept
-        moved = before.density if before.steady is None else before.steady
-        carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
     views = _seen(index, shot)
-    fitted, taken_over = _density(views, before, carried, predicted, shot, method)
-    followed = _followed(views, shot, method)
+    fitted, taken_over = _density(views, before, predicted, shot, method)
+    followed = _followed(views) if follows else None
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
     fit_done = time.perf_counter()
@@ -170,11 +168,9 @@ def _seen(index: int, shot: Shot) -> ViewSet | None:
     return ViewSet.of(observations, shot.optics, index) if observations else None
 
 
-def _followed(views: ViewSet | None, shot: Shot, method: Method) -> Picture | None:
-    """What is followed of the picture of a camera that stands still and sees the smoke alone."""
-    if views is None or not method.follows_picture or len(shot.views) > 1 or shot.moves:
-        return None
-    return followed_picture(views.views[0])
+def _followed(views: ViewSet | None) -> Picture | None:
+    """What is followed of the only camera's picture; None if it shows nothing of the domain."""
+    return None if views is None else followed_picture(views.views[0])
 
 
 def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:
@@ -193,30 +189,37 @@ def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
 
 
 def _density(
-    views: ViewSet | None,
-    before: Carried | None,
-    carried: Volume | None,
-    predicted: Velocity | None,
-    shot: Shot,
-    method: Method,
+    views: ViewSet | None, before: Carried | None, predicted: Velocity | None, shot: Shot, method: Method
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     if views is None:
-        return _unseen(shot.optics.domain, carried), {}
+        return _unseen(shot.optics.domain, _carried(before, predicted, shot)), {}
     depth = method.depth_prior.estimate(views)
-    if before is None or carried is None or predicted is None:
+    carried = _carried(before, predicted, shot)
+    if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
-    carried_smooth = None
-    if before.smooth is not None:
-        carried_smooth = carry(before.smooth, predicted, 1.0 / shot.clip.fps, shot.optics.domain.voxel_size)
-    start = method.temporal_prior.start(depth.views, depth, carried, before.density, carried_smooth)
-    del carried_smooth  # the fit needs the memory
+    start = method.temporal_prior.start(depth.views, depth, carried, Smoke(before.density, before.smooth))
+    # what a moving camera does not see now it may have seen before
+    unseen = carried.density if shot.moves else None
+    del carried  # the fit needs the memory
     fitted = method.density_fit.fit(views, depth, start.density)
-    if shot.moves:
-        # what a moving camera does not see now it may have seen before
+    if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
-        fitted = replace(fitted, density=np.where(visible, fitted.density, carried), steady=None)
+        fitted = replace(fitted, density=np.where(visible, fitted.density, unseen), steady=None)
     return fitted, start.figures
+
+
+def _carried(before: Carried | None, predicted: Velocity | None, shot: Shot) -> Smoke | None:
+    """The smoke of the frame before, carried along; None where there is none or no prediction."""
+    if before is None or predicted is None:
+        return None
+    dt, voxel_size = 1.0 / shot.clip.fps, shot.optics.domain.voxel_size
+    steady = before.density if before.steady is None else before.steady
+    return Smoke(
+        # what a moving camera does not see no picture corrects, so that its mass has to be kept
+        carry(steady, predicted, dt, voxel_size, conserve=shot.moves),
+        None if before.smooth is None else carry(before.smooth, predicted, dt, voxel_size),
+    )
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
@@ -230,8 +233,8 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
     return flame_emission(seen.image @ colour / (colour @ colour), seen.camera, density, shot.optics)
 
 
-def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:
+def _unseen(domain: Domain, carried: Smoke | None) -> FittedDensity:
     """The density of a frame whose picture shows nothing of the domain: what was carried along."""
     nothing: Array = np.zeros(domain.resolution, np.float32)
     figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
-    return FittedDensity(nothing if carried is None else carried, nothing > 0, figures)
+    return FittedDensity(nothing if carried is None else carried.density, nothing > 0, figures)

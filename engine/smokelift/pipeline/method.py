@@ -40,8 +40,8 @@ class Method:
     temporal_prior
         What a frame takes over from the one before.
     follows_picture
-        Whether the velocity is corrected by what moves in the picture, where one camera alone sees the smoke
-        (`pipeline.seen_motion`).
+        Whether, where one camera that stands still alone sees the smoke, the velocity is estimated as of one view and
+        corrected by what moves in the picture (`VelocityEstimator.of_one_view`, `pipeline.seen_motion`).
     """
 
     density_fit: DensityFit

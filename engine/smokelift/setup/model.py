@@ -17,10 +17,6 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
 
-ONE_VIEW_SMOOTHNESS = 10.0
-"""Factor on the velocity's smoothness where a camera that stands still alone sees the smoke: what moves is mixed along
-its rays then, and a depth that is assumed anew in every frame moves as well (docs/experiments/velocity-one-view.md)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -56,10 +52,8 @@ def choose_model(
     """
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.value)
-    several = bool(scene.views) or scene.camera.moves
-    smoothness = velocity.smoothness if several else ONE_VIEW_SMOOTHNESS * velocity.smoothness
     if not frames:
-        return Model(replace(velocity, levels=velocity.grids, smoothness=smoothness), ())
+        return Model(replace(velocity, levels=velocity.grids), ())
 
     @cache
     def density(number: int) -> FittedDensity | None:
@@ -75,7 +69,7 @@ def choose_model(
     followed = sorted({min(number, length - 2) for number in frames if length > 1})
     levels = _levels(followed, density, next(iter(frames.values())).scene.domain, scene.domain, velocity)
     chosen = (_inside(densities, scene), _iterations(densities, settings), coarsened, levels)
-    return Model(replace(velocity, levels=levels.value, smoothness=smoothness), chosen)
+    return Model(replace(velocity, levels=levels.value), chosen)
 
 
 def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:

@@ -29,6 +29,10 @@ from smokelift.velocity.pyramid import Level, coarsen, pyramid, refine, smoothed
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import SourceDetection
 
+ONE_VIEW_SMOOTHNESS = 10.0
+"""Factor on `smoothness` for densities of one view: what moves is mixed along its rays, and a depth that is assumed
+anew in every frame moves as well (docs/experiments/velocity-one-view.md)."""
+
 CONFIDENCE_WIDTH = 2.0
 """Standard deviation in voxels over which gradients count: smoothness carries what they show about as far."""
 
@@ -87,6 +91,10 @@ class CoarseToFine:
         """The velocity of the next frame if no force acts, carried along on its grid."""
         predicted = predict_velocity(velocity, dt)
         return smoothed(predicted) if self.settings.coarsening else predicted
+
+    def of_one_view(self) -> CoarseToFine:
+        """Return itself with more smoothness."""
+        return replace(self, settings=replace(self.settings, smoothness=ONE_VIEW_SMOOTHNESS * self.settings.smoothness))
 
 
 class _Solved(NamedTuple):

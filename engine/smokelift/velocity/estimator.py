@@ -63,6 +63,10 @@ class VelocityEstimator(Protocol):
         """The velocity of the next frame if no force acts, on the grid of the one given: see `predict_velocity`."""
         ...
 
+    def of_one_view(self) -> VelocityEstimator:
+        """The estimator for densities that one camera alone saw, standing still; itself if it makes no difference."""
+        ...
+
 
 def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
     """The velocity of the next frame if no force acts: carried along by itself, then projected.

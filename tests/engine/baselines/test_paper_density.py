@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy
-from smokelift.density import FittedDensity, Observation, ViewSet
+from smokelift.density import FittedDensity, Observation, Smoke, ViewSet
 from smokelift.render import DeviceError, device, render, scene_optics
 from smokelift.scene import Scene, completed, orbit
 
@@ -80,4 +80,5 @@ def test_all_of_the_carried_density_is_taken(plume, small) -> None:
     """As it is."""
     views = ViewSet.of([Observation(small.camera, render(plume.densities[1], small))], scene_optics(completed(small)))
     depth = OrthogonalCopy().estimate(views)
-    assert AllCarried().start(views, depth, plume.densities[1], plume.densities[0]).density is plume.densities[1]
+    carried, before = Smoke(plume.densities[1]), Smoke(plume.densities[0])
+    assert AllCarried().start(views, depth, carried, before).density is carried.density

@@ -78,7 +78,6 @@ def test_no_detail_is_the_smooth_prior_itself(shot) -> None:
     estimate = prior.estimate(views)
     np.testing.assert_array_equal(estimate.density, RoundDepth().of_clip(shot).estimate(views).density)
     assert estimate.detail is None
-    assert estimate.smooth is None
 
 
 def test_another_seed_is_another_smoke(shot) -> None:
@@ -94,11 +93,11 @@ def test_what_is_known_of_the_side_is_kept(shot) -> None:
     """Amount of smoke by height, and where it is in depth."""
     views = ViewSet.of(shot.observe(2), shot.optics, 2)
     estimate = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views)
-    assert estimate.smooth is not None
+    assert estimate.detail is not None
     found = FIT.fit(views, estimate, None).density
-    layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.smooth))
+    layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.detail.smooth))
     assert np.abs(layers - kept).sum() < 0.1 * kept.sum()
-    place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.smooth))
+    place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.detail.smooth))
     assert place == pytest.approx(smooth, abs=0.6)
 
 
@@ -110,9 +109,8 @@ def lobes(scene: Scene, across: int) -> float:
         views = ViewSet.of(shot.observe(2), shot.optics, 2)
         estimate = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views)
     size = across // 6
-    smooth, noisy = (
-        density.reshape(6, size, 6, size, 8, size).mean((1, 3, 5)) for density in (estimate.smooth, estimate.density)
-    )
+    both = estimate.detail.smooth, estimate.density
+    smooth, noisy = (density.reshape(6, size, 6, size, 8, size).mean((1, 3, 5)) for density in both)
     smoky = smooth > 0.1 * smooth.max()
     return float(np.log(noisy[smoky] / smooth[smoky]).std())
 

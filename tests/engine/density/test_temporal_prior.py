@@ -16,6 +16,7 @@ from smokelift.density import (
     NothingCarried,
     Observation,
     RoundDepth,
+    Smoke,
     Start,
     ViewSet,
 )
@@ -45,7 +46,7 @@ class Moment:
 
     def start(self, carried: Volume) -> Start:
         """Where the fit starts with a carried density."""
-        return BlendCarried(LARGEST).start(self.views, self.depth, carried, self.before)
+        return BlendCarried(LARGEST).start(self.views, self.depth, Smoke(carried), Smoke(self.before))
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +116,7 @@ def test_even_fog_is_no_failure(moment) -> None:
 
 def test_nothing_carried_is_the_priors_density(moment) -> None:
     """Whatever comes along."""
-    start = NothingCarried().start(moment.views, moment.depth, moment.true, moment.before)
+    start = NothingCarried().start(moment.views, moment.depth, Smoke(moment.true), Smoke(moment.before))
     assert start.density is moment.prior
     assert start.figures == {}
 
@@ -130,6 +131,7 @@ class Lobes:
     """Detail whose lobes are some voxels wide."""
 
     views: ViewSet
+    smooth: Volume
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         return density
@@ -142,12 +144,13 @@ class Lobes:
 def prior_start(moment) -> DepthEstimate:
     """What a depth prior says that has made something up: its smooth answer beside a density."""
     density = 0.9 * moment.prior + 0.1 * blurred(moment.prior)
-    return replace(moment.depth, smooth=moment.prior, density=density, detail=Lobes(moment.views))
+    return replace(moment.depth, density=density, detail=Lobes(moment.views, moment.prior))
 
 
-def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume) -> Start:
+def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume, smooth: Volume | None = None) -> Start:
     """Where a guided simulation starts, with all of what is carried."""
-    return GuidedSimulation(LARGEST, kept=1.0).start(moment.views, prior_start, carried, moment.before)
+    carried_smoke, before = Smoke(carried, smooth), Smoke(moment.before)
+    return GuidedSimulation(LARGEST, kept=1.0).start(moment.views, prior_start, carried_smoke, before)
 
 
 def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, prior_start) -> None:
@@ -174,15 +177,13 @@ def test_detail_is_born_where_nothing_is_carried(moment, prior_start) -> None:
 
 def test_a_hole_that_smoke_entered_through_is_filled(moment, prior_start) -> None:
     """It is narrower than the blur; where the smooth answer came along, a gap is detail and stays."""
-    smooth, holed = prior_start.smooth, moment.true.copy()
+    smooth, holed = moment.prior, moment.true.copy()
     entrance = np.zeros_like(moment.views.hull)
     row = int(smooth.sum((0, 1)).argmax())
     entrance[:, :, row] = moment.views.hull[:, :, row]
     holed[entrance] = 0
-    simulation = GuidedSimulation(LARGEST, kept=1.0)
     gap, hole = (
-        simulation.start(moment.views, prior_start, holed, moment.before, came).density
-        for came in (smooth, np.where(entrance, np.float32(0), smooth))
+        guided(moment, prior_start, holed, came).density for came in (smooth, np.where(entrance, np.float32(0), smooth))
     )
     np.testing.assert_array_equal(gap, guided(moment, prior_start, holed).density)
     dense = entrance & (smooth > smooth[moment.views.hull].mean())
@@ -193,5 +194,5 @@ def test_a_hole_that_smoke_entered_through_is_filled(moment, prior_start) -> Non
 
 def test_without_anything_made_up_the_carried_density_is_judged(moment) -> None:
     """A depth prior that has no smooth answer of its own gets the blend."""
-    found = GuidedSimulation(LARGEST).start(moment.views, moment.depth, moment.true, moment.before)
+    found = GuidedSimulation(LARGEST).start(moment.views, moment.depth, Smoke(moment.true), Smoke(moment.before))
     np.testing.assert_array_equal(found.density, moment.start(moment.true).density)

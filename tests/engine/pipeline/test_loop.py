@@ -13,7 +13,7 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift.baselines.density import FixedRateDescent
-from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
+from smokelift.density import GradientFit, RoundDepth, Smoke, Start, ViewSet
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
@@ -25,6 +25,7 @@ from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
+from smokelift.pipeline.loop import Carried, frames_after
 from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.render import render, scene_renderer
 from smokelift.scene import (
@@ -392,6 +393,19 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     np.testing.assert_array_equal(rest[-1].density, both[-1].density)
 
 
+def test_where_no_picture_is_followed_a_run_goes_on_without_the_frame_before(two_views, draft, monkeypatch) -> None:
+    """Its picture is not read again."""
+    observed: list[int] = []
+    observe = Shot.observe
+    with Clip.open(two_views.clip) as clip:
+        shot = prepare_shot(clip, two_views, replace(draft, detail=0.0))
+        method = compose(shot.settings)
+        first = next(frames_after(None, shot, method))
+        monkeypatch.setattr(Shot, "observe", lambda shot, frame: observed.append(frame) or observe(shot, frame))
+        next(frames_after(Carried.of(first), shot, method))
+    assert observed == [1]
+
+
 def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
     """The pictures of all views of that moment, and nothing else."""
     settings = replace(draft, transport=0.0, detail=0.0)
@@ -410,7 +424,7 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, settings)
         camera = shot.observe(1)[0].camera
-    estimator, domain = compose(shot.settings).velocity_estimator, shot.optics.domain
+    estimator, domain = compose(shot.settings).velocity_estimator.of_one_view(), shot.optics.domain
     first, second = by_themselves[:2]
     assert first.smooth is not None and second.smooth is not None
     assert first.followed is not None and second.followed is not None
@@ -593,10 +607,8 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     """The loop asks each part for what it is for: here the temporal prior, which puts every frame on the one before."""
 
     class Stubborn:
-        def start(
-            self, views: Any, depth: Any, carried: np.ndarray, before: np.ndarray, carried_smooth: object = None
-        ) -> Start:
-            return Start(before, {"stubborn": 1.0})
+        def start(self, views: Any, depth: Any, carried: Smoke, before: Smoke) -> Start:
+            return Start(before.density, {"stubborn": 1.0})
 
     class Idle:
         def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:

@@ -34,7 +34,6 @@ from smokelift.setup import illumination, scattering
 from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.model import ONE_VIEW_SMOOTHNESS
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -428,9 +427,13 @@ def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> Non
     assert shot_of(plume.write(tmp_path, densities, near), draft).estimates
 
 
-def test_a_velocity_that_one_camera_shows_is_smoother(plume, tracked, two_views, draft) -> None:
-    """Not where several do, or one that travels."""
-    usual = draft.velocity.smoothness
-    assert shot_of(plume.scene, draft).settings.velocity.smoothness == pytest.approx(ONE_VIEW_SMOOTHNESS * usual)
-    assert shot_of(two_views, draft).settings.velocity.smoothness == usual
-    assert shot_of(tracked, draft).settings.velocity.smoothness == usual
+def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
+    """What was chosen is given then, and chooses the same."""
+    first = shot_of(plume.scene, draft)
+    assert shot_of(plume.scene, first.settings).settings == first.settings
+
+
+def test_a_camera_is_alone_where_no_other_sees_the_smoke_and_it_stands_still(plume, tracked, two_views, draft) -> None:
+    """Its rays mix what moves."""
+    shots = [shot_of(scene, draft) for scene in (plume.scene, two_views, tracked)]
+    assert [shot.alone for shot in shots] == [True, False, False]

@@ -14,6 +14,7 @@ from scipy import ndimage
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.transport import face_shapes
 from smokelift.velocity import CoarseToFine, ProjectedCG, Velocity, VelocitySettings, estimate_velocity
+from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
 from smokelift.velocity.estimator import refined_to
 from tests.engine.velocity.known_motions import (
     DT,
@@ -49,6 +50,13 @@ def test_recovers_a_translation(motion):
     velocity = estimate_velocity(before, after, DT, VOXEL, SMOOTH)
     assert error_in_smoke(velocity, after, truth) < 0.05
     assert velocity.figures["divergence"] < 1e-5
+
+
+def test_an_estimate_of_one_view_is_smoother():
+    """Nothing else of it changes; the paper's has no such thing."""
+    smooth = dataclasses.replace(VelocitySettings(), smoothness=ONE_VIEW_SMOOTHNESS * VelocitySettings().smoothness)
+    assert DEFAULT.of_one_view() == CoarseToFine(smooth)
+    assert PAPER.of_one_view() == PAPER
 
 
 @pytest.mark.parametrize(("coarsening", "limit"), [(1, 0.08), (2, 0.25)])
