@@ -1,6 +1,6 @@
 """Velocity estimates against known velocities, in many circumstances: a table in Markdown.
 
-    python -m benchmarks.velocity.accuracy [--picture SLICES.png] plume-1/truth.npz jet-1/truth.npz ...
+    python -m benchmarks.velocity.accuracy plume-1/truth.npz jet-1/truth.npz ...
 
 `benchmarks.truth` bakes such files. Estimates do not know where smoke enters, except in the row "inlet known". Figures
 are means over at least eight frames, inside the smoke and the two voxels around it, without the cells of the inlet,
@@ -104,15 +104,20 @@ def pairs(
 
 def chain(truth: Truth, unit: float, closed: tuple[Side, ...] = ()) -> Iterator[Score]:
     """Score estimates whose prediction is the estimate of the frame before."""
+    for frame, (seconds, found) in zip(CHAIN, estimates(truth, closed), strict=True):
+        if frame >= CHAIN.start + SETTLED:
+            yield score(truth, frame, found, seconds / unit)
+
+
+def estimates(truth: Truth, closed: tuple[Side, ...] = ()) -> Iterator[tuple[float, Velocity]]:
+    """Yield the estimates of a chain of frames with their times (s)."""
     estimator, prediction = CoarseToFine(), None
     for frame in CHAIN:
         densities = truth.density(frame), truth.density(frame + 1)
         start = time.perf_counter()
         found = estimator.estimate(*densities, truth.dt, truth.voxel_size, closed=closed, prediction=prediction)
         prediction = estimator.predict(found, truth.dt)
-        seconds = time.perf_counter() - start
-        if frame >= CHAIN.start + SETTLED:
-            yield score(truth, frame, found, seconds / unit)
+        yield time.perf_counter() - start, found
 
 
 def blurred(density: Array) -> Array:
@@ -157,45 +162,14 @@ def table(path: Path) -> list[list[str]]:
     return cells
 
 
-def draw(paths: list[Path], out: Path) -> None:
-    """Draw slices of the upward velocity after a chain, beside the truth's, from the front and from the side."""
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(len(paths), 4, figsize=(10, 3.6 * len(paths)), squeeze=False)
-    for row, path in zip(axes, paths, strict=True):
-        truth = Truth.load(path)
-        estimator, prediction, frame = CoarseToFine(), None, CHAIN.start
-        for frame in CHAIN:
-            densities = truth.density(frame), truth.density(frame + 1)
-            found = estimator.estimate(*densities, truth.dt, truth.voxel_size, prediction=prediction)
-            prediction = estimator.predict(found, truth.dt)
-        smoke = near_smoke(truth.density(frame + 1))
-        heaviest = [int(truth.density(frame).sum(axis=tuple(d for d in range(3) if d != a)).argmax()) for a in (0, 1)]
-        limit = float(np.abs(truth.velocity(frame).centres()[smoke]).max())
-        for column, (axis, name) in enumerate([(1, "front"), (0, "side")]):
-            for k, (what, velocity) in enumerate([("truth", truth.velocity(frame)), ("estimate", found)]):
-                upward = np.where(smoke, velocity.centres()[..., 2], np.nan)
-                plot = row[2 * column + k]
-                picture = upward.take(heaviest[axis], axis).T
-                plot.imshow(picture, origin="lower", cmap="RdBu_r", vmin=-limit, vmax=limit)
-                plot.set_title(f"{path.parent.name}, {name}: {what}", fontsize=8)
-                plot.axis("off")
-    figure.suptitle("Upward velocity in the slices with most smoke", fontsize=10)
-    figure.tight_layout()
-    figure.savefig(out, dpi=70)
-
-
 def main() -> None:
-    """Print the table, draw the slices."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("truths", nargs="+", type=Path, metavar="TRUTH.npz")
-    parser.add_argument("--picture", type=Path, metavar="PNG")
     options = parser.parse_args()
     names = [field.name for field in fields(Score)]
     rows = [row for path in options.truths for row in table(path)]
     print(markdown(["scene", "", *names[:-1], "worst", names[-1]], rows))
-    if options.picture:
-        draw(options.truths, options.picture)
 
 
 if __name__ == "__main__":
