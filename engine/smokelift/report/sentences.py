@@ -68,6 +68,10 @@ SENTENCES: Mapping[str, str] = {
         "One frame alone does not show what moves: the color around it counts as background, and all that has another "
         "as smoke. If that is wrong, hide what is no smoke by a mask, or give a clean plate or a color as background."
     ),
+    "background never seen": (
+        "Next to nothing of the picture is ever free of smoke, so what is behind it is taken to be black. Give a clean "
+        "plate or a color as background."
+    ),
     "background of few frames": (
         "Only {frames} frames show what is behind the smoke: what is the same in all that there are counts as "
         "background, smoke too. Give a clean plate or a color as background."
