@@ -228,7 +228,10 @@ def _of_one_colour(
 ) -> Plate:
     """The plate of one colour with the objects before it."""
     image = np.tile(colour, (*objects.shape, 1))
-    noise = _noise(even, image, white)
+    deviations = _deviations(even, image)
+    # smoke draws one colour to one side, so that to the other there is noise alone
+    sides = (np.where(beyond, np.float32(np.nan), deviations) for beyond in (deviations > 0, deviations < 0))
+    noise = noise_of(white, np.minimum(*map(spread_about, sides)), even.scale**2)
     whole = np.tile(colour, (*clip.size[::-1], 1))
     if objects.any():
         own = np.median(even.pictures[:, objects], axis=0)
@@ -257,6 +260,11 @@ def _white_noise(clip: Clip, proxy: Proxy) -> Picture:
 
 def _noise(proxy: Proxy, background: Picture, white: Picture) -> Noise:
     """The noise of the file's pixels before a linear background (rows, columns, 3)."""
+    return noise_of(white, spread_about(_deviations(proxy, background)), proxy.scale**2)
+
+
+def _deviations(proxy: Proxy, background: Picture) -> Picture:
+    """How pictures (frames, rows, columns, 3) differ from a linear background, in sRGB values."""
     deviations = proxy.encoded - linear_to_srgb(background)
     deviations[~proxy.seen] = np.nan
-    return noise_of(white, spread_about(deviations), proxy.scale**2)
+    return deviations

@@ -56,6 +56,21 @@ def test_fog_that_fills_black_is_no_noise(tmp_path: Path, frames: tuple[int, int
         assert (share * picture).sum() > 0.98 * picture.sum()
 
 
+def test_faint_fog_before_one_colour_is_no_noise(tmp_path: Path) -> None:
+    """It goes to one side of the colour, and noise to both."""
+    random = np.random.default_rng(2)
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    for n in range(COUNT):
+        faint = 6 * np.clip(np.sin(rows / 9 + n / 2) * np.sin(columns / 11 - n / 3), 0, 1) + random.normal(
+            0, 1, rows.shape
+        )
+        write_image(tmp_path / f"faint_{n:02d}.png", srgb_to_linear((60 + faint)[..., None].repeat(3, -1) / 255))
+    with Clip.open(tmp_path / "faint_##.png", fps=24) as clip:
+        found = find_backdrop(clip, None, None)
+    assert found.source == "colour"
+    assert found.plates.noise.lasting.max() * 255 < 1.3
+
+
 @pytest.mark.parametrize("haze", [0.0, 0.15])
 def test_fog_that_never_leaves_is_before_black(tmp_path: Path, haze: float) -> None:
     """No pixel is ever clear, so no picture is behind it that a clip would show; all light is the fog's."""
