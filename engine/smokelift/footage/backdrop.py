@@ -48,7 +48,7 @@ MOSTLY = 0.5
 passes by."""
 
 MIN_KNOWN = 0.1
-"""Share of a picture that is ever seen clear, below which it tells nothing: of public clips before something it is .25
+"""Share of a picture that is ever seen clear, below which it tells nothing: of public clips before something it is .2
 and more (docs/clips.md)."""
 
 TEXTURE = np.float32(6 / 255)

@@ -10,7 +10,7 @@ from films import HEIGHT, WIDTH, film, overlap, plate_of, wall
 from scipy import ndimage
 
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.matte import MIN_DEVIATION, FULL_DEVIATION, MAX_SMOOTHING, SMOOTHING, matte, smoothing
+from smokelift.footage.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
 from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.steady import without_noise_light
