@@ -15,7 +15,7 @@ from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.colour_weight import ColourWeight
 from smokelift.density.hull import Places, Projection, common_hull, project_voxels, reached
-from smokelift.footage.matte import SMOKE_THRESHOLD, matte
+from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics, Renderer
@@ -25,8 +25,9 @@ from smokelift.scene.checks import LARGEST
 THINNEST_CLEAR = 0.05
 """Transmittance at least: a brightness does not show an optical depth above 3."""
 
-PATCH = 3
-"""Pixels along a shaded side of smoke at least (docs/experiments/bright-background.md)."""
+SHADED, PATCH = 4.0, 3
+"""Noise by which a shaded side of smoke turns away from its source radiance, and pixels along it, at least
+(docs/experiments/bright-background.md)."""
 
 SHADED_DEPTH = 1.5
 """Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
@@ -298,7 +299,7 @@ def _in_shadow(image: Image, plate: Plate, mask: NDArray[np.bool_], contrast: ND
     noise = np.sum((noise_at(image, plate) * contrast) ** 2, -1)
     if plate.errors.any():
         noise += (1 - plate.confidence) * np.sum((contrast @ plate.errors) * contrast, -1)
-    beyond = (away > SMOKE_THRESHOLD * np.sqrt(noise)) & mask
+    beyond = (away > SHADED * np.sqrt(noise)) & mask
     return np.asarray(ndimage.binary_opening(beyond, np.ones((PATCH, PATCH))))
 
 

@@ -1,8 +1,8 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
 In this order: what an alpha channel says; what the scene gives; one colour, if that is the likeliest by the whole file
-(`background_kind`); else the picture that the clear frames show (`clear_picture`), steadied if the camera turns
-(`turning`). The clip's noise is measured on what cannot be smoke, before all else (`noise`).
+(`background_kind`); the picture that the clear frames show (`clear_picture`), steadied if the camera turns (`turning`);
+black, if they show next to nothing. The clip's noise is measured on what cannot be smoke, before all else (`noise`).
 """
 
 from __future__ import annotations
@@ -47,13 +47,17 @@ MOSTLY = 0.5
 """Share of the picture that shows one colour, on the mean, from which on it is no texture that
 passes by."""
 
+MIN_KNOWN = 0.1
+"""Share of a picture that is ever seen clear, below which it tells nothing: of public clips before something it is .2
+and more (docs/clips.md)."""
+
 TEXTURE = np.float32(6 / 255)
 """White noise in sRGB values from which on it is texture that a moving camera sees."""
 
 NO_ERRORS = np.zeros((3, 3), np.float32)
 """Covariance of the errors of what is known."""
 
-Source = Literal["alpha", "given", "colour", "colour around one frame", "picture"]
+Source = Literal["alpha", "given", "colour", "colour around one frame", "black for want of a picture", "picture"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,11 +197,17 @@ def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
             plate = _picture(steadied, part, white, masked=False)
             made = partial(made, frames=len(part.numbers), steadied=(panorama, plate), cut=cut)
             return made("picture", plates=panorama.plates(plate, clip), quantiser=median_quantiser(clip.path))
-    if found.colour is not None:
-        red, green, blue = (float(v) for v in found.colour)
-        plate = _of_one_colour(clip, part, even, gains, found.colour, found.objects, white)
-        return made("colour", plates=plate, colour=(red, green, blue))
-    return made("picture", plates=_picture(clip, part, white, masked=True), quantiser=median_quantiser(clip.path))
+    colour, objects = found.colour, found.objects
+    source: Source = "colour"
+    if colour is None:
+        plate = _picture(clip, part, white, masked=True)
+        if plate.confidence.mean() >= MIN_KNOWN:
+            return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
+        # fog that drifts over all of the file: it is shown as it was made, before black
+        colour, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
+    red, green, blue = (float(v) for v in colour)
+    plate = _of_one_colour(clip, part, even, gains, colour, objects, white)
+    return made(source, plates=plate, colour=(red, green, blue))
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, *, masked: bool) -> Plate:
@@ -218,7 +228,10 @@ def _of_one_colour(
 ) -> Plate:
     """The plate of one colour with the objects before it."""
     image = np.tile(colour, (*objects.shape, 1))
-    noise = _noise(even, image, white)
+    deviations = _deviations(even, image)
+    # smoke draws one colour to one side, so that to the other there is noise alone
+    sides = (np.where(beyond, np.float32(np.nan), deviations) for beyond in (deviations > 0, deviations < 0))
+    noise = noise_of(white, np.minimum(*map(spread_about, sides)), even.scale**2)
     whole = np.tile(colour, (*clip.size[::-1], 1))
     if objects.any():
         own = np.median(even.pictures[:, objects], axis=0)
@@ -247,6 +260,11 @@ def _white_noise(clip: Clip, proxy: Proxy) -> Picture:
 
 def _noise(proxy: Proxy, background: Picture, white: Picture) -> Noise:
     """The noise of the file's pixels before a linear background (rows, columns, 3)."""
+    return noise_of(white, spread_about(_deviations(proxy, background)), proxy.scale**2)
+
+
+def _deviations(proxy: Proxy, background: Picture) -> Picture:
+    """How pictures (frames, rows, columns, 3) differ from a linear background, in sRGB values."""
     deviations = proxy.encoded - linear_to_srgb(background)
     deviations[~proxy.seen] = np.nan
-    return noise_of(white, spread_about(deviations), proxy.scale**2)
+    return deviations

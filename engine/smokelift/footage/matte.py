@@ -1,6 +1,9 @@
 """Where a frame shows smoke: its deviation from the background, in units of the clip's noise.
 
-How much the constants matter: docs/experiments/background.md.
+A patch that deviates is smoke if noise makes so large and so strong a one too rarely: `FALSE_ALARMS` are expected in a
+picture, whatever its size (Desolneux, Moisan and Morel, "Meaningful alignments", 2000). So a wide veil needs to be
+hardly above the noise, and a speck has to be far above it. Within a patch, a pixel is as certain as it deviates.
+Figures: docs/experiments/background.md, docs/experiments/faint-rim.md.
 """
 
 from __future__ import annotations
@@ -9,28 +12,30 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+from scipy import ndimage, special
 
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb
 from smokelift.footage.noise import Noise
 from smokelift.footage.plate import Plate
 
-SMOKE_THRESHOLD = 4.0
-"""Deviation of a pixel that may be smoke, in units of noise. Twice as much is smoke for certain (hysteresis:
-Canny, "A computational approach to edge detection", 1986)."""
+FALSE_ALARMS = 0.01
+"""Number of patches of noise that are taken for smoke in a picture, on the mean."""
 
-CERTAIN_AREA = 1e-4
-"""Share of the picture that has to be smoke for certain in a patch of smoke; less is an accident of the noise."""
+PATCH_GROWTH = 4.06
+"""Factor by which the number of shapes of a patch grows with each sample of its area (lattice animals: Jensen and
+Guttmann, "Statistics of lattice animals", 2000)."""
+
+MIN_DEVIATION, FULL_DEVIATION = 1.5, 3.0
+"""Deviations from which a pixel counts, and counts fully, in units of noise (docs/experiments/faint-rim.md)."""
+
+MEASURED_DEVIATION = 4.0
+"""Deviation from which on a pixel shows smoke that box, light and colour are measured on, in units of noise."""
 
 SMOOTHING = 1.5
 """Standard deviation of the Gaussian that smooths the deviation, in pixels, at least."""
 
 MAX_SMOOTHING = 4.0
 """Standard deviation of that Gaussian in noise, in pixels, at most: more hides the smoke's own shape."""
-
-MIN_DEVIATION = 1.5
-"""Deviation from which on a pixel around certain smoke counts as smoke, in units of noise; with twice as much it counts
-fully (docs/experiments/faint-rim.md)."""
 
 GLOBAL_DEVIATION = 2.0
 """Units of noise. A median deviation of a frame up to this is treated as drift of exposure or of the codec, not as
@@ -45,22 +50,17 @@ class Matte:
     ----------
     deviation : (rows, columns)
         From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke.
-    mask : (rows, columns) bool
-        Patches of a deviation above `SMOKE_THRESHOLD` in which `CERTAIN_AREA` of the picture exceeds twice as much.
+    share : (rows, columns)
+        How certain a pixel shows smoke, from 0 to 1.
     """
 
     deviation: Picture
-    mask: npt.NDArray[np.bool_]
+    share: Picture
 
     @property
-    def share(self) -> Picture:
-        """How certain a pixel (rows, columns) shows smoke, from 0 to 1.
-
-        It is 1 in the mask, and around it as much as the deviation is above `MIN_DEVIATION`.
-        """
-        share = np.clip(self.deviation / MIN_DEVIATION - 1, 0, 1)
-        share[~_around_certain(self.deviation, MIN_DEVIATION)] = 0
-        return np.asarray(share)
+    def mask(self) -> npt.NDArray[np.bool_]:
+        """Pixels (rows, columns) that show smoke to measure on."""
+        return np.asarray((self.deviation > MEASURED_DEVIATION) & (self.share > 0))
 
 
 def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
@@ -95,14 +95,26 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     smooth = blurred(difference, width)
     deviation = np.sqrt(channel_mean(smooth**2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
-    return Matte(deviation, _around_certain(deviation, SMOKE_THRESHOLD))
+    share = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
+    share[~_meaningful(deviation, 4 * np.pi * smoothing(plate.noise) ** 2)] = 0
+    return Matte(deviation, share)
 
 
-def _around_certain(deviation: Picture, threshold: float) -> npt.NDArray[np.bool_]:
-    """Patches (rows, columns) of a deviation above a threshold that hold enough smoke that is certain."""
-    patches, count = ndimage.label(deviation > threshold, structure=np.ones((3, 3)))
-    certain = np.bincount(patches[deviation > 2.0 * SMOKE_THRESHOLD], minlength=count + 1)
-    return np.asarray((certain > CERTAIN_AREA * patches.size)[patches])
+def _meaningful(deviation: Picture, sample: float) -> npt.NDArray[np.bool_]:
+    """Patches (rows, columns) of a deviation above `MIN_DEVIATION` that noise makes too rarely.
+
+    ``sample`` is the number of pixels that noise has in common, so that a patch of noise is as likely as the product of
+    its samples' probabilities, each to deviate as far.
+    """
+    patches, count = ndimage.label(deviation > MIN_DEVIATION, structure=np.ones((3, 3)))
+    inside = patches > 0
+    # of a normal value to be as far from zero, to either side
+    probability = np.log(2 * PATCH_GROWTH) + special.log_ndtr(-deviation[inside])
+    surprise = -np.bincount(patches[inside], probability, count + 1) / sample
+    expected = np.log(max(deviation.size / sample, 1)) - surprise
+    rare = expected < np.log(FALSE_ALARMS)
+    rare[0] = False
+    return np.asarray(rare[patches])
 
 
 def smoothing(noise: Noise) -> float:

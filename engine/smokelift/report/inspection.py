@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from smokelift.checks import Doubt, Remark, counted
 from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
+from smokelift.footage.matte import Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit
 from smokelift.report.page import TILE, Fact, Page, Panel, fitted
@@ -34,6 +34,9 @@ ARROW = 0.35
 
 HEAD = 16.0
 """Length of its head in pixels."""
+
+STRONG = 16.0
+"""Deviation from the background that is shown brightest, in units of noise."""
 
 BINS = 96
 """Bins of the histogram."""
@@ -132,10 +135,10 @@ def _line(
 
 
 def _matte_picture(seen: Matte) -> Tile:
-    """The deviation from the background, white where it is certain, and orange where it is taken for smoke."""
-    strength = np.clip(seen.deviation / (4 * SMOKE_THRESHOLD), 0, 1)[..., None]
-    colour = np.where(seen.mask[..., None], np.array(SMOKE), np.array([255, 255, 255]))
-    return np.asarray(np.rint(strength * colour), np.uint8)
+    """The deviation from the background, orange as far as it is certain to be smoke."""
+    strength = np.clip(seen.deviation / STRONG, 0, 1)[..., None]
+    white = np.full(3, 255)
+    return np.asarray(np.rint(strength * (white + seen.share[..., None] * (SMOKE - white))), np.uint8)
 
 
 def _unknown_picture(plate: Plate, unknown: NDArray[np.bool_]) -> Tile:

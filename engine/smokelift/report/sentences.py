@@ -68,6 +68,10 @@ SENTENCES: Mapping[str, str] = {
         "One frame alone does not show what moves: the color around it counts as background, and all that has another "
         "as smoke. If that is wrong, hide what is no smoke by a mask, or give a clean plate or a color as background."
     ),
+    "background never seen": (
+        "Next to nothing of the picture is ever free of smoke, so what is behind it is taken to be black. Give a clean "
+        "plate or a color as background."
+    ),
     "background of few frames": (
         "Only {frames} frames show what is behind the smoke: what is the same in all that there are counts as "
         "background, smoke too. Give a clean plate or a color as background."
@@ -102,8 +106,8 @@ SENTENCES: Mapping[str, str] = {
     ),
     "smoke of several colours": (
         "The smoke has more than one color: its light is {degrees:.0f} degrees from the nearest single one on the "
-        "mean, but one is taken for all of it, so colors are wrong and the thickness may be. Crop the clip to smoke of "
-        "one color, or give it a mask."
+        "mean, but one is taken for all of it, so colors are wrong and the thickness may be. Use frames with smoke "
+        "of one color, crop the clip to it, or give a mask."
     ),
     # where the camera stands, and where the smoke is
     "assumed camera": (
@@ -286,7 +290,7 @@ SENTENCES: Mapping[str, str] = {
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
         "changes there, and its psnr is as high as it is because the smoke is faint. Give the background, the light or "
-        "the medium of the clip; `smokelift inspect` says what was taken."
+        "the medium of the clip, or a mask around its smoke; `smokelift inspect` says what was taken."
     ),
     "not all is smoke": (
         "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by {error:.0%} of "

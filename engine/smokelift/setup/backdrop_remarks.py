@@ -55,6 +55,8 @@ def backdrop_doubts(found: Backdrop) -> tuple[Doubt, ...]:
     """Why a background may be wrong."""
     if found.source == "colour around one frame":
         return (Doubt("background of one frame"),)
+    if found.source == "black for want of a picture":
+        return (Doubt("background never seen"),)
     few = found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES
     compressed = found.quantiser is not None and found.quantiser >= COARSE
     return (

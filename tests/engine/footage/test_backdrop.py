@@ -16,6 +16,7 @@ from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.output.images import write_image
 from smokelift.scene import Camera
+from smokelift.setup.backdrop_remarks import backdrop_doubts
 
 
 def spreading_ink(n: int) -> np.ndarray:
@@ -24,8 +25,11 @@ def spreading_ink(n: int) -> np.ndarray:
     return np.clip((62 * np.sqrt(n / COUNT) - rows - 6 * np.cos(columns / 4)) / 6, 0, 1) if n else 0.0 * rows
 
 
-def fog(folder: Path, frames: tuple[int, int] | None = None) -> Clip:
-    """Billows that fill the picture and drift by two pixels a frame, and pure black at both ends of the file."""
+def fog(folder: Path, frames: tuple[int, int] | None = None, haze: float | None = None) -> Clip:
+    """Billows that fill the picture and drift by two pixels a frame, and pure black at both ends of the file.
+
+    With haze (sRGB) they never leave, and it is added to them.
+    """
     count, rows, columns = 60, 90, 120
     random = np.random.default_rng(5)
     wide = sum(
@@ -34,8 +38,9 @@ def fog(folder: Path, frames: tuple[int, int] | None = None) -> Clip:
     )
     wide = (wide - wide.min()) / np.ptp(wide)
     for n in range(count):
-        amount = 0.7 * np.clip(min(n, count - 1 - n) / 12, 0, 1)
-        write_image(folder / f"fog_{n:02d}.png", srgb_to_linear(amount * wide[:, 2 * n : 2 * n + columns]))
+        amount = 0.7 * np.clip(min(n, count - 1 - n) / 12, 0, 1) if haze is None else 0.7
+        billows = amount * wide[:, 2 * n : 2 * n + columns] + (haze or 0)
+        write_image(folder / f"fog_{n:02d}.png", srgb_to_linear(billows))
     return Clip.open(folder / "fog_##.png", fps=24, frames=frames)
 
 
@@ -48,6 +53,33 @@ def test_fog_that_fills_black_is_no_noise(tmp_path: Path, frames: tuple[int, int
         assert found.plates.noise.total.max() < 2 / 255
         picture = clip.frame(len(clip) // 2)
         share = matte(picture, found.plates.at(0)).share[..., None]
+        assert (share * picture).sum() > 0.98 * picture.sum()
+
+
+def test_faint_fog_before_one_colour_is_no_noise(tmp_path: Path) -> None:
+    """It goes to one side of the colour, and noise to both."""
+    random = np.random.default_rng(2)
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    for n in range(COUNT):
+        faint = 6 * np.clip(np.sin(rows / 9 + n / 2) * np.sin(columns / 11 - n / 3), 0, 1) + random.normal(
+            0, 1, rows.shape
+        )
+        write_image(tmp_path / f"faint_{n:02d}.png", srgb_to_linear((60 + faint)[..., None].repeat(3, -1) / 255))
+    with Clip.open(tmp_path / "faint_##.png", fps=24) as clip:
+        found = find_backdrop(clip, None, None)
+    assert found.source == "colour"
+    assert found.plates.noise.lasting.max() * 255 < 1.3
+
+
+@pytest.mark.parametrize("haze", [0.0, 0.15])
+def test_fog_that_never_leaves_is_before_black(tmp_path: Path, haze: float) -> None:
+    """No pixel is ever clear, so no picture is behind it that a clip would show; all light is the fog's."""
+    with fog(tmp_path, haze=haze) as clip:
+        found = find_backdrop(clip, None, None)
+        assert found.source == "black for want of a picture"
+        assert [doubt.kind for doubt in backdrop_doubts(found)] == ["background never seen"]
+        picture = clip.frame(30)
+        share = matte(picture, found.plates.at(30)).share[..., None]
         assert (share * picture).sum() > 0.98 * picture.sum()
 
 

@@ -167,7 +167,7 @@ def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
     assert np.median(codes_apart(plate.image, truth)[inner]) < 15
 
 
-def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_path: Path) -> None:
+def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_path: Path) -> None:
     """A dark jacket before a bright wall that breathes by ten codes, beside a puff."""
     jacket = np.s_[40:, :12]
     truth = wall(0.6, 0.9)
@@ -183,7 +183,6 @@ def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_pat
     inner = np.s_[44:, :9]
     assert plate.confidence[inner].min() == 1.0
     assert codes_apart(plate.image, truth)[inner].max() < 12
-    assert not matte(clip.frame(12), plate).mask[inner].any()
 
 
 def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:

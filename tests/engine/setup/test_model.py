@@ -217,7 +217,7 @@ def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
 def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draft, monkeypatch) -> None:
     def blind(frame, plate):
         judged = matte(frame, plate)
-        return replace(judged, mask=np.zeros_like(judged.mask))
+        return replace(judged, share=np.zeros_like(judged.share))
 
     monkeypatch.setattr("smokelift.setup.coarse.matte", blind)
     shot = shot_of(plume.scene, draft)

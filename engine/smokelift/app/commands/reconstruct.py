@@ -15,7 +15,6 @@ from smokelift.app.options import add_run_options, named_path, require_folder, s
 from smokelift.app.progress import Reporter, median_psnr
 from smokelift.checks import Figures, Remark
 from smokelift.footage.clip import Clip
-from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
 from smokelift.output.writer import check_directory, written_kinds
@@ -74,8 +73,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
         raise ValueError(
-            f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
-            f"clip's noise, so all frames in {options.out} are empty. "
+            f"No smoke found: nothing differs from the background by more than the clip's noise makes, so all frames "
+            f"in {options.out} are empty. "
             f"{sentence(what_helps(shot.clip, shot.views[0].plates, scene.background is not None))}"
         )
     for doubt in shortcomings(figures):
