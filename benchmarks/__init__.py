@@ -5,6 +5,10 @@
 - ``pipeline``: seconds a frame and memory of whole runs
 - ``accuracy``: reconstructions beside known volumes and other views
 - ``stability``: damaged files, hostile values and failing systems against the command line
+- ``clean_clip``, ``disturbances``: what a camera, a codec or a wrong description costs
+- ``background``: backgrounds that are found beside known ones
+- ``direct``: smoke that is continued beside what came
+- ``file_kinds``: clips of every kind of file; ``tests/benchmarks/test_file_kinds.py`` reads some
 - ``blender``: pictures for the manual, and results beside their clips in Cycles
 - ``truth``: makes the scenes that are known, and the example clip
 

@@ -1,1 +1,1 @@
-"""Continued, retimed and looped smoke beside what really came."""
+"""Continued smoke beside what really came: ``python -m benchmarks.direct.continuation SCENES --runs OUT``."""
