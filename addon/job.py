@@ -103,7 +103,7 @@ class Job:
     notes
         The engine's assumptions and warnings, a sentence each.
     warnings
-        The notes since the first finished frame: faults of the result.
+        Those of the notes that are doubts: why the result may be nothing, or wrong.
     sentence
         The result, or the reason of a failure.
     details
@@ -218,7 +218,7 @@ class Job:
         match event:
             case "note":
                 self.notes.append(sentence(message))
-                if self.done:
+                if message.get("doubt"):
                     self.warnings.append(self.notes[-1])
                 self._write_log(self.notes[-1])
             case "start":

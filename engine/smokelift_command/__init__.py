@@ -7,7 +7,8 @@ import signal
 import sys
 from types import FrameType
 
-CANCELLED = 130
+DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
+"""Exit statuses; a run that was cancelled can be resumed."""
 
 
 class Termination:

@@ -9,7 +9,6 @@ from typing import get_args
 import pytest
 
 from addon import contract
-from smokelift.app import cli
 from smokelift.app.commands import continue_, loop, retime
 from smokelift.direct import new_sequence
 from smokelift.footage.images import READABLE
@@ -19,11 +18,12 @@ from smokelift.output.proxy_files import MIN_PROXY_VOXELS
 from smokelift.report.provenance import Origin
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
+from smokelift_command import BAD_INPUT, CANCELLED, DONE
 
 
 def test_exit_statuses() -> None:
     """Done, bad input, cancelled."""
-    assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (cli.DONE, cli.BAD_INPUT, cli.CANCELLED)
+    assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (DONE, BAD_INPUT, CANCELLED)
 
 
 def test_files_of_a_sequence() -> None:

@@ -24,11 +24,12 @@ FRAMES = """
 import json
 def say(event, **fields):
     print(json.dumps({"event": event, **fields}), flush=True)
-say("note", text="Light not given.")
+say("note", text="Light not given.", doubt=False)
+say("note", text="A cut.", doubt=True)
 say("start", total=3, done=0)
 for n in (1, 2, 3):
     say("frame", frame=n, done=n, total=3, seconds_left=2.0 * (3 - n), figures={"psnr": 40.0})
-say("note", text="No smoke found.")
+say("note", text="No smoke found.", doubt=True)
 say("done", text="3 frames.", frames=3)
 """
 
@@ -115,8 +116,8 @@ def test_progress(engine, log) -> None:
     finished(job)
     assert (job.outcome, job.status) == ("done", 0)
     assert (job.done, job.total, job.seconds_left) == (3, 3, 0.0)
-    assert job.notes == ["Light not given.", "No smoke found."]
-    assert job.warnings == ["No smoke found."]
+    assert job.notes == ["Light not given.", "A cut.", "No smoke found."]
+    assert job.warnings == ["A cut.", "No smoke found."]
     assert job.sentence == "3 frames."
     assert job.details == {"text": "3 frames.", "frames": 3}
     text = log.read_text()

@@ -16,15 +16,14 @@ from typing import Any, NoReturn
 
 from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
-from smokelift.app.progress import OutputError, one_line, reporter
+from smokelift.app.progress import OutputError, reporter
+from smokelift.checks import printable
 from smokelift.footage.images import READABLE
 from smokelift.output.atomic import DISK_FULL
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
-from smokelift_command import Termination
-
-DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
+from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE, Termination
 
 _TRANSIENT = {
     getattr(errno, name)
@@ -43,7 +42,7 @@ class _Parser(argparse.ArgumentParser):
     """Says what is wrong with a word without obeying the control characters in it."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(one_line(message))
+        super().error(printable(message))
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse, and refuse what is left over; a shell makes many words of ``frame_*.png``."""

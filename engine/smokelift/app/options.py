@@ -111,7 +111,7 @@ def require_new(options: argparse.Namespace) -> None:
     written_kinds(options.npz)
 
 
-def finite(text: str) -> float:
+def finite_number(text: str) -> float:
     """Return the number that a word says."""
     try:
         number = float(text)

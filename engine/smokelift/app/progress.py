@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from smokelift.checks import Remark
+from smokelift.checks import Doubt, Remark, printable
 from smokelift.report.sentences import all_figures, sentence
 
 Style = Literal["text", "json"]
@@ -29,14 +29,9 @@ class OutputError(OSError):
         self.closed = isinstance(error, BrokenPipeError)
 
 
-def printable(text: str) -> str:
-    """Return a text whose control characters, which a terminal would obey, are spelt out."""
-    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
-
-
-def one_line(text: str) -> str:
-    """Return a text, which may name a path with a line break in it, as a single printable line."""
-    return printable(text).replace("\n", r"\n")
+def printable_lines(text: str) -> str:
+    """Return a text whose control characters but line breaks, which a terminal would obey, are spelt out."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 class _Console(Console):
@@ -142,7 +137,7 @@ class _Text:
 
     def note(self, said: Remark | str) -> None:
         with _output():
-            self._console.print(printable(_words(said)), markup=False, soft_wrap=True)
+            self._console.print(printable_lines(_words(said)), markup=False, soft_wrap=True)
 
     def start(self, total: int, done: int) -> None:
         with _output():
@@ -164,13 +159,14 @@ class _Text:
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
         self._stop()
-        self._errors.print(one_line(text), markup=False, soft_wrap=True)
+        self._errors.print(printable(text), markup=False, soft_wrap=True)
 
 
 class _Json:
     """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, each with its fields, one a line.
 
     What is said has its ``text``, and where `smokelift.report.sentences` has the words its ``kind`` and ``figures``.
+    A note says whether it is a ``doubt``.
     """
 
     def __init__(self) -> None:
@@ -186,7 +182,7 @@ class _Json:
         return None
 
     def note(self, said: Remark | str) -> None:
-        self._say("note", **_fields(said))
+        self._say("note", **_fields(said), doubt=isinstance(said, Doubt))
 
     def start(self, total: int, done: int) -> None:
         self._total, self._done = total, done

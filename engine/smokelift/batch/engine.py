@@ -20,9 +20,6 @@ import psutil
 ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
 """The command line, which ends with the process that started it."""
 
-DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
-"""Its exit statuses."""
-
 POLL_SECONDS = 0.25
 """Between two checks of a running engine, at most."""
 

@@ -11,10 +11,11 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from smokelift.batch.engine import BAD_INPUT, CANCELLED, DONE, ENGINE, NO_DEVICE, EngineResult, run_engine
+from smokelift.batch.engine import ENGINE, EngineResult, run_engine
 from smokelift.batch.record import Forecast, Record, Status, finished_frames, read_record, read_state
 from smokelift.batch.shots import Shot
 from smokelift.output.lock import Lock
+from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,9 @@ MAX_PICTURE_SIDE = 4096
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Weights of linear red, green and blue (ITU-R BT.709)."""
+
 LOOK_UPS = 2**16
 """Codes that are looked up at a time: their indices fit the cache."""
 

@@ -23,12 +23,9 @@ from smokelift.checks import Remark
 from smokelift.footage.behind_smoke import push_pull
 from smokelift.footage.frame_source import ClipError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence, is_pattern
-from smokelift.footage.images import Picture, area_average, read_image
+from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image
 from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-"""Weights of red, green and blue (Rec. 709)."""
 
 HALF = 0.5
 """Value from which on a pixel of a mask is white."""
@@ -120,7 +117,7 @@ class Mask:
         if missing:
             raise ClipError(f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all.")
         self._needed = range(first, last + 1) if self.count else (first,)
-        if not any((self._read(n) @ LUMINANCE >= HALF).any() for n in self._needed):
+        if not any((self._read(n) @ LUMINANCE.astype(np.float32) >= HALF).any() for n in self._needed):
             raise ClipError(
                 f"{path}: this mask is black everywhere (transparent counts as black), so that no smoke may be "
                 "anywhere; paint white where smoke may be."
@@ -154,7 +151,7 @@ class Mask:
             )
 
     def _seen(self, n: int, width: int, height: int) -> Seen:
-        return area_average(self._read(n) @ LUMINANCE, width, height) >= HALF
+        return area_average(self._read(n) @ LUMINANCE.astype(np.float32), width, height) >= HALF
 
     def close(self) -> None:
         """Close the file."""

@@ -51,6 +51,16 @@ class Method:
     follows_picture: bool = True
 
 
+def other_parts(method: Method, settings: Settings) -> dict[str, str | bool]:
+    """Those parts of a method that are of another kind than the settings ask for, by name."""
+    asked = _names(compose(settings))
+    return {part: name for part, name in _names(method).items() if name != asked[part]}
+
+
+def _names(method: Method) -> dict[str, str | bool]:
+    return {part: of if isinstance(of, bool) else type(of).__name__ for part, of in vars(method).items()}
+
+
 def compose(settings: Settings) -> Method:
     """The method that settings ask for."""
     require_kind(settings, Settings, "settings", "Settings (Settings.preset makes them)")

@@ -13,7 +13,7 @@ from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.loop import Carried, Frame, frames_after
-from smokelift.pipeline.method import Method, compose
+from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.pipeline.sources import sources
 from smokelift.report.provenance import provenance, record
 from smokelift.scene import Scene
@@ -78,11 +78,12 @@ class Reconstruction:
             no OpenVDB module.
         """
         shot = self.shot
+        others = other_parts(self.method, shot.settings)
         directory = file_path(directory, "directory", "the path of a directory")
         with SequenceWriter(
             directory,
             shot.scene,
-            shot.settings.as_dict(),
+            {**shot.settings.as_dict(), **({"parts": others} if others else {})},
             npz=npz,
             resume=resume,
             background=shot.estimated_background,

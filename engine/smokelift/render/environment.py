@@ -20,11 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Doubles, Indices
-from smokelift.footage.images import ImageError, read_image
+from smokelift.footage.images import LUMINANCE, ImageError, read_image
 from smokelift.scene import DirectionalLight, EnvironmentLight
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Weights of linear red, green and blue (ITU-R BT.709)."""
 
 CELLS = (256, 512)
 """Rows and columns of the cells that strata are made of, 0.7 degrees: a sun is one to four of them."""

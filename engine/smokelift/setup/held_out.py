@@ -3,8 +3,8 @@
 A wrong light can still reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
 shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels. What they let through of the
 background is taken away from the other half, and the rest is light that the smoke scatters. That is linear in the
-lights: each adds its own picture of the same densities, and how strong each has to be are least squares without
-negative parts (Lawson and Hanson, "Solving Least Squares Problems", 1974).
+lights: each adds its own picture of the same densities. How strong all together have to be is the least-squares
+factor, zero at least.
 """
 
 from __future__ import annotations

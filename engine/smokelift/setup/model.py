@@ -1,4 +1,7 @@
-"""What a run needs besides the light and is measured on coarse densities: iterations, and the grids of velocities."""
+"""What a run needs besides the light and is measured on coarse densities: the grids of velocities.
+
+The part of the box and the iterations that these densities took are reported with them.
+"""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from smokelift.checks import Doubt
 from smokelift.checks.array_types import Doubles
+from smokelift.footage.fire import CLIPPED_VALUE
 from smokelift.footage.images import brightest_channel
 from smokelift.scene.checks import Vector
 from smokelift.setup.estimate import Estimate, measured, undetermined
@@ -29,9 +30,6 @@ and van de Weijer, "Computational color constancy: survey and experiments", 2011
 
 THICK_PERCENTILE = 90
 """Percentile of the change from which on smoke is measured: the thickest is nearest to the source."""
-
-CLIPPED_VALUE = 0.95
-"""Linear value from which on a channel may have been larger."""
 
 PIXELS = 50
 """Smallest number of smoke pixels that have a colour."""

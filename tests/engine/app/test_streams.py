@@ -14,7 +14,7 @@ import pytest
 from command_line import ENVIRONMENT, MODULE, QUICK, command, refused
 from PIL import Image
 
-from smokelift.app.progress import printable
+from smokelift.app.progress import printable_lines
 from smokelift.output.index import SequenceError
 from smokelift.render import device
 
@@ -82,7 +82,7 @@ def test_control_characters_of_a_path_are_spelt_out(capsys) -> None:
     """An escape sequence in a path could rename the window or hide what is written."""
     sentence = refused(capsys, "inspect", "\x1b]0;owned\x07\x9b31m.toml")
     assert sentence == r"\x1b]0;owned\x07\x9b31m.toml: cannot be read: No such file or directory"
-    assert printable("two\nlines, räuchern, 烟") == "two\nlines, räuchern, 烟"
+    assert printable_lines("two\nlines, räuchern, 烟") == "two\nlines, räuchern, 烟"
 
 
 @pytest.mark.parametrize("number", ["SIGTERM", "SIGINT"])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smokelift.density import GradientFit
+from smokelift.density import GradientFit, NothingCarried
 from smokelift.footage.clip import Clip
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
@@ -68,3 +68,15 @@ def test_frames_in_memory_and_written_are_the_same(plume, draft, tmp_path) -> No
         for found, wanted in zip(velocity.faces, frame.velocity.faces, strict=True):
             np.testing.assert_array_equal(found, wanted)
         assert (velocity.voxel_size, velocity.closed) == (frame.velocity.voxel_size, frame.velocity.closed)
+
+
+def test_a_run_is_not_resumed_with_other_parts(plume, draft, tmp_path) -> None:
+    scene = plume.scene.with_frames(0, 0)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, draft)
+        usual = compose(shot.settings)
+        other = Reconstruction(shot, replace(usual, temporal_prior=NothingCarried()))
+        other.write(tmp_path, npz=True)
+        assert other.write(tmp_path, npz=True, resume=True).complete
+        with pytest.raises(SequenceError, match=r"cannot be resumed: settings.*temporal_prior.*NothingCarried"):
+            Reconstruction(shot, usual).write(tmp_path, npz=True, resume=True)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from smokelift.app.options import add_directed_options, finite, named_path, require_new
+from smokelift.app.options import add_directed_options, finite_number, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import Doubt, Figures, Remark
 from smokelift.direct import (
@@ -52,7 +52,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--wind",
-        type=finite,
+        type=finite_number,
         nargs=3,
         default=(0.0, 0.0, 0.0),
         metavar=("X", "Y", "Z"),
@@ -93,7 +93,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--room",
-        type=finite,
+        type=finite_number,
         default=ROOM,
         metavar="TIMES",
         help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it",
@@ -105,7 +105,7 @@ def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[
     """Add an option of some numbers that may be given again."""
     parser.add_argument(
         option,
-        type=finite,
+        type=finite_number,
         nargs=len(values),
         action="append",
         default=[],

@@ -6,7 +6,7 @@ import argparse
 import time
 from typing import Any
 
-from smokelift.app.options import add_directed_options, finite, require_new
+from smokelift.app.options import add_directed_options, finite_number, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import Figures, Remark
 from smokelift.direct import open_source, playback, retime_sequence
@@ -21,7 +21,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     add_directed_options(parser)
     parser.add_argument(
         "--speed",
-        type=finite,
+        type=finite_number,
         nargs="+",
         required=True,
         metavar="S",

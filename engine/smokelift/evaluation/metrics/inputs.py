@@ -12,7 +12,7 @@ from smokelift.checks.array_types import Doubles, Mask
 from smokelift.transport import StaggeredGrid
 
 
-def finite(values: npt.ArrayLike) -> Doubles:
+def finite_array(values: npt.ArrayLike) -> Doubles:
     """Return an array of float64; ValueError if it holds anything but finite numbers."""
     if isinstance(values, StaggeredGrid):
         raise ValueError("a velocity must be an array of vectors at voxel centres: velocity.centres(), not a Velocity")
@@ -24,7 +24,7 @@ def finite(values: npt.ArrayLike) -> Doubles:
 
 def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Doubles, Doubles]:
     """Return two arrays of float64; ValueError if a value is not finite, or they are empty or differ in shape."""
-    first, second = finite(a), finite(b)
+    first, second = finite_array(a), finite_array(b)
     if first.shape != second.shape:
         raise ValueError(f"shapes must be equal, not {first.shape} and {second.shape}")
     if first.size == 0:

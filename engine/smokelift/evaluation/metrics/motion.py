@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.evaluation.metrics.inputs import counted, finite, pair, relative
+from smokelift.evaluation.metrics.inputs import counted, finite_array, pair, relative
 from smokelift.evaluation.metrics.volumes import volume_error
 from smokelift.transport import require_positive
 
@@ -69,7 +69,7 @@ def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayL
         If a value is not finite, the size not positive, a shape does not fit, or no corner counts.
     """
     require_positive("voxel_size", voxel_size)
-    u = finite(velocity)
+    u = finite_array(velocity)
     if u.ndim != 4 or u.shape[3] != 3:
         raise ValueError(f"a velocity must have the shape (nx, ny, nz, 3), not {u.shape}")
     outflow = np.zeros([n - 1 for n in u.shape[:3]])
@@ -106,7 +106,7 @@ def warp_error(
         If shapes differ, a value is not finite, or no voxel counts.
     """
     start, end = pair(before, after)
-    way = finite(displacement)
+    way = finite_array(displacement)
     if way.shape != (*start.shape, 3):
         raise ValueError(f"the displacement {way.shape} must have a vector for each of {start.shape} voxels")
     origins = np.indices(start.shape) - np.moveaxis(way, -1, 0)
@@ -128,7 +128,7 @@ def flicker(series: npt.ArrayLike) -> float:
     ValueError
         If a value is not finite, or there are fewer than three frames.
     """
-    values = finite(series)
+    values = finite_array(series)
     if len(values) < 3:
         raise ValueError(f"flicker needs at least three frames, not {len(values)}")
     second = values[2:] - 2 * values[1:-1] + values[:-2]

@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
 from smokelift.checks.array_types import Doubles
-from smokelift.evaluation.metrics.inputs import finite, relative
+from smokelift.evaluation.metrics.inputs import finite_array, relative
 
 PATCH = 7
 """Pixels along a patch: the finest structure with its surroundings; a patch of scale 4 spans a lobe."""
@@ -57,7 +57,7 @@ class PatchStatistics:
         ValueError
             If a value is not finite or the picture has not two axes.
         """
-        values = finite(picture)
+        values = finite_array(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
         projected = [_basis().T @ _patches(_averaged(values, scale)).T for scale in SCALES]
@@ -103,7 +103,7 @@ def mean_gradient(picture: npt.ArrayLike) -> float:
     ValueError
         If a value is not finite or the picture has not two axes of two pixels at least.
     """
-    values = finite(picture)
+    values = finite_array(picture)
     down, right = np.gradient(values)
     total = float(values.sum())
     return float(np.hypot(down, right).sum()) / total if total > 0 else 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.evaluation.metrics.inputs import counted, finite, pair, relative
+from smokelift.evaluation.metrics.inputs import counted, finite_array, pair, relative
 from smokelift.transport import require_positive
 
 
@@ -42,7 +42,7 @@ def mass(density: npt.ArrayLike, voxel_size: float) -> float:
         If a value is not finite, or the size not positive.
     """
     require_positive("voxel_size", voxel_size)
-    return float(finite(density).sum()) * voxel_size**3
+    return float(finite_array(density).sum()) * voxel_size**3
 
 
 def height_mass_error(density: npt.ArrayLike, truth: npt.ArrayLike) -> float:
