@@ -11,12 +11,12 @@ from typing import Any
 
 from benchmarks.renderer.peers import PEERS
 from benchmarks.tables import size_text
-from smokelift.app.cli import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 from smokelift.app.progress import Reporter, reporter
 from smokelift.evaluation.truth import Truth
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import device
 from smokelift.setup.settings import METHODS, QUALITIES
+from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
 SMALLEST = 8
 """Voxels a side of the smallest grid for the renderer."""

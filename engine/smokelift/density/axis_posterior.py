@@ -36,7 +36,8 @@ MAX_VOXELS = 512
 (docs/experiments/axis-uncertainty.md)."""
 
 CANDIDATES = 121
-"""Number of depths that are compared, from the front of the box to its back: 60 to a reach (half the box's depth)."""
+"""Number of depths that are compared, from the front of the box to its back: 60 to a reach (half the box's depth), so
+`UPRIGHT_DEVIATION`, the narrowest of all, is three steps."""
 
 BOX_DEVIATION = 0.165
 """Standard deviation, in reaches, of the smoke's depth about the middle of its box
@@ -47,7 +48,8 @@ BOX_COUNT = 2.0
 is across the picture (docs/experiments/axis-uncertainty.md)."""
 
 MAX_KNOWN_DEVIATION = 0.95
-"""Largest standard deviation of a depth that a floor contact determines, in those that the box alone leaves."""
+"""Largest standard deviation of a depth that counts as determined by a floor contact, over that of the depth by the box
+alone: a contact that leaves about as much spread as the box shows nothing."""
 
 MIN_CONTACT_SHARE = 0.6
 """Smallest share of the frames that show a floor contact where there is one."""

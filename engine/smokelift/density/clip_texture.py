@@ -23,7 +23,8 @@ SMOOTHING = 1.5
 """Standard deviation (voxels) of the blur before the drift is measured, which a difference quotient asks for."""
 
 ACROSS = 6.0
-"""Standard deviations of a row's smoke that make its whole width."""
+"""Width of a row's smoke in its standard deviations: three to either side of its middle hold all but 0.3 % of a
+Gaussian profile."""
 
 VOXEL = 12**-0.5
 """Standard deviation (voxels) of smoke that fills one voxel: none is narrower, a thread of single pixels either."""

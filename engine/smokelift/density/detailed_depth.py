@@ -43,8 +43,8 @@ SMOOTH_TOLERANCE = 0.02
 """Share of the objective that one of them has to gain for another to follow, as in the fit."""
 
 AMOUNTS = 0.5
-"""Standard deviation of the blur that noise does not change, in standard deviations of the smoke's width: noise makes
-lobes, and leaves each where the smoke is (docs/experiments/every-view.md)."""
+"""Standard deviation of a blur, in standard deviations of the smoke's width: blurred by it, the density is the same
+with noise as without. Noise makes lobes, and leaves the smoke of each where it is (docs/experiments/every-view.md)."""
 
 GUIDED_AMOUNTS = 0.75
 """Standard deviation, in the same unit, of the blur over which carried smoke gets the smooth answer's amounts: what is

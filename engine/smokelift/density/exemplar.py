@@ -38,7 +38,8 @@ KNOTS = 512
 """Quantiles that stand for a distribution."""
 
 MAX_PATCHES = 8192
-"""Patches at most that the quantiles of a scale are taken from."""
+"""Patches at most that the quantiles of a scale are taken from: the rank of each is then known to 0.6 % at most, the
+standard error of a share of one half."""
 
 PASSES = 2
 """Times that a picture's patches are moved, each along another basis."""

@@ -27,7 +27,7 @@ from smokelift.scene.domain import box_around
 from smokelift.scene.projection import voxel_width
 
 BLUR_REACH = 3.0
-"""Standard deviations up to which a blur reaches."""
+"""Standard deviations up to which a blur reaches: 0.3 % of a Gaussian lie beyond."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,8 +42,8 @@ smoke has entered, or has moved otherwise than was predicted."""
 
 
 MIN_NEW_DENSITY = np.float32(0.3)
-"""Mean densities of the smooth answer below which nothing is taken to have entered: filled in every frame, what fades
-at the support's edge shows a shell (docs/experiments/level-layers.md)."""
+"""Mean densities of the smooth answer below which nothing is taken to have entered. Faint smoke that leaves at the
+support's edge would be filled up again in every frame, and show as a shell (docs/experiments/level-layers.md)."""
 
 
 @dataclass(frozen=True, eq=False)

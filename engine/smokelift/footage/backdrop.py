@@ -77,7 +77,7 @@ class Backdrop:
     colour
         Linear, where one was found; black counts as such below half a step of 8 bit video.
     frames
-        Of the file that decided on it, up to the next cut.
+        Number of the file's frames that decided on it: those up to the next cut.
     steadied
         Of a camera that was found to turn: how, and the background of one that stands still in its mean pose.
     quantiser

@@ -3,8 +3,8 @@
 A block of the picture is in one of two states: clear, when it shows its background within the noise, and smoke, when it
 shows anything. Smoke goes on as it was, or jumps to any other value. So each background explains the blocks at a cost,
 the negative logarithm of their probability with the likeliest states (Viterbi, "Error bounds for convolutional codes",
-1967). One colour is behind all blocks, but for a few objects before it. A picture has a colour for each block, and as
-it may be any, each costs as much as a jump does.
+1967). One colour is behind all blocks, but for a few objects before it. A picture has a colour for each block. All
+colours are taken to be equally likely there, as they are after a jump, so each block's costs as much as a jump.
 
 A frame that is black everywhere says nothing against a picture, for clips fade. What is black, or another colour, at
 some time of the file counts for all of its frames up to the next cut, whatever part of it is used.

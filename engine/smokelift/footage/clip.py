@@ -13,7 +13,7 @@ import numpy as np
 
 from smokelift.checks import Remark
 from smokelift.footage.exposure import small_size
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Visitor
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import Picture, Transfer
 from smokelift.footage.kept_frames import KeptFrames, keep
@@ -346,11 +346,11 @@ class _Changed:
             return image
         return LinearPicture(self._change(number, image.linear()))
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
         clip = self._clip
         if (first, last) == (clip.first, clip.first + len(clip) - 1):  # what the clip may know already
             return tuple(clip.first + n for n in clip.damaged)
-        return self._source.damaged(first, last, look)
+        return self._source.damaged(first, last, visit)
 
     def close(self) -> None:
         self._source.close()

@@ -9,8 +9,8 @@ from typing import Protocol
 from smokelift.checks import Remark
 from smokelift.footage.stored_picture import StoredPicture
 
-Look = Callable[[int, Callable[[], StoredPicture]], None]
-"""What takes the number of a frame and a function that makes its picture."""
+Visitor = Callable[[int, Callable[[], StoredPicture]], None]
+"""What is called with the number of a frame and a function that makes its picture."""
 
 DEFAULT_FPS = 24.0
 """Frames a second where neither the file nor the user gives any: the rate of film."""
@@ -59,8 +59,8 @@ class FrameSource(Protocol):
         """Return a frame; raise `DamagedFrameError` if it cannot be decoded."""
         ...
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        """Return which frames from one to another, both included, raise `DamagedFrameError`; others go to ``look``."""
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+        """Return which frames from one to another, both included, raise `DamagedFrameError`; others go to ``visit``."""
         ...
 
     def close(self) -> None:

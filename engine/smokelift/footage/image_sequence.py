@@ -9,7 +9,7 @@ from pathlib import Path
 
 from smokelift.checks import Remark
 from smokelift.footage import lens
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Visitor
 from smokelift.footage.images import READABLE, ImageError, Transfer, area_average, read_layer, reduction
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 from smokelift.footage.stored_picture import LinearPicture, StoredPicture
@@ -91,17 +91,17 @@ class ImageSequence:
                 if layer.alpha is None:
                     return
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        """Return which pictures from one to another are missing or cannot be read; others go to ``look``."""
-        return tuple(n for n in range(first, last + 1) if not self._readable(n, look))
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+        """Return which pictures from one to another are missing or cannot be read; others go to ``visit``."""
+        return tuple(n for n in range(first, last + 1) if not self._readable(n, visit))
 
-    def _readable(self, n: int, look: Look | None) -> bool:
+    def _readable(self, n: int, visit: Visitor | None) -> bool:
         try:
             picture = self.read(n)
         except DamagedFrameError:
             return False
-        if look is not None:
-            look(n, lambda: picture)
+        if visit is not None:
+            visit(n, lambda: picture)
         return True
 
     def close(self) -> None:

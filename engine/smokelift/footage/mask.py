@@ -21,7 +21,7 @@ from scipy import ndimage
 
 from smokelift.checks import Remark
 from smokelift.footage.behind_smoke import push_pull
-from smokelift.footage.frame_source import ClipError, FrameSource, Look
+from smokelift.footage.frame_source import ClipError, FrameSource, Visitor
 from smokelift.footage.image_sequence import ImageSequence, is_pattern
 from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image
 from smokelift.footage.stored_picture import StoredPicture
@@ -183,10 +183,10 @@ class Masked:
     def read(self, n: int) -> StoredPicture:
         return self._continued(n, self.filmed.read(n))
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
         def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
-            if look is not None:
-                look(n, lambda: self._continued(n, picture()))
+            if visit is not None:
+                visit(n, lambda: self._continued(n, picture()))
 
         return self.filmed.damaged(first, last, look_at)
 

@@ -33,7 +33,7 @@ from smokelift.checks import Remark
 from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import lacks_index, open_container
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Visitor
 from smokelift.footage.images import (
     MAX_PIXELS,
     Picture,
@@ -256,8 +256,8 @@ class Video:
         upright = np.ascontiguousarray(_upright(codes, frame))
         return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded; others go to ``look``, some twice."""
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+        """Return which frames from one to another cannot be decoded; others go to ``visit``, some twice."""
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
         if not self._keys:
             return ()  # they were counted by decoding them
@@ -267,8 +267,8 @@ class Video:
 
         def pass_on(time: int, frame: av.VideoFrame) -> None:
             for n in numbers.get(time, ()):
-                if look is not None:
-                    look(n, lambda: self._shown_by(frame))
+                if visit is not None:
+                    visit(n, lambda: self._shown_by(frame))
 
         from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._container.seek(wanted[0], stream=self._stream)

@@ -54,7 +54,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     _check(clip, scene, settings)
     _expect(clip, scene)
     remarks = clip.remarks()
-    # cameras that belong together are measured, and stand where they are said to
+    # a search for the lens finds turns of a camera; several cameras are calibrated, so they stand still where given
     lenses = () if scene.views else clip_lenses(scene.camera, clip)
     estimate = first_estimate(clip, scene.camera, scene.background, lenses)
     steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples

@@ -69,7 +69,8 @@ class VelocitySettings:
         Allowed noise in the difference of two densities, divided by the root mean square gradient: voxels of motion
         (velocity-noise.md).
     smooth
-        The same limit for densities that are left as they are (velocity-noise.md).
+        Noise in the same unit below which densities are smooth already, and neither blurred nor compressed
+        (velocity-noise.md).
     solver
         `ProjectedCG`, or `PrimalDual`, which has the same minimum at several times the cost (velocity-solver.md).
     """
