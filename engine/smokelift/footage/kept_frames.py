@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from smokelift.checks import Remark
-from smokelift.footage.frame_source import FrameSource, Look
+from smokelift.footage.frame_source import FrameSource, Visitor
 from smokelift.footage.stored_picture import StoredPicture
 
 Image = TypeVar("Image", bound=StoredPicture)
@@ -50,12 +50,12 @@ class KeptFrames:
         self._decoded.clear()
         self._expected = frozenset(numbers[: DECODED_BYTES // size])
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
         def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
             if n in self._expected and n not in self._kept:
                 self._decoded[n] = picture
-            if look is not None:
-                look(n, picture)
+            if visit is not None:
+                visit(n, picture)
 
         if (first, last) not in self._damaged:
             self._damaged[first, last] = self._source.damaged(first, last, look_at)

@@ -52,7 +52,7 @@ class Method:
 
 
 def other_parts(method: Method, settings: Settings) -> dict[str, str | bool]:
-    """Those parts of a method that are of another kind than the settings ask for, by name."""
+    """The names of what stands for other parts in a method than the settings ask for, by part."""
     asked = _names(compose(settings))
     return {part: name for part, name in _names(method).items() if name != asked[part]}
 
