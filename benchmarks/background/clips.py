@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import Look
+from smokelift.footage.frame_source import Visitor
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 from smokelift.footage.stored_picture import LinearPicture
 
@@ -145,7 +145,7 @@ class Frames:
         """Return a frame, linear."""
         return LinearPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
         """None."""
         return ()
 

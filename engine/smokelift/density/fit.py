@@ -103,9 +103,9 @@ class DensityFit(Protocol):
         Parameters
         ----------
         views
-            The cameras' pictures.
+            The cameras' pictures, against all voxels that they allow to hold smoke.
         depth
-            What the depth prior says of them.
+            What the depth prior says of them; its own views are against those of the voxels where it expects smoke.
         initial : (nx, ny, nz), optional
             Where to start, if not from the prior's density.
         """
