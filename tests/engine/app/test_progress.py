@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from smokelift.app.progress import reporter
+from smokelift.checks import Doubt, Remark
 
 
 def figures(seconds: float, hull_share: float = 0.1, psnr: float = 41.23) -> dict[str, Any]:
@@ -33,7 +34,7 @@ def test_json_events_are_a_line_each(capsys) -> None:
         say.finish("done.", {"directory": "out"})
         say.fail("no.", 2)
     note, start, frame, done, error = lines(capsys)
-    assert note == {"event": "note", "text": 'two\nlines and "quotes"'}
+    assert note == {"event": "note", "text": 'two\nlines and "quotes"', "doubt": False}
     assert start == {"event": "start", "total": 4, "done": 1}
     assert (frame["event"], frame["frame"], frame["done"], frame["total"]) == ("frame", 2, 2, 4)
     assert frame["figures"] == figures(2.0)
@@ -87,3 +88,10 @@ def test_text_errors_go_to_standard_error(capsys) -> None:
     captured = capsys.readouterr()
     assert captured.err == sentence + "\n"
     assert captured.out == ""
+
+
+def test_a_note_says_whether_it_is_a_doubt(capsys) -> None:
+    say = reporter("json")
+    for kind in (Remark, Doubt):
+        say.note(kind("bars"))
+    assert [(each["kind"], each["doubt"]) for each in lines(capsys)] == [("bars", False), ("bars", True)]

@@ -12,7 +12,7 @@ from PIL import Image
 from smokelift.checks import Remark
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import Look
+from smokelift.footage.frame_source import Visitor
 from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.plate import Plate
@@ -38,7 +38,7 @@ class Filmed:
     def read(self, n: int) -> CodedPicture:
         return CodedPicture(self.codes[n], code_values(255))
 
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
         return ()
 
     def close(self) -> None:
