@@ -1,7 +1,5 @@
 """The extension in the bpy wheels, each in an environment that has nothing else of what the engine needs."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -74,7 +72,6 @@ class InWheel:
         assert "libstdc++" not in said
 
     def test_from_install_to_uninstall(self, interpreter) -> None:
-        """The whole story of `inside`."""
         folder = user_folder(f"bpy-{self.blender}")
         run([*interpreter, "-m", "pytest", *pytest_words(LIFECYCLE, folder)], variables(folder, self.python))
 
