@@ -1,7 +1,5 @@
 """Progress: lines of JSON for programs, plain words for people, errors apart from results."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -70,20 +68,9 @@ def test_text_names_what_matters(capsys) -> None:
 
 
 def test_the_fit_that_stays_on_the_terminal_is_the_runs(capsys) -> None:
-    """The median, not the last frame's."""
     with reporter("text") as say:
         say.start(3, 0)
         for number, psnr in enumerate((40.0, 30.0, 20.0), 1):
             say.frame(number, figures(1.0, psnr=psnr))
         say.finish("done.", {})
     assert "fit 30.0 dB" in capsys.readouterr().out
-
-
-def test_text_errors_go_to_standard_error(capsys) -> None:
-    """A failure is one unbroken line there, and nothing on standard output."""
-    sentence = "shot.toml: " + "a very long sentence about what went wrong " * 5 + "[in brackets]."
-    with reporter("text") as say:
-        say.fail(sentence, 2)
-    captured = capsys.readouterr()
-    assert captured.err == sentence + "\n"
-    assert captured.out == ""

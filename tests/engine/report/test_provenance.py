@@ -1,7 +1,5 @@
 """What is said of a result's origin follows from what was given and chosen."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -37,7 +35,6 @@ def test_only_what_the_pictures_show_is_measured(shot) -> None:
 
 
 def test_made_up_detail_names_its_settings(shot) -> None:
-    """So that the same can be made again."""
     other = replace(shot, settings=replace(shot.settings, detail=0.5, seed=3))
     assert parts(other)["fine structure along the rays"].settings == {"detail": 0.5, "seed": 3}
     assert made_up(other) == (parts(other)["fine structure along the rays"].how,)
@@ -45,7 +42,6 @@ def test_made_up_detail_names_its_settings(shot) -> None:
 
 @pytest.mark.parametrize("settings", [replace(Settings.preset(), detail=0.0), Settings.preset(method="paper")])
 def test_without_detail_nothing_is_made_up(shot, settings) -> None:
-    """Whatever the seed."""
     smooth = replace(shot, settings=replace(settings, seed=3))
     assert "made up" not in {part.origin for part in provenance(smooth)}
     assert made_up(smooth) == ()
@@ -79,7 +75,6 @@ def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
 
 
 def test_json_holds_it(shot) -> None:
-    """As plain values, in sentences."""
     plain = [part.as_dict() for part in provenance(shot)]
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
     assert [part["how"] for part in plain] == [sentence(part.how) for part in provenance(shot)]
