@@ -1,27 +1,16 @@
 """Where a frame shows smoke."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
-from films import HEIGHT, WIDTH, film, overlap, plate_of, wall
-from scipy import ndimage
+from films import HEIGHT, WIDTH, film, overlap, wall
 
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
 from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.steady import without_noise_light
-
-
-def test_an_empty_clip_has_no_smoke(tmp_path: Path) -> None:
-    truth = wall(0.2, 0.8)
-    clip = film(tmp_path, truth, lambda n: np.zeros((HEIGHT, WIDTH)), 1.0, 2.0)
-    plate = plate_of(clip)
-    assert plate.confidence.min() == 1.0
-    assert not any(matte(frame, plate).mask.any() for frame in clip)
 
 
 def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The average along the line of sight: what it keeps, what it takes away."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
