@@ -323,7 +323,7 @@ def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tm
     assert sorted(world.name for world in bpy.data.worlds) == ["Smokelift", "World"]
 
 
-# the camera that is guessed
+# the camera that is assumed
 
 
 @pytest.mark.parametrize("size", [(256, 384), (384, 256)])
