@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
+from smokelift.baselines.density import FixedRateDescent
 from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, voxel_centres
@@ -21,6 +22,7 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
+from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
 from smokelift.setup.prepare import prepare_shot
@@ -315,6 +317,42 @@ def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, d
         views = ViewSet.of(shot.observe(2), shot.optics)
         alone = GradientFit(settings.density).fit(views, RoundDepth().estimate(views), None)
     np.testing.assert_array_equal(frames[2].density, alone.density)
+
+
+def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> None:
+    """The first velocity is that between the densities without it, to the bit, as the pictures correct it."""
+    settings = replace(draft, transport=0.0)
+    with Clip.open(plume.scene.clip) as clip:
+        shot = prepare_shot(clip, plume.scene, settings)
+        camera = shot.observe(1)[0].camera
+    estimator, domain = compose(shot.settings).velocity_estimator, shot.optics.domain
+    first, second = by_themselves[:2]
+    assert first.smooth is not None and second.smooth is not None
+    assert first.followed is not None and second.followed is not None
+
+    def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
+        dt = 1 / plume.scene.clip.fps
+        known = {"closed": shot.scene.closed, "inflow": shot.scene.inflow(), "prediction": None}
+        found = estimator.estimate(before, after, dt, domain.voxel_size, **known)
+        return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
+
+    np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())
+    assert not np.array_equal(second.estimated.centres(), velocity(first.density, second.density).centres())
+
+
+def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
+    paper = Settings.preset("draft", "paper")
+    starts, density_fit = [], FixedRateDescent(iterations=1)
+
+    class Watched:
+        def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
+            starts.append(initial)
+            return density_fit.fit(views, depth, initial)
+
+    scene = plume.write(tmp_path / "clip", plume.densities[:4])
+    frames = frames_of(scene, paper, method=replace(compose(paper), density_fit=Watched()))
+    assert [start is None for start in starts] == [True, True, False, False]
+    assert all(frame.figures["transport"] == {} for frame in frames)
 
 
 def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, along_the_path) -> None:
