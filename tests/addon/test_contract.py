@@ -87,7 +87,6 @@ TABLES = st.dictionaries(NAMES, VALUES, max_size=4)
 @settings(max_examples=50, deadline=None, derandomize=True)
 @given(st.dictionaries(NAMES, TABLES | st.lists(TABLES, min_size=1, max_size=3), max_size=4))
 def test_what_is_written_is_read_back(tables) -> None:
-    """Any texts (paths with quotes, backslashes, umlauts), numbers and nested lists."""
     assert tomllib.loads(dumps(tables)) == tables
 
 

@@ -137,7 +137,6 @@ def test_progress(engine, log) -> None:
     ],
 )
 def test_an_engine_that_fails(engine, log, script, status, sentence) -> None:
-    """The engine's own last word is the sentence; a whole traceback is in the log."""
     job = finished(engine(script))
     assert (job.outcome, job.status, job.sentence) == ("failed", status, sentence)
     assert ("Traceback" in log.read_text()) == (status == 1)
@@ -169,7 +168,6 @@ def test_lines_that_are_no_messages_go_to_the_log(engine, log) -> None:
 
 
 def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
-    """A poll takes a bounded part, nothing is lost, and the engine waits meanwhile."""
     count = 20 * module.LINES_A_POLL
     job = engine(
         f"import json\nfor n in range({count}):\n"

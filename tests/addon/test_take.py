@@ -38,7 +38,6 @@ def test_takes_are_numbered_and_never_overwritten(tmp_path) -> None:
 
 
 def test_a_take_knows_how_the_engine_is_called(tmp_path) -> None:
-    """The scene file is there, and the arguments begin the take or go on with it."""
     take = begun(tmp_path)
     assert tomllib.loads(take.scene_file.read_text()) == TABLES
     arguments = Take(take.directory).arguments()  # as another session would

@@ -44,7 +44,6 @@ def test_the_same_files_make_the_same_zip(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", PINS)
 def test_the_manifest_says_what_the_zip_is_for(name, tmp_path, monkeypatch) -> None:
-    """Its version is the project's; Blender refuses it where it has another Python."""
     monkeypatch.setattr(extension_products, "STAGE", tmp_path)
     monkeypatch.setattr(build_extension, "MANUAL", tmp_path / "none")
     manifest = tomllib.loads((build_extension.ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))

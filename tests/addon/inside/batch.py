@@ -68,7 +68,6 @@ def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
 
 
 def test_options_override_the_file(saved, tmp_path) -> None:
-    """Clip, frames, quality, detail in depth and its seed, place in depth, folder."""
     clip = tmp_path / "other.mp4"
     clip.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
     words = ("--clip", clip, "--frames", "1:2", "--quality", "fine", "--distance", "6.9")

@@ -161,7 +161,6 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
 
 
 def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
-    """A smoke that was moved, rotated and scaled meets what stands in its way there."""
     mesh, place = cube()
     obj = placed(acting, "Crate", mesh, **place)
     fan = placed(

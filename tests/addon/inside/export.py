@@ -120,7 +120,6 @@ def test_the_usd_file_is_sound(made) -> None:
 
 
 def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
-    """Appended with its material, its files found, also after the folder has moved."""
     material = made.data.materials[0].name
     exported(made)
     export.write_asset(made, export.folder_of(made))

@@ -79,7 +79,6 @@ def test_instances_keep_turn_scale_and_material(shown) -> None:
 
 
 def test_cycles_renders_them_at_their_times(shown, tmp_path) -> None:
-    """One that has not begun is not there; one of another frame has another density."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = 48, 16

@@ -59,7 +59,6 @@ def test_presets_look_different(lit, tmp_path) -> None:
 
 
 def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) -> None:
-    """A result made anew brings its extinction, and changes nothing of the artist's."""
     volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
     bpy.ops.smokelift.use_look(preset="DUST")
     volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5), number=2))
@@ -123,7 +122,6 @@ def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
 
 
 def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_path) -> None:
-    """Radiance per metre: 4 of it along 0.25 m are 1, in smoke that hides nothing."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     bpy.data.objects["Sun"].hide_render = True
     lit.cycles.samples = 4096

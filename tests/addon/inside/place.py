@@ -72,7 +72,6 @@ def test_the_distance_is_that_of_the_first_frame(shot) -> None:
     ],
 )
 def test_a_click_that_tells_nothing_is_refused(shot, height, points, words) -> None:
-    """Above the horizon, beside the box, and where a pixel is too much of the floor."""
     looking_down(shot).location.z = height
     bpy.context.view_layer.update()
     with pytest.raises(ShotError, match=words):

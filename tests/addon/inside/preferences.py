@@ -34,7 +34,6 @@ def test_without_preferences_everything_is_as_usual(scene, clip) -> None:
 
 
 def test_new_smokes_follow_the_preferences(scene, clip, user, tmp_path) -> None:
-    """Those that are there keep their quality; a smoke's own output counts first."""
     first = new_smoke(scene, clip)
     user.quality, user.output, user.threads = "draft", str(tmp_path), 1
     second = new_smoke(scene, clip)
@@ -63,7 +62,6 @@ def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> No
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
 def test_a_dropped_video_becomes_a_smoke(scene, suffix, tmp_path) -> None:
-    """Blender calls the handler's operator with the path, and no file browser opens."""
     handler = bpy.types.SMOKELIFT_FH_video
     assert suffix in handler.bl_file_extensions.split(";")
     dropped = tmp_path / f"my clip{suffix}"

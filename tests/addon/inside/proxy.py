@@ -69,7 +69,6 @@ def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) ->
 
 
 def test_it_has_a_switch(obj, tmp_path) -> None:
-    """That stays as it is when the smoke is shown again, and when another result is."""
     proxy.modifier_of(obj).show_viewport = False
     volume.show(obj, volume.shown_take(obj))
     volume.show(obj, with_proxy(tmp_path, number=2))

@@ -328,7 +328,6 @@ def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tm
 
 @pytest.mark.parametrize("size", [(256, 384), (384, 256)])
 def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
-    """With the engine's lens and place; the scene's own camera stays the scene's."""
     from bpy_extras.object_utils import world_to_camera_view
 
     own = shot.camera

@@ -134,7 +134,6 @@ def test_engine_runs_with_blenders_numpy() -> None:
 
 
 def test_every_module_of_the_engine_has_what_it_imports() -> None:
-    """What the build leaves out of libraries is not needed; Taichi is needed by name."""
     command = [sys.executable, "-I", "-B", "-c", _IMPORT_ALL, str(libraries())]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -173,7 +172,6 @@ def test_makes_smoke(folder) -> None:
 
 
 def test_cancel_keeps_frames_and_resume_ends_what_was_begun(folder) -> None:
-    """In a Blender without a window: SIGTERM after the first frame, then --resume."""
     blend = folder / "shot.blend"
     words = ["--output", str(folder / "again")]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}

@@ -114,8 +114,6 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
 
 
 def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, monkeypatch) -> None:
-    """For want of room or of memory; a run that goes on keeps the room that it has."""
-
     def said(*words: object) -> list[str]:
         start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
         assert command(*start, *words, "--progress", "json") == 0

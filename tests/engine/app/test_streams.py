@@ -59,7 +59,6 @@ def test_a_path_that_is_no_text_is_refused() -> None:
     ("path", "spelt"), [("a\nb.toml", r"a\nb.toml"), ("\x1b]0;owned\x07\x9b31m.toml", r"\x1b]0;owned\x07\x9b31m.toml")]
 )
 def test_control_characters_of_a_path_are_spelt_out(capsys, path, spelt) -> None:
-    """An escape sequence in a path could rename the window or hide what is written."""
     assert refused(capsys, "inspect", path) == f"{spelt}: cannot be read: No such file or directory"
     assert printable("two\nlines, räuchern, 烟") == "two\nlines, räuchern, 烟"
     status, lines = ended("inspect", "räuchern.toml", env={**ENVIRONMENT, "PYTHONIOENCODING": "ascii"})

@@ -135,7 +135,6 @@ def test_thin_smoke_looks_and_derives_as_with_the_exact_renderer(density):
 
 
 def test_no_smoke_no_change(wall):
-    """Nothing is added to the background, and rays that miss the box record nothing."""
     away = Camera.look_at((1.9, -1.2, 1.4), (3, -3, 1.4), fov_y_degrees=40, size=(14, 16))
     for camera in (CAMERAS["perspective"], away):
         renderer = PaperRenderer(camera, DOMAIN, Medium(), (SUN,), wall)

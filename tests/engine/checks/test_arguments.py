@@ -117,7 +117,6 @@ def test_a_scene_is_not_saved_as_a_folder(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_comments_of_a_scene_file_are_lines(tmp_path: Path) -> None:
-    """A text alone would be a line a letter, and a line break would end the comment."""
     path = tmp_path / "scene.toml"
     refused('comments must be a list of lines, not "known"', SCENE.save, path, "known")
     SCENE.save(path, ["one\n[clip]"])

@@ -62,7 +62,6 @@ def test_smoke_turns_about_the_axis_that_it_travels_along(step, axis) -> None:
 
 
 def test_wider_smoke_has_more_scales() -> None:
-    """The coarsest patches are as wide as the smoke, the finest have single pixels."""
     narrow, wide = (ClipTexture.of(moving((-1, 0), width=width)) for width in (3.0, 12.0))
     assert narrow is not None
     assert wide is not None

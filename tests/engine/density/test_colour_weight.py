@@ -117,7 +117,6 @@ def test_the_other_colours_tell_smoke_from_a_wall_that_is_continued_too_dark(tru
 
 
 def test_a_wall_that_is_continued_too_bright_is_no_smoke_in_shadow(optics) -> None:
-    """It is darker than what is continued, as thick smoke in its own shadow would be."""
     bright, everywhere = replace(found_plate(0.2), image=1.2 * wall()), np.ones(SIZE, np.bool_)
     certain = replace(bright, errors=np.zeros((3, 3), np.float32))
     assert apparent_optical_depth(wall(), certain, everywhere, optics).min() > 2

@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 import smokelift._core as _core
-from smokelift.density import (
-    DensitySettings,
-    FittedDensity,
-    Observation,
-    View,
-    reconstruct_density,
-)
+from smokelift.density import DensitySettings, FittedDensity, Observation, View, reconstruct_density
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.hull import Places, common_hull, project_voxels, visual_hull

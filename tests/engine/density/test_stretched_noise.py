@@ -87,7 +87,6 @@ def test_fine_octaves_are_drawn_out() -> None:
 
 
 def test_a_lattice_is_read_as_scipy_does() -> None:
-    """To the bit, at nodes and a rounding beside them too, any number of turns away."""
     random = np.random.default_rng(0)
     lattice = random.standard_normal((5, 6, 7)).astype(np.float32)
     places = random.uniform(-40, 40, (3, 2000)).astype(np.float32)

@@ -62,7 +62,6 @@ def test_a_wrong_motion_is_rejected(moment, step) -> None:
 
 
 def test_amounts_that_are_worse_than_the_pictures_own_are_not_taken_over(moment) -> None:
-    """With hardly any smoke carried along, or far too much, rays keep the prior's."""
     for wrong in (0.02, 12.0):
         carried = np.float32(wrong) * moment.true
         start = moment.start(carried)

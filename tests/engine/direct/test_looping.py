@@ -12,7 +12,6 @@ from tests.engine.direct.rising import DOMAIN, DT, blob, write_plume
 
 
 def test_a_seam_moves_a_shape_instead_of_fading_it():
-    """Half way there is one blob half way, and the velocity says that it goes there."""
     way = 4 * DOMAIN.voxel_size
     still = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",))
     end, start = (Moment(blob((x, 0, 1), 0.25), still) for x in (-way / 2, way / 2))

@@ -52,7 +52,6 @@ def test_a_seed_makes_the_same_eddies_on_any_grid():
 
 
 def test_a_hundred_frames_keep_the_speed_of_the_eddies():
-    """Air that comes in through the open sides brings nothing with it that grows."""
     around = Surroundings(wind=(0.3, 0.0, 0.0), turbulences=(Turbulence(0.5, 0.5, 1),))
     nothing = Moment(np.zeros(DOMAIN.shape, np.float32), at_rest(blob()).velocity)
     moments = course(free(Physics(0.0, 0.0), around), nothing, 100)

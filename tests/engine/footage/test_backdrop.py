@@ -97,7 +97,6 @@ def test_a_trimmed_clip_has_the_background_of_its_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
 def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
-    """Ink is over more of the picture that never changes than what it spreads over."""
     truth = np.full((HEIGHT, WIDTH, 3), colour)
     clip = film(tmp_path, truth, spreading_ink, ink)
     plate = plate_of(clip)
@@ -133,7 +132,6 @@ def test_mist_that_hardly_moves_is_before_the_black_that_it_fades_into(tmp_path:
 
 @pytest.mark.parametrize("lit", [False, True], ids=["bars", "spot"])
 def test_what_has_edges_is_no_mist(tmp_path: Path, lit: bool) -> None:
-    """Black bars, and a wall that a spot lights, are as black as what mist is before."""
     truth = wall(0.2, 0.5)
     truth[:10] = 0
     truth[-10:] = 0

@@ -67,7 +67,6 @@ def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> No
 def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
     tmp_path: Path, colour: float, edge: float
 ) -> None:
-    """A chimney's column, beside which a shred of the other brightness passes once."""
     truth = np.linspace(0.2, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     column = np.abs(columns - WIDTH / 2) < 14

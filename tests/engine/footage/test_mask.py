@@ -81,7 +81,6 @@ def test_a_mask_a_frame_belongs_to_the_frames_of_the_file(tmp_path: Path, kind: 
 
 
 def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path: Path) -> None:
-    """Frames without a mask say nothing; and are refused where they are asked for."""
     clip = filmed(tmp_path / "clip")
     for n in range(8):
         painted(tmp_path / f"mask_{n}.png", np.full((HEIGHT, WIDTH), 255))

@@ -28,7 +28,6 @@ def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
 
 
 def test_noise_is_smoothed_as_far_as_that_helps() -> None:
-    """Clean pictures stay sharp; noise that neighbours share is not lessened by it."""
     codes = np.full(3, 1 / 255, np.float32)
     assert smoothing(lasting_noise(0.1)) == smoothing(Noise(2 * codes, codes)) == SMOOTHING
     assert SMOOTHING < smoothing(Noise(10 * codes, codes)) < MAX_SMOOTHING
@@ -36,7 +35,6 @@ def test_noise_is_smoothed_as_far_as_that_helps() -> None:
 
 
 def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
-    """A veil too faint for the noise of single pixels, before a wall that is given."""
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     veil = np.where(np.hypot(rows - 36, columns - 28) < 16, 0.09, 0.0)
     truth = wall(0.2, 0.3)

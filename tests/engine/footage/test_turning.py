@@ -55,7 +55,6 @@ def test_a_camera_that_hardly_travels_is_not() -> None:
 
 
 def test_too_little_texture_tells_nothing() -> None:
-    """A band of it, as smoke is before something smooth, may move in its own way."""
     frames = over_a_plain(30)
     frames[:, :, 75:] = 0.2
     assert find_turns(clip_of(frames), LENS) is None

@@ -142,7 +142,6 @@ def test_resuming_before_the_first_frame_starts(tmp_path: Path, no_vdb: None) ->
 
 
 def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -> None:
-    """A kill between the index and the state of frame 3 leaves the state of frame 2."""
     cut_off(tmp_path, [1, 2])
     older = (tmp_path / "resume.npz").read_bytes()
     (tmp_path / ".smoke_0003.npz.77.tmp").write_bytes(b"half a fra")

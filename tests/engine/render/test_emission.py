@@ -44,7 +44,6 @@ def test_a_layer_of_fire_shines_as_the_integral_says(smoke, expected) -> None:
 
 
 def test_smoke_hides_what_its_transmittance_says() -> None:
-    """A sheet of light behind all smoke is seen as the renderer shows a background."""
     smoke = np.random.default_rng(1).random(DOMAIN.resolution, np.float32)
     smoke[:, -1] = 0
     sheet = np.zeros_like(smoke)

@@ -39,7 +39,6 @@ def test_examples_of_the_documentation_run():
 
 @pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
 def test_render_gradient_of_every_model(density, target, scattering):
-    """loss, gradient and image agree with each other and with finite differences."""
     scene = replace(SCENE, scattering=scattering)
     loss, gradient, image = render_gradient(density, scene, target)
     assert loss == pytest.approx(np.sum((image.astype(np.float64) - target) ** 2), rel=1e-6)

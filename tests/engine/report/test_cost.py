@@ -56,7 +56,6 @@ def suggestion(resolution: tuple[int, int, int], given: bool = True) -> tuple[in
 
 
 def test_more_voxels_need_more() -> None:
-    """Eight times the voxels need up to eight times the memory, and nothing is free."""
     least, small, large = (memory_needed((n, n, n), WORK) for n in (8, 128, 512))
     assert least > 0
     assert 2 * small < large < 64 * small
@@ -87,7 +86,6 @@ def test_a_voxel_a_pixel_fits_where_smoke_fills_little() -> None:
 @pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
 @pytest.mark.parametrize("gigabytes", [0.3, 0.35, 0.4])
 def test_the_suggestion_fits(monkeypatch, size, gigabytes) -> None:
-    """The named resolution is accepted at once, and is smaller than what was refused."""
     free(monkeypatch, gigabytes)
     smaller = suggestion(size)
     assert memory_needed(smaller, WORK) <= gigabytes * 2**30
@@ -112,7 +110,6 @@ def test_a_box_that_was_found_follows_its_voxels(monkeypatch) -> None:
 
 
 def test_nothing_fits_is_said_too(monkeypatch) -> None:
-    """With less memory than the bare program takes no resolution is promised to fit."""
     free(monkeypatch, 0.2)
     with pytest.raises(NotEnoughMemoryError) as caught:
         require_memory(SIZES["cube"], WORK)

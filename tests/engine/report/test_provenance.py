@@ -48,7 +48,6 @@ def test_without_detail_nothing_is_made_up(shot, settings) -> None:
 
 
 def test_nothing_is_made_up_where_cameras_stand_all_around(shot) -> None:
-    """With all the detail asked for; a camera less, and what it would see is made up."""
     front = shot.views[0]
     near = front.working.camera
     around = [

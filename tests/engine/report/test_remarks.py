@@ -26,7 +26,6 @@ def test_how_smoke_gets_in_and_out_is_said(plume, draft) -> None:
     ("left", "kinds"), [(0.2, []), (0.4, ["not all is smoke"]), (0.8, ["hardly any smoke fitted"])]
 )
 def test_a_fit_that_explains_little_is_said(left: float, kinds: list[str]) -> None:
-    """A good fit says nothing, and one frame that is worse than the others neither."""
     errors = ({"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {})
     said = shortcomings([{"hull_share": 0.1, **figures} for figures in errors])
     assert said == [Doubt(kind, {"error": left}) for kind in kinds]

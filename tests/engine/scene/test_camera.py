@@ -62,7 +62,6 @@ def test_resizing_and_cropping_keep_the_rays() -> None:
 
 
 def test_a_moving_camera_stands_still_in_every_frame() -> None:
-    """Each frame has its own matrix; size and lens are shared, also by resized ones."""
     camera = moving_camera((0, -7, 1.5), (1, -7, 1.5), (2, -7, 1.5))
     for frame in range(3):
         still = camera.at(frame)

@@ -101,7 +101,6 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
 
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
 def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> None:
-    """As the color that a scene file would give; the run says what counts as smoke."""
     rows, columns = np.mgrid[:120, :80]
     smoke = np.clip(1.5 - np.hypot(rows - 80, columns - 40) / 26, 0, 1)
     shown = linear_to_srgb((colour * (1 - smoke) + 0.6 * smoke)[..., None].repeat(3, -1).astype(np.float32))

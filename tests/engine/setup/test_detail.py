@@ -102,7 +102,6 @@ def test_a_given_resolution_wins(filmed) -> None:
 
 @pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
 def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> None:
-    """The voxels that fill it may stand over by less than one, never below its floor."""
     box = Box((-size[0] / 2, -1, 0), (size[0] / 2, 1, size[2]))
     scene = replace(filmed(0.0), domain=box)
     shot = shot_of(scene, Settings.preset("draft"))

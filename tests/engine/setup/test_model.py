@@ -82,7 +82,6 @@ def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
 
 
 def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> None:
-    """Single scattering cannot be that bright; anisotropic smoke has no richer model."""
     shot = shot_of(white, draft)
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "multiple"

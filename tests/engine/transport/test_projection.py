@@ -44,7 +44,6 @@ def test_poisson_on_every_mix_of_sides(shape):
 
 @pytest.mark.parametrize("closed", [*ALL_SIDES[::9], ALL_SIDES[-1]])
 def test_poisson_where_transforms_are_split(closed):
-    """Long lines go through all kinds of halves; an odd length is not split at all."""
     rng = np.random.default_rng(7)
     for shape in ((2, 72, 100), (3, 65, 160)):
         truth = rng.standard_normal(shape)

@@ -34,8 +34,6 @@ def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed
 
 
 def test_twice_as_fine_a_turning_flow_turns_as_it_did():
-    """A flow that is linear in space has one value at a place, whatever the grid."""
-
     def turning(voxel: float, shape: tuple[int, int, int]) -> Velocity:
         x, y = (voxel * (np.arange(n) + 0.5) for n in shape[:2])
         faces = (y[None, :, None], -x[:, None, None], np.zeros((1, 1, 1)))

@@ -110,7 +110,6 @@ def test_mean_divergence() -> None:
 
 
 def test_a_flow_without_divergence_on_faces_has_none() -> None:
-    """However rough it is: the curl of noise on a staggered grid, at the centres."""
     a, b, c = np.random.default_rng(8).random((3, 9, 9, 9))
     faces = (
         np.diff(c, axis=1)[:, :, :-1] - np.diff(b, axis=2)[:, :-1],
