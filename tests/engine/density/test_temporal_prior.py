@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density import BlendCarried, DepthEstimate, GuidedSimulation, Observation, RoundDepth, Start, ViewSet
+from smokelift.density import (
+    BlendCarried,
+    DepthEstimate,
+    GuidedSimulation,
+    Observation,
+    RoundDepth,
+    Smoke,
+    Start,
+    ViewSet,
+)
 from smokelift.density.objective import Term
 from smokelift.density.temporal_prior import LARGEST_GAIN
 from smokelift.footage.noise import lasting_noise
@@ -151,5 +160,5 @@ def test_a_hole_that_smoke_entered_through_is_filled(moment, prior_start) -> Non
 
 
 def test_without_anything_made_up_the_carried_density_is_judged(moment) -> None:
-    found = GuidedSimulation(LARGEST).start(moment.views, moment.depth, moment.true, moment.before)
+    found = GuidedSimulation(LARGEST).start(moment.views, moment.depth, Smoke(moment.true), Smoke(moment.before))
     np.testing.assert_array_equal(found.density, moment.start(moment.true).density)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from films import HEIGHT, WIDTH, film, overlap, wall
+from scipy import ndimage
 
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing

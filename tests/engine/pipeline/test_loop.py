@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift.baselines.density import FixedRateDescent
-from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
+from smokelift.density import GradientFit, RoundDepth, Smoke, Start, ViewSet
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
@@ -22,6 +22,7 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
+from smokelift.pipeline.loop import Carried, frames_after
 from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix

@@ -20,7 +20,6 @@ from smokelift.setup import illumination, scattering
 from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.model import ONE_VIEW_SMOOTHNESS
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
