@@ -326,15 +326,22 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, settings)
         camera = shot.observe(1)[0].camera
-    estimator, domain = compose(shot.settings).velocity_estimator, shot.optics.domain
+    estimator, domain = compose(shot.settings).velocity_estimator.of_one_view(), shot.optics.domain
     first, second = by_themselves[:2]
     assert first.smooth is not None and second.smooth is not None
     assert first.followed is not None and second.followed is not None
 
     def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
         dt = 1 / plume.scene.clip.fps
-        known = {"closed": shot.scene.closed, "inflow": shot.scene.inflow(), "prediction": None}
-        found = estimator.estimate(before, after, dt, domain.voxel_size, **known)
+        found = estimator.estimate(
+            before,
+            after,
+            dt,
+            domain.voxel_size,
+            closed=shot.scene.closed,
+            inflow=shot.scene.inflow(),
+            prediction=None,
+        )
         return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
 
     np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())
