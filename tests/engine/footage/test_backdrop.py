@@ -56,7 +56,6 @@ def test_fog_that_fills_black_is_no_noise(tmp_path: Path, frames: tuple[int, int
 
 
 def test_faint_fog_before_one_colour_is_no_noise(tmp_path: Path) -> None:
-    """It goes to one side of the colour, and noise to both."""
     random = np.random.default_rng(2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     for n in range(COUNT):

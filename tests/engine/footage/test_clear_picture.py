@@ -84,7 +84,6 @@ def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
 
 
 def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_path: Path) -> None:
-    """A dark jacket before a bright wall that breathes by ten codes, beside a puff."""
     jacket = np.s_[40:, :12]
     truth = wall(0.6, 0.9)
     truth[jacket] = 0.01

@@ -42,11 +42,7 @@ def test_a_core_that_is_clipped_to_yellow_is_no_bright_smoke() -> None:
 
 @pytest.mark.parametrize(
     "what",
-    [
-        {"flame": np.zeros(3)},
-        {"smoke": np.array((0.9, 0.45, 0.1)), "flame": np.zeros(3)},
-        {"flame": np.ones(3)},
-    ],
+    [{"flame": np.zeros(3)}, {"smoke": np.array((0.9, 0.45, 0.1)), "flame": np.zeros(3)}, {"flame": np.ones(3)}],
     ids=["no flame", "orange smoke", "white light"],
 )
 def test_what_is_no_fire(what) -> None:
@@ -67,7 +63,6 @@ def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:
 
 
 def test_what_is_added_to_the_background_counts() -> None:
-    """Flames before land are fire, and a sky as red as they is not."""
     sky, land = np.full((90, 3), 0.45, np.float32), np.full((10, 3), 0.02, np.float32)
     flames = np.broadcast_to(np.float32((0.95, 0.35, 0.08)), (10, 3))
     seen = np.concatenate([0.7 * sky + 0.02, flames])

@@ -65,7 +65,6 @@ def test_a_faint_rim_counts_as_far_as_it_is_certain(noise: float) -> None:
 
 
 def test_noise_is_hardly_ever_smoke() -> None:
-    """Of a hundred pictures one at most shows any, whatever their size and noise."""
     random = np.random.default_rng(0)
     alarms = 0
     for size in ((40, 60), (120, 260)):
@@ -80,7 +79,6 @@ def test_noise_is_hardly_ever_smoke() -> None:
 
 
 def test_a_speck_has_to_be_stronger_than_a_veil() -> None:
-    """Noise makes what is small and faint, and nothing that is large or strong."""
     plate = Plate(np.full((120, 160, 3), 0.2, np.float32), np.ones((120, 160), np.float32), lasting_noise(1 / 255))
     for side, codes, found in ((40, 3, True), (6, 3, False), (6, 30, True)):
         encoded = linear_to_srgb(plate.image)

@@ -297,7 +297,6 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
 
 
 def test_where_no_picture_is_followed_a_run_goes_on_without_the_frame_before(two_views, draft, monkeypatch) -> None:
-    """Its picture is not read again."""
     observed: list[int] = []
     observe = Shot.observe
     with Clip.open(two_views.clip) as clip:
@@ -334,13 +333,7 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
     def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
         dt = 1 / plume.scene.clip.fps
         found = estimator.estimate(
-            before,
-            after,
-            dt,
-            domain.voxel_size,
-            closed=shot.scene.closed,
-            inflow=shot.scene.inflow(),
-            prediction=None,
+            before, after, dt, domain.voxel_size, closed=shot.scene.closed, inflow=shot.scene.inflow(), prediction=None
         )
         return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
 

@@ -273,12 +273,10 @@ def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
 
 
 def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
-    """What was chosen is given then, and chooses the same."""
     first = shot_of(plume.scene, draft)
     assert shot_of(plume.scene, first.settings).settings == first.settings
 
 
 def test_a_camera_is_alone_where_no_other_sees_the_smoke_and_it_stands_still(plume, tracked, two_views, draft) -> None:
-    """Its rays mix what moves."""
     shots = [shot_of(scene, draft) for scene in (plume.scene, two_views, tracked)]
     assert [shot.alone for shot in shots] == [True, False, False]

@@ -48,7 +48,6 @@ def test_recovers_a_translation(motion):
 
 
 def test_an_estimate_of_one_view_is_smoother():
-    """Nothing else of it changes; the paper's has no such thing."""
     smooth = dataclasses.replace(VelocitySettings(), smoothness=ONE_VIEW_SMOOTHNESS * VelocitySettings().smoothness)
     assert DEFAULT.of_one_view() == CoarseToFine(smooth)
     assert PAPER.of_one_view() == PAPER
