@@ -50,7 +50,6 @@ def test_resolutions() -> None:
 
 
 def test_directions() -> None:
-    """Every option of a take that is made of another is the engine's, and the limits are."""
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
     for module in (continue_, retime, loop):

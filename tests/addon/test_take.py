@@ -129,7 +129,6 @@ def test_obstacles_that_move(tmp_path) -> None:
     ],
 )
 def test_nothing_but_what_decides_the_result_reaches_the_engine(tmp_path, request_, said) -> None:
-    """A project from elsewhere brings its takes along, and they must not write where they like."""
     take = begun(tmp_path)
     take.request_file.write_text(request_ if isinstance(request_, str) else json.dumps(request_))
     with pytest.raises(TakeError, match=said):

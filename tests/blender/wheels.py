@@ -60,7 +60,6 @@ class InWheel:
         return [*offline(), str(folder / "bin" / "python")]
 
     def test_the_core_needs_no_newer_system_than_blender(self, tmp_path) -> None:
-        """As the file itself says, whatever its wheel was called; its C++ library is inside it."""
         with zipfile.ZipFile(shipped(self.python)) as archive:
             (name,) = (name for name in archive.namelist() if re.search(r"/smokelift/_core\.[^/]+\.so$", name))
             core = archive.extract(name, tmp_path)

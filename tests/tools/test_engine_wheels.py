@@ -33,7 +33,6 @@ def test_what_a_build_needs_is_installed_once_and_said(tmp_path, commands, capsy
 
 
 def test_blenders_pythons_take_what_was_compiled_for_the_tests() -> None:
-    """The numerics of the first serve the others; a Python that no Blender has shares nothing."""
     assert engine_wheels.versions("3.13", blender=True) == ["3.13", "3.11"]
     assert engine_wheels.versions("3.12", blender=True) == ["3.11", "3.13"]
     assert engine_wheels.versions("3.12", blender=False) == ["3.12"]

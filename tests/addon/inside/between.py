@@ -69,7 +69,6 @@ def seen(obj: bpy.types.Object, frame: int, name: str = "density") -> np.ndarray
 
 @needs_nodes
 def test_the_smoke_is_where_it_would_be(slow, tmp_path) -> None:
-    """In frames of the scene between two of the clip as in these; the last stays for its time."""
     volume.show(slow, flying(tmp_path, fire=True))
     for frame in range(1, 2 * FRAMES + 1):
         place = min((frame - 1) / 2, FRAMES - 1)

@@ -58,7 +58,6 @@ def remove(scene: bpy.types.Scene, *names: str) -> None:
 
 
 def test_the_plate_is_behind_the_smoke_and_its_shadow(filmed, tmp_path) -> None:
-    """Without smoke it is the plate; the floor is darker where the sun does not come through."""
     found = shown(filmed, tmp_path, Grain=0.0)
     assert filmed.render.film_transparent
     assert found[SIZE * 3 // 4 :].min() < 0.7 * PLATE

@@ -179,7 +179,6 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
 
 
 def test_winds_and_fans(result, acting) -> None:
-    """Winds add up; an Empty, a Force field and a Wind field with a distance are fans."""
     for name in ("One", "Two"):
         placed(acting, name, field="WIND", rotation_euler=(0.0, math.pi / 2, 0.0)).field.strength = 0.4
     placed(acting, "Empty", location=(0.1, 0.2, 0.3), empty_display_size=0.25)

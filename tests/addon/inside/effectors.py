@@ -14,7 +14,6 @@ def select(*objects: bpy.types.Object) -> None:
 
 
 def test_the_selected_act_on_the_smoke(shot, tmp_path) -> None:
-    """In a collection that is made, and then kept; they stay in their own collections too."""
     obj = smoke(shot)
     volume.show(obj, made(tmp_path))
     select(obj, obj.smokelift.box, shot.camera)

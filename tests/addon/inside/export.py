@@ -93,7 +93,6 @@ def test_blender_reads_the_usd_file(made, host, velocity) -> None:
 
 
 def test_the_usd_file_is_sound(made) -> None:
-    """By USD's own module: names, fields, purposes, and a material whose nodes MaterialX knows."""
     from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdVol
 
     exported(made, proxy=2)

@@ -42,7 +42,6 @@ def files(points: bpy.types.Object, frame: int) -> list[str]:
 
 
 def test_each_point_plays_later(shown) -> None:
-    """By its attribute, which the artist may change; the Volume itself stays as it was."""
     start = shown.data.frame_start
     points = scattered(count=3, step=2)
     assert not points.smokelift.is_smoke

@@ -87,7 +87,6 @@ def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
 
 
 def test_smoke_evaporates_on_its_way_up(lit, tmp_path) -> None:
-    """The smoke is between a half and a bit more of its height; what is dense stays longer."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
     inputs = node(lit).inputs

@@ -204,7 +204,6 @@ def test_frames_are_counted_from_nought(shot) -> None:
 
 
 def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
-    """Pictures carry none; a video's own is left to the engine; what the user says wins."""
     for number in range(7, 12):
         (tmp_path / f"smoke_{number:03d}.png").write_bytes((EXAMPLE / "plate.png").read_bytes())
     load_clip(shot, tmp_path / "smoke_007.png")
@@ -259,7 +258,6 @@ def test_the_box_becomes_cubes(shot, tmp_path) -> None:
 
 
 def test_a_resolution_that_is_left_open_is_measured(shot) -> None:
-    """In the scene's box; a box that is assumed always is, and a number of one's own never."""
     assert options(smoke(shot))[-2:] == ["--resolution", "auto"]
     smoke(shot).smokelift.longest_side = 40
     assert "--resolution" not in options(smoke(shot))
@@ -444,7 +442,6 @@ def with_camera_at(scene: bpy.types.Scene, y: float) -> dict:
 
 
 def test_a_camera_beside_the_box_is_not_inside_it(shot) -> None:
-    """Nor in what rounding up to cubes adds, nor by the rounding of Blender's numbers."""
     far = with_camera_at(shot, -7.0)
     assert far["min"][1] < -1.0
     for y in (-1.0, float(np.nextafter(np.float32(-1.0), np.float32(0.0))), far["min"][1] * 0.5 - 0.5):

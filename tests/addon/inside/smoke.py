@@ -30,7 +30,6 @@ def test_new_smoke_is_a_volume_that_is_selected_and_active(scene, clip) -> None:
 
 
 def test_the_active_smoke_is_that_of_the_active_object(scene, clip) -> None:
-    """Also through its box and its camera; where nothing of a smoke is active, the first."""
     first, second = new_smoke(scene, clip), new_smoke(scene, clip)
     box = second.smokelift.box = add_box(scene, (0, 0, 0), (1, 1, 1))
     layer = bpy.context.view_layer

@@ -137,7 +137,6 @@ def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
 
 
 def test_grids_and_their_place(shot, tmp_path) -> None:
-    """Density and velocity, in the engine's voxels: the smoke is where the engine has it."""
     take = made(tmp_path)
     volume.show(smoke(shot), take)
     obj = evaluated(shot, 3)
@@ -169,7 +168,6 @@ def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
 
 
 def test_smoke_that_was_moved_stays_where_it_was_put(shot, tmp_path) -> None:
-    """While it grows, and when it is made anew: also if the box was rotated meanwhile."""
     first = made(tmp_path)
     obj = volume.show(smoke(shot), first)
     obj.location.x, obj.rotation_euler.z, obj.scale = obj.location.x + 5.0, 0.5, (2.0, 2.0, 2.0)
@@ -216,7 +214,6 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     ],
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
-    """In the panel, and with the Volume wherever it goes; nothing where the engine did not say."""
     assert volume.provenance_note(smoke(shot)) == ""
     take = made(tmp_path)
     file = take.directory / "sequence.json"

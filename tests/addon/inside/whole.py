@@ -120,7 +120,6 @@ def test_a_shot_of_which_everything_is_given_is_made(shot, kept, tmp_path) -> No
 
 
 def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
-    """The light that was estimated is made, the background that was estimated is shown."""
     smoke(shot).smokelift.light_mode, smoke(shot).smokelift.plate_mode = "ESTIMATE", "ESTIMATE"
     bpy.data.objects.remove(bpy.data.objects["Sun"])
     make(shot, tmp_path / "out")

@@ -52,7 +52,6 @@ def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
 
 
 def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
-    """Status 3 before anything is written, and the resolution that is named would fit."""
     clip = str(plume.scene.clip.path)
     words = ("--out", tmp_path / "out", "--npz", "--resolution", "4000,4000,4000", *QUICK)
     sentence = refused(capsys, "reconstruct", clip, *words, status=3)
@@ -67,7 +66,6 @@ def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT to send")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys, number) -> None:
-    """Status 130 in the middle; --resume gives the rest, bit for bit as without the break."""
     heights = np.linspace(0.3, 0.9, 8)
     filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
     filmed.save(tmp_path / "scene.toml")
@@ -162,7 +160,6 @@ def test_threads_are_limited(tmp_path, capsys, monkeypatch) -> None:
 
 
 def test_doctor_in_a_process_of_its_own() -> None:
-    """Versions, devices and what is missing, on standard output; nothing on the other."""
     done = subprocess.run([*MODULE, "doctor"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0
     assert done.stdout.startswith(f"smokelift {smokelift.__version__}, Python 3.")

@@ -36,7 +36,6 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
 
 
 def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
-    """In one run, as a run at each quality has it; where the resolution is given, all have that."""
     path = tmp_path / "scene.toml"
     replace(plume.scene, camera=None, domain=None).save(path)
 

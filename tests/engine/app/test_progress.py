@@ -23,7 +23,6 @@ def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
 
 
 def test_json_events_are_a_line_each(capsys) -> None:
-    """Every event with its fields, in order, even with line breaks and quotes in a text."""
     with reporter("json") as say:
         say.note('two\nlines and "quotes"')
         say.start(4, 1)
@@ -40,7 +39,6 @@ def test_json_events_are_a_line_each(capsys) -> None:
 
 
 def test_json_is_told_how_long_it_takes(capsys) -> None:
-    """Time left is the mean of the latest frames, for those still to come; none at the end."""
     with reporter("json") as say:
         say.start(13, 0)
         for number in range(1, 14):

@@ -63,7 +63,6 @@ def test_further_views_of_a_scene_file_are_named(two_views, tmp_path, capsys) ->
 
 
 def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
-    """A pattern of pictures instead of a scene file, with a range of frames and a resolution."""
     out = tmp_path / "out"
     clip = str(plume.scene.clip.path)
     arguments = ("--npz", "--frames", "1:3", "--resolution", "16,16,24", "--progress", "json", *QUICK)
@@ -88,7 +87,6 @@ def test_one_picture_alone_is_enough_before_one_colour(plume, tmp_path, capsys) 
 
 
 def test_what_is_made_up_is_chosen_said_and_kept(shot, finished, tmp_path, capsys) -> None:
-    """Detail and seed reach the settings and the record; a run goes on with its own seed only."""
     out, words = tmp_path / "out", ("--npz", "--frames", "0:1", *QUICK)
     assert command("reconstruct", shot, "--out", out, "--detail", "0.5", "--seed", "3", *words) == 0
     sequence = Sequence.open(out)
@@ -104,7 +102,6 @@ def test_what_is_made_up_is_chosen_said_and_kept(shot, finished, tmp_path, capsy
 
 
 def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
-    """What is said is used, and said to be by hand; auto measures the resolution of a given box."""
     out = tmp_path / "out"
     arguments = ("--npz", "--frames", "0:1", "--scattering", "unshadowed", "--resolution", "auto")
     assert command("reconstruct", shot, "--out", out, *arguments) == 0
@@ -118,7 +115,6 @@ def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
 
 
 def test_no_smoke_at_all_is_said(plume, tmp_path, capsys) -> None:
-    """Empty frames, exit 2, no figure of the fit, and a sentence that says what to do."""
     nothing = np.zeros_like(plume.densities[0])
     plume.write(tmp_path / "clip", [nothing] * 2).save(tmp_path / "scene.toml")
     out = tmp_path / "out"

@@ -38,7 +38,6 @@ def rising(depth: float) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("depth", [-0.3, -0.15, 0.0, 0.1])
 def test_smoke_on_the_floor_shows_its_depth(depth) -> None:
-    """To less than a voxel, shrunk towards the axis a little, and the same at all heights."""
     found = axis_of(rising(depth), FRONT, BOX)
     assert found.at(np.array([-1.2])) == pytest.approx(0.8 * depth, abs=0.05)
     assert found.at(np.array([0.5])) == pytest.approx(0.8 * depth, abs=0.06)
@@ -136,7 +135,6 @@ def beside(lean: float = 0.0) -> np.ndarray:
 
 
 def test_columns_beside_one_another_have_depths_of_their_own() -> None:
-    """Each as deep as its source, and as wide as it is itself, however far apart they stand."""
     found = axis_of(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
     heights, right, left = np.array([-0.9, 0.0, 0.4]), np.full(3, 0.45), np.full(3, -0.35)
     np.testing.assert_allclose(found.at(heights, right), -0.3, atol=0.03)

@@ -78,7 +78,6 @@ def test_no_detail_is_the_smooth_prior_itself(shot) -> None:
 
 
 def test_another_seed_is_another_smoke(shot) -> None:
-    """From the side; from the front both show the picture, and the same seed is the same smoke."""
     found = [fitted(shot, DetailedDepth(RoundDepth(), seed=seed)) for seed in (0, 0, 1)]
     (first, psnr), (again, _), (other, psnr_other) = found
     np.testing.assert_array_equal(first, again)

@@ -45,7 +45,6 @@ def noisy_plate(picture: np.ndarray) -> Plate:
 
 
 def test_voxels_seen_by_no_smoke_pixel_are_out(plume) -> None:
-    """A single smoky pixel allows its own columns of voxels and the nearest, and nothing else."""
     projection = project_voxels(GRID, plume.scene.domain)
     mask = np.zeros((32, 24), np.bool_)
     mask[10, 7] = True
@@ -100,7 +99,6 @@ def test_a_faint_rim_fades() -> None:
 
 
 def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
-    """It ends without a shell along its support: what is outermost on a ray is next to nothing."""
     found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
     deep = found.hull.sum(1) >= 8
     first, last = found.hull.argmax(1)[deep], 23 - found.hull[:, ::-1].argmax(1)[deep]
@@ -128,7 +126,6 @@ def amount_of(width: int) -> np.ndarray:
 
 
 def test_the_profile_has_unit_integral(plume) -> None:
-    """Along the depth the profile adds up to one, so that the picture's amounts are kept."""
     domain = plume.scene.domain
     total = profile_of(amount_of(8), domain).sum(1) * domain.voxel_size
     np.testing.assert_allclose(total, 1, rtol=0.03)
@@ -158,7 +155,6 @@ def test_the_profile_follows_the_axis(plume) -> None:
 
 
 def test_columns_behind_one_another_make_it_deeper(plume) -> None:
-    """Where sources are known to stand apart in depth, the smoke reaches from one to the other."""
     domain = plume.scene.domain
     h = domain.voxel_size
     y = (np.arange(24) - 11.5) * h
@@ -265,7 +261,6 @@ def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
 
 @pytest.mark.parametrize("even", [True, False])
 def test_compiled_steps_are_those_of_the_formula(even) -> None:
-    """What is not visible stays, a gain has its bound, and steps may be of either sign."""
     random = np.random.default_rng(0)
     values, plausible = random.lognormal(size=(2, 20000)).astype(np.float32)
     rows, columns = random.uniform(-1, 10, (2, 20000)).astype(np.float32)
@@ -352,7 +347,6 @@ def test_every_model_of_scattering_is_met(plume, small, scattering) -> None:
 
 
 def test_an_initial_density_is_used(plume, small) -> None:
-    """From the truth, nothing moves far; the depth that one picture cannot know survives."""
     truth = plume.densities[1]
     target = render(truth, small)
     found = reconstruct_density(target, small, truth, QUICK).density

@@ -54,7 +54,6 @@ def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
 
 
 def test_what_stays_there_stays_here(shot, large) -> None:
-    """To rounding; a factor is carried over, and what the finer grid holds of its own stays."""
     fine = level(shot)
     coarser = fine.coarser
     assert coarser is not None

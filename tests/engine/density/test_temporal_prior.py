@@ -132,7 +132,6 @@ def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, prior_star
 
 
 def test_detail_is_born_where_nothing_is_carried(moment, prior_start) -> None:
-    """There the prior's density is all that there is; likewise where far too little is carried."""
     hull = moment.views.hull
     empty = guided(moment, prior_start, np.zeros_like(moment.true))
     np.testing.assert_array_equal(empty.density[hull], prior_start.density[hull])

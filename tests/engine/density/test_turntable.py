@@ -13,7 +13,6 @@ CAMERA = Camera.look_at((3, -4, 1.1), (0, 0, 0.8), fov_y_degrees=27, size=(40, 5
 
 @pytest.mark.parametrize("degrees", [-30.0, 0.0, 45.0, 90.0, 135.0])
 def test_a_camera_is_where_it_is_turned_to(degrees) -> None:
-    """Turned cameras know their angle, and so does a camera in orbit about the same axis."""
     turntable = Turntable.before(CAMERA, DOMAIN)
     assert turntable.degrees(turntable.camera(degrees)) == pytest.approx(degrees)
     assert turntable.degrees(orbit(CAMERA, DOMAIN, degrees)) == pytest.approx(degrees)
@@ -56,7 +55,6 @@ def test_a_volume_comes_back_from_standing_upright(axis) -> None:
 
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0, 90.0, 137.0])
 def test_even_smoke_makes_an_even_picture(degrees) -> None:
-    """A cylinder is seen as its chords: no pattern of the grid shows, and nothing is lost."""
     domain = Domain((-1, -1, 0), (1, 1, 0.5), (64, 64, 16))
     turntable = Turntable.before(CAMERA, domain)
     x, y, _ = domain.offsets(domain.centre)

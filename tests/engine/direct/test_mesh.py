@@ -58,7 +58,6 @@ def test_a_round_mesh_is_a_ball(turned):
 
 
 def test_parts_of_a_mesh_may_overlap_and_leave_the_box():
-    """What two parts share is solid, and nothing leaks out of what is cut off by the box."""
     triangles = np.concatenate([cube((-0.5, -0.5, -1), (0.3, 0.5, 1)), cube((-0.1, -0.3, 0.5), (5, 0.3, 2))])
     inside = Mesh(triangles).voxels(DOMAIN)
     wanted = Box((-0.5, -0.5, -1), (0.3, 0.5, 1)).voxels(DOMAIN) | Box((-0.1, -0.3, 0.5), (5, 0.3, 2)).voxels(DOMAIN)

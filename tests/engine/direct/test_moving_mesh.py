@@ -24,7 +24,6 @@ def along_x(triangles: np.ndarray, speed: float, frames: int) -> MovingMesh:
 
 
 def test_the_surface_has_the_speed_of_its_corners():
-    """Of a mesh that goes, and of one that turns, on every face between inside and outside."""
     start = cube((-0.5, -0.3, 0.6), (0.5, 0.3, 1.4)).astype(float)
     turn = 0.02
     matrix = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])

@@ -23,7 +23,6 @@ def height(moment: Moment, axis: int = 2) -> float:
 
 
 def test_a_blob_rises_as_it_should_and_keeps_its_mass():
-    """At first it gains speed like a body in a fluid of equal inertia; nothing leaves the box."""
     moments = course(free(Physics(2.0, 0.0)), at_rest(blob()), 12)
     assert mass(moments[-1]) == pytest.approx(mass(moments[0]), rel=1e-3)
     heights = [height(moment) for moment in moments]

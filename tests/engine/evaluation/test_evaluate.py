@@ -111,7 +111,6 @@ def test_frames_are_those_of_the_clip(plume, truth, tmp_path, capsys) -> None:
 
 
 def test_without_truth_or_view_the_orbit_is_compared_with_the_front(plume, perfect, tmp_path, capsys) -> None:
-    """A sequence that is its front picture drawn out in depth has other sides than fronts."""
     drawn_out = [np.repeat(density.mean(1, keepdims=True), density.shape[1], 1) for density in plume.densities]
     folder = write(tmp_path / "out", plume.scene, drawn_out)
     found, other = (evaluate(capsys, sequence) for sequence in (perfect, folder))

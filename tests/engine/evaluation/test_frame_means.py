@@ -91,7 +91,6 @@ def test_each_mistake_shows_where_it_belongs(truth) -> None:
 
 
 def test_where_smoke_is_put_in_motion_is_not_scored(truth) -> None:
-    """Nonsense in the inlet's cells, before or after the step, changes no figure of the motion."""
     inlet = np.zeros(SHAPE, bool)
     inlet[6:10, 6:10, 6:9] = True
     fed = replace(truth, inflow_packed=np.stack([np.packbits(inlet)] * 4))

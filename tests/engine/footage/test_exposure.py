@@ -10,7 +10,6 @@ GAINS = np.array([1.3, 1.0, 0.8], np.float32)
 
 
 def test_a_gain_is_found_beside_smoke() -> None:
-    """A puff over a part of the picture does not disturb the gain of the rest, one a channel."""
     behind = wall(0.3, 0.7).astype(np.float32)
     alpha = puff(12)[..., None]
     seen = (behind * (1 - alpha) + 0.4 * alpha) * GAINS
@@ -18,7 +17,6 @@ def test_a_gain_is_found_beside_smoke() -> None:
 
 
 def test_smoke_is_no_gain() -> None:
-    """Before black nothing tells a gain, and smoke over most of a steady picture is none."""
     black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     assert (gain_of(black + 0.3, black) == 1).all()
     behind = wall(0.3, 0.7).astype(np.float32)

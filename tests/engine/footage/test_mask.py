@@ -49,7 +49,6 @@ def mask(tmp_path: Path) -> Path:
 
 
 def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path: Path) -> None:
-    """As values are stored, not as light; a mask of another size is resized as a clean plate is."""
     file = painted(tmp_path / "mask.png", [[0, 120, 140, 255]])
     seen = Mask(file, 0, 0).seen(0, 8, 2)
     np.testing.assert_array_equal(seen, [[False] * 4 + [True] * 4] * 2)
@@ -151,7 +150,6 @@ def test_a_cleared_clip_shows_its_background_as_it_is_exposed(tmp_path: Path, ma
 
 
 def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path) -> None:
-    """Behind the result there would be a blur; where the background is known it stays."""
     file = filmed(tmp_path / "clip", with_block=False)
     with Clip.open(file, mask=mask) as clip:
         found = plate_of(clip)

@@ -35,7 +35,6 @@ def test_a_working_pixel_is_a_voxel_wide_at_the_centre(camera: Camera) -> None:
 
 @all_three
 def test_points_fall_to_the_same_place_of_both_pictures(camera: Camera) -> None:
-    """A full picture's pixel, moved and scaled like the cut, is the small camera's pixel."""
     work = working_picture(camera, DOMAIN)
     full, depth = project(camera, points())
     small, small_depth = project(work.camera, points())

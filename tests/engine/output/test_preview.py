@@ -61,7 +61,6 @@ def tiles(path, sequence: Sequence, rows: int, columns: int) -> list[list[np.nda
 
 
 def test_an_orbit_shows_one_moment_from_twelve_angles(plume, tmp_path) -> None:
-    """The first is the camera's own; each angle shows other smoke than the one opposite."""
     sequence = at_rest(plume.scene, plume.densities, tmp_path / "out")
     framing = frame_smoke(sequence)
     with Clip.open(plume.scene.clip) as clip:
@@ -76,7 +75,6 @@ def test_an_orbit_shows_one_moment_from_twelve_angles(plume, tmp_path) -> None:
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 5), (14, STRIP_FRAMES)])
 def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, columns) -> None:
-    """The clip above; as many as there are, at most eight, and of a long clip its later part."""
     densities = [plume.densities[min(n, 4)] for n in range(count)]
     scene = plume.write(tmp_path / "clip", densities, plume.scene)
     sequence = at_rest(scene, densities, tmp_path / "out")
@@ -91,7 +89,6 @@ def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, 
 
 
 def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
-    """Its last third begins with the front and leaves it, for smoke that does not move."""
     still = [plume.densities[2]] * 5
     scene = plume.write(tmp_path / "clip", still, plume.scene)
     scene = replace(scene, clip=replace(scene.clip, fps=4.0))

@@ -24,7 +24,6 @@ def test_a_coarser_box_keeps_the_mass() -> None:
 
 @needs_vdb
 def test_a_large_sequence_has_proxies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run writes them beside its frames, with the fire, and goes on in that directory."""
     monkeypatch.setattr(writer, "MIN_PROXY_VOXELS", 1)
     burning = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
     with SequenceWriter(tmp_path, burning, SETTINGS) as out:

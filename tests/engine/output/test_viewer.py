@@ -17,7 +17,6 @@ def test_the_front_is_the_scenes_own_view(plume) -> None:
 
 
 def test_a_clean_plate_stands_behind_what_the_camera_itself_shows(plume, tmp_path) -> None:
-    """All of it in front, a part behind a part of the picture, and elsewhere its mean colour."""
     plate = np.zeros((56, 40, 3), np.float32)
     plate[:, :20] = 0.5
     write_image(tmp_path / "plate.exr", plate)

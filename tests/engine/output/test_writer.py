@@ -37,7 +37,6 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
 
 @pytest.mark.parametrize("renames", [0, 1])
 def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: None, monkeypatch, renames) -> None:
-    """Before the index or the background has its name, and without a chance to clear up."""
     out, background = tmp_path / "out", np.full((48, 32, 3), 0.2, np.float32)
     rename, left = Path.replace, renames
 

@@ -56,7 +56,6 @@ def test_all_pixels_are_those_of_the_clips_camera(shot, sharp) -> None:
 
 @pytest.mark.parametrize("step", [3, 5])
 def test_rays_between_pixels_are_left_out_and_none_is_moved(shot, sharp, step) -> None:
-    """Every n-th pixel is as it is among all; the mean over them stands for that over all."""
     every, some = (beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], n) for n in (1, step))
     rows, columns = every.inside.shape
     down, right = (n % step // 2 + step // 2 for n in (rows, columns))

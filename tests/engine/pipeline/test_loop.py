@@ -109,7 +109,6 @@ def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) 
 
 
 def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
-    """A given distance moves the smoke away from the camera, and what is given is not estimated."""
     depth = view_frame(plume.scene.camera)[1]
     offset = (voxel_centres(plume.scene.domain) - np.array(plume.scene.domain.centre)) @ depth
     shift = 3 * plume.scene.domain.voxel_size
@@ -140,7 +139,6 @@ def test_the_example_stands_upright() -> None:
 
 
 def test_the_picture_is_met(run, plume) -> None:
-    """Seen from the camera the reconstruction is the footage, to 35 dB at least in linear light."""
     frames, _ = run
     with Clip.open(plume.scene.clip) as clip:
         for index, frame in enumerate(frames):
@@ -168,7 +166,6 @@ def test_rising_smoke_has_upward_velocity(run, plume) -> None:
 
 
 def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
-    """Nothing goes through the floor, no motion is taken from the inlet, and both are on record."""
     inflows = []
 
     class Watched(CoarseToFine):
@@ -221,7 +218,6 @@ def test_what_a_mask_hides_is_no_smoke(run, plume, draft, tmp_path) -> None:
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, count) -> None:
-    """Resuming gives the rest, and the files are those of an uninterrupted run bit for bit."""
     _, uninterrupted = run
     out = tmp_path / "out"
     cut_off(plume.scene, draft, out, count)
@@ -400,7 +396,6 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
 
 
 def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
-    """A wall that passes by behind the smoke is no smoke, and the pictures are fitted."""
     blocks = np.random.default_rng(0).uniform(0.05, 0.2, (7, 7, 3)).astype(np.float32)
     wide = np.kron(blocks, np.ones((8, 8, 1), np.float32))
     for n, density in enumerate(plume.densities):
@@ -500,7 +495,6 @@ def test_transport_keeps_the_mass_of_every_height(by_themselves, all_carried) ->
 
 
 def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
-    """It shows what it adds to the pictures, and is written; without fire there is none."""
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
     scene = replace(plume.write(tmp_path / "clip", plume.densities[:2], dim), lights=())
     with Clip.open(scene.clip) as clip:

@@ -16,7 +16,6 @@ from smokelift.setup.prepare import prepare_shot
 
 
 def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None:
-    """What was decided is there at once; a directory that cannot be written to costs no frame."""
     computed = []
 
     class Counted:

@@ -169,7 +169,6 @@ def test_a_black_picture_takes_the_least(light_of) -> None:
 
 
 def test_the_count_follows_the_scene(light_of) -> None:
-    """A lamp needs no more than the least, a sky more, and a medium that scatters forward most."""
     lamp = np.zeros((64, 128, 3))
     lamp[10, 20] = 1
     medium, forward = Medium(2.0, 0.9, 0.0), Medium(2.0, 0.9, 0.6)

@@ -23,7 +23,6 @@ def test_optics_are_those_of_the_scene() -> None:
 
 
 def test_unshadowed_source_is_the_radiance_of_thin_smoke() -> None:
-    """Before black, isotropic, one voxel in the middle: picture = source times opacity."""
     domain = Domain((-0.1, -0.1, 0.4), (0.1, 0.1, 0.6), (1, 1, 1))
     medium = Medium(1e-3, 0.8, 0.0)
     optics = Optics(domain, medium, (SUN, PointLight((2.0, 0.0, 0.5), (4.0, 8.0, 12.0))), "unshadowed")

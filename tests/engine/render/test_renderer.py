@@ -172,7 +172,6 @@ def test_image_is_finite_and_creates_no_light(density, yaw, pitch, light, anisot
 
 
 def test_gradient_stays_on_the_support(density, wall):
-    """Outside the voxels that may hold smoke the gradient is zero; inside it is the same."""
     support = density > 0.3
     inside = np.where(support, density, 0)
     camera, medium = make_camera((2.5, -1.2, 2.4)), medium_of_depth(density, 3)
@@ -186,7 +185,6 @@ def test_gradient_stays_on_the_support(density, wall):
 
 
 def test_a_gradient_is_written_where_an_earlier_one_was(density, wall):
-    """The memory is the same and so are the values; memory of another type is refused."""
     renderer = Renderer(
         make_camera((2.5, -1.2, 2.4)), DOMAIN, medium_of_depth(density, 3), (SUN,), wall, support=density > 0.3
     )

@@ -96,7 +96,6 @@ def test_the_suggestion_fits(monkeypatch, size, gigabytes) -> None:
 
 
 def test_a_box_that_was_found_follows_its_voxels(monkeypatch) -> None:
-    """Nearly all that fits is suggested, where a given box can only be divided evenly."""
     free(monkeypatch, 7)
     large = (516, 516, 948)
     sizes = []
@@ -117,7 +116,6 @@ def test_nothing_fits_is_said_too(monkeypatch) -> None:
 
 
 def test_more_frames_views_and_smoke_cost_more(monkeypatch) -> None:
-    """Time and disk follow the frames and the smoke of them all, memory the most smoke of any."""
     monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
     base, longer, more = (
         estimate_cost(SIZES["cube"], work)
@@ -132,7 +130,6 @@ def test_more_frames_views_and_smoke_cost_more(monkeypatch) -> None:
 
 
 def test_time_without_detail_and_of_the_papers_method(monkeypatch) -> None:
-    """Detail takes as much time as the smooth answer; the paper's method many times as much."""
     monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
     paper = replace(SMOOTH, settings=Settings.preset(method="paper"), largest=1.0, mean=1.0)
     detailed, smooth, papers = (estimate_cost(SIZES["cube"], work).seconds for work in (WORK, SMOOTH, paper))

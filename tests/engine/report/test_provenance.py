@@ -60,8 +60,6 @@ def test_nothing_is_made_up_where_cameras_stand_all_around(shot) -> None:
 
 
 def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
-    """Further cameras limit it; the paper's method takes the picture for the side view."""
-
     def assumed(shot: Shot) -> str:
         return parts(shot)["distribution along the rays"].how.kind
 

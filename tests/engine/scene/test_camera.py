@@ -79,7 +79,6 @@ def test_a_moving_camera_stands_still_in_every_frame() -> None:
 @all_three
 @pytest.mark.parametrize(("yaw", "pitch"), [(33, 0), (0, 25), (-120, -10)])
 def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: float) -> None:
-    """The camera stays as far away, and the domain's centre at the same pixel and depth."""
     moved = orbit(camera, DOMAIN, yaw, pitch)
     distance = [np.linalg.norm(np.array(c.position) - CENTRE) for c in (camera, moved)]
     assert distance[1] == pytest.approx(distance[0])

@@ -61,7 +61,6 @@ AUTO = Settings.preset("draft", resolution="auto")
 
 
 def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
-    """A sharp one gets what the quality allows; in the box that was given, with its proportions."""
     sharp, soft, blurred = (shot_of(filmed(blur), AUTO) for blur in (0.0, 4.0, 12.0))
     sides = [max(shot.scene.domain.resolution) for shot in (sharp, soft, blurred)]
     assert sides[0] >= LIMITS["draft"].most - 3

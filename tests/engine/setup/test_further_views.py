@@ -65,7 +65,6 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
 
 @pytest.mark.parametrize("wrong", ["camera", "background"])
 def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
-    """A camera that stands elsewhere, or another background: nothing is refused, but it is said."""
     (view,) = two_views.views
     if wrong == "camera":
         lower = look_at_matrix((4, 0, 0.2), (0, 0, 0.2), (0, 0, 1))

@@ -70,7 +70,6 @@ def test_a_light_that_the_clip_does_not_contradict_stays(thick, draft) -> None:
 
 
 def test_a_light_that_is_too_weak_becomes_stronger(thick, draft) -> None:
-    """Between once and twice what was taken away, since thicker smoke makes up for some of it."""
     (sun,) = thick.lights
     factor, said = strengths(replace(thick, lights=(sun.scaled(0.4),)), draft)
     assert 1.5 < factor < 3.2
@@ -139,7 +138,6 @@ def leaves(monkeypatch):
 
 
 def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(lit, draft, leaves) -> None:
-    """The strength stays that of what is behind the smoke, and the direction undetermined."""
     tried = leaves(0.02)
     shot = shot_of(unlit(lit), draft)
     choice, lights = scattering_of(shot), shot.scene.lights

@@ -147,7 +147,6 @@ def test_each_frame_has_its_own_small_picture(tracked, draft) -> None:
 
 
 def test_a_frame_that_shows_nothing_of_the_domain(tracked, draft) -> None:
-    """There is no picture to fit, and the first one that shows it stands for the shot."""
     away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
     poses = (away, *tracked.camera.matrices[1:])
     shot = shot_of(replace(tracked, camera=replace(tracked.camera, matrix=away, matrices=poses)), draft)

@@ -11,7 +11,6 @@ from smokelift.setup.settings import LIMITS, METHODS, QUALITIES, Settings
 
 
 def test_better_qualities_cost_more() -> None:
-    """Voxels and the detail that they keep rise from draft to final, and iterations never fall."""
     presets = [Settings.preset(quality) for quality in QUALITIES]
     for less, more in itertools.pairwise(presets):
         for pixels in (300, 600, 4000):

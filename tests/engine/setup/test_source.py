@@ -45,7 +45,6 @@ def test_a_colour_of_its_own_is_found(source, behind):
 @pytest.mark.parametrize("behind", [BLACK, SKY, BRICK], ids=["black", "sky", "brick"])
 @pytest.mark.parametrize("source", [0.8 * WHITE, 0.02 * WHITE, BLACK], ids=["white", "soot", "black"])
 def test_grey_smoke_stays_grey_before_anything(source, behind, thickest):
-    """Thin smoke has the colour of what is behind it, and takes most of one colour away from it."""
     color, choice = smoke_colour(samples(source, behind, thickest), WHITE)
     assert (color, choice.value) == ((1, 1, 1), UNDETERMINED)
 

@@ -72,7 +72,6 @@ def test_texture_that_is_lost_without_smoke_tells_nothing() -> None:
 
 
 def test_a_background_that_may_be_smoke_tells_nothing_of_thin_smoke() -> None:
-    """What is unsure is held against what the smoke hides: thick smoke stands out from it."""
     assert thickness(depth=0.3, confidence=0.95)[0] is None
     assert thickness(depth=3.0, confidence=0.95)[0] is not None
 

@@ -21,7 +21,6 @@ def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
 @pytest.mark.parametrize("closed", [(), ("z-",), ("x+", "y-", "z+")])
 @pytest.mark.parametrize("shape", [(12, 8, 10), (11, 9, 7)])
 def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed):
-    """Whatever the flow, and where an odd number of voxels cuts the last coarse ones in half."""
     rng = np.random.default_rng(1)
     coarse_shape = tuple((n + 1) // 2 for n in shape)
     rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(coarse_shape)), 2.0, closed)
