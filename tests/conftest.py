@@ -1,7 +1,5 @@
 """What every test needs."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

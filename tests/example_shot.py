@@ -1,7 +1,5 @@
 """The example in Blender as an artist would have set it up. For every Blender, with or without a window."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -75,7 +75,6 @@ def test_the_architecture_names_what_there_is() -> None:
 
 @pytest.mark.parametrize("page", [*sorted(ROOT.glob("*.md")), *MEASURED], ids=name)
 def test_files_of_the_code_that_a_page_names_exist(page: Path) -> None:
-    """They are named as within the engine, or as within the checkout; NAME stands for any."""
     named = {file for file in FILE.findall(page.read_text()) if "NAME" not in file}
     assert [file for file in sorted(named) if not ((ENGINE / file).exists() or (ROOT / file).exists())] == []
 
@@ -118,7 +117,6 @@ def test_an_experiment_fits_on_a_page(page: Path) -> None:
 
 
 def test_an_experiment_decides_something_that_is_there() -> None:
-    """The code, or a page other than the notebook's list, names it for what it chose or found."""
     named = "".join(path.read_text() for path in (*PAGES, *SOURCES))
     assert [page.stem for page in EXPERIMENTS if not re.search(rf"\b{page.stem}\.md", named)] == []
 

@@ -1,7 +1,5 @@
 """The manual: its commands are real ones, its examples run, and what it lists is what the code has."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import doctest

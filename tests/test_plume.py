@@ -1,7 +1,5 @@
 """The small plume of the tests is the example."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +21,6 @@ def test_the_scene_is_the_examples_but_for_its_size() -> None:
 
 
 def test_every_frame_and_the_plate_are_the_examples() -> None:
-    """To what the codec changes."""
     with Clip.open(SMALL / "clip.mp4") as small, Clip.open(EXAMPLE / "clip.mp4") as example:
         assert (len(small), small.fps) == (len(example), example.fps)
         for number in (0, 20, 47):

@@ -45,10 +45,7 @@ ALLOWED = (
 )
 """Standard terms, and cameras, which look at something."""
 
-EXCEPTIONS = {
-    "tests/test_vocabulary.py": "the list itself",
-    "CONTRIBUTING.md": "the table itself",
-}
+EXCEPTIONS = {"tests/test_vocabulary.py": "the list itself", "CONTRIBUTING.md": "the table itself"}
 """Where other words still stand, by the beginning of the path, and why."""
 
 STANDARD = re.compile("|".join(ALLOWED), re.IGNORECASE)

@@ -1,16 +1,21 @@
-"""What the add-on repeats of the engine is the engine's own."""
-
-from __future__ import annotations
+"""What the engine and the add-on have in common, from names to scene files and the pace that is tried out."""
 
 import argparse
+import math
+import tomllib
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from addon import contract
+from addon.pace import paced
+from addon.toml import dumps
 from smokelift.app.commands import continue_, loop, retime
-from smokelift.direct import new_sequence
+from smokelift.direct import new_sequence, playback
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.layout import INDEX, frame_path, proxy_path
@@ -21,27 +26,17 @@ from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 from smokelift_command import BAD_INPUT, CANCELLED, DONE
 
 
-def test_exit_statuses() -> None:
-    """Done, bad input, cancelled."""
+def test_names_are_the_engines() -> None:
+    """Exit statuses, files of a sequence and of an export, and the words of settings and provenance."""
     assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (DONE, BAD_INPUT, CANCELLED)
-
-
-def test_files_of_a_sequence() -> None:
-    """The index, a frame, and its coarse copy."""
     assert contract.INDEX_FILE == INDEX
     assert contract.FRAME_FILE.format(12) == frame_path(Path(), 12, "vdb").name
     assert contract.PROXY_FILE.format(12) == proxy_path(Path(), 12).name
     assert contract.PROXY_VOXELS == MIN_PROXY_VOXELS
-
-
-def test_files_of_an_export() -> None:
-    """Its note, and the file that the engine leaves to the add-on."""
     assert (contract.EXPORT_FILE, contract.ASSET_FILE) == (NOTE, ASSET)
-
-
-def test_origins() -> None:
-    """The one that the add-on looks for."""
     assert contract.MADE_UP in get_args(Origin)
+    assert contract.QUALITIES == QUALITIES
+    assert sorted(contract.SIDES) == sorted(SIDES)
 
 
 def test_resolutions() -> None:
@@ -54,18 +49,7 @@ def test_resolutions() -> None:
         Settings.preset("draft", "default", (fewest, fewest, fewest - 1))
 
 
-def test_qualities() -> None:
-    """In their order."""
-    assert contract.QUALITIES == QUALITIES
-
-
-def test_sides() -> None:
-    """Of the box, in another order."""
-    assert sorted(contract.SIDES) == sorted(SIDES)
-
-
 def test_directions() -> None:
-    """Every option of a take that is made of another is the engine's, and the limits are."""
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
     for module in (continue_, retime, loop):
@@ -83,7 +67,6 @@ def test_directions() -> None:
 
 
 def test_pictures() -> None:
-    """Those that are read, and those that light a scene."""
     assert contract.IMAGE_SUFFIXES == READABLE
     for suffix in contract.IMAGE_SUFFIXES:
         if suffix in contract.PANORAMA_SUFFIXES:
@@ -91,3 +74,37 @@ def test_pictures() -> None:
         else:
             with pytest.raises(SceneError, match="image"):
                 EnvironmentLight(Path(f"sky{suffix}"))
+
+
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]))
+NUMBERS = st.integers(-(2**31), 2**31) | st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=False)
+VALUES = st.recursive(TEXTS | NUMBERS, lambda inner: st.lists(inner, max_size=4), max_leaves=8)
+NAMES = st.from_regex(r"[a-z_]{1,8}", fullmatch=True)
+TABLES = st.dictionaries(NAMES, VALUES, max_size=4)
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(st.dictionaries(NAMES, TABLES | st.lists(TABLES, min_size=1, max_size=3), max_size=4))
+def test_what_is_written_is_read_back(tables) -> None:
+    assert tomllib.loads(dumps(tables)) == tables
+
+
+LONGEST_EXPRESSION = 256
+"""Characters that Blender keeps of a driver's expression."""
+
+
+@pytest.mark.parametrize("speeds", [(1.0,), (0.25,), (3.0,), (1.0, 0.2, 1.0), (0.5, 0.5, 2.0), (2.0, 1.0)])
+def test_places_and_speeds_are_the_engines(speeds) -> None:
+    count = 41
+    pace = paced(count, speeds)
+    places, wanted = playback(count, speeds)
+    for time, (place, speed) in enumerate(zip(places, wanted, strict=True)):
+        found = [eval(text("t"), {"t": time, "exp": math.exp}) for text in (pace.place, pace.speed)]
+        np.testing.assert_allclose(found, (place, speed), rtol=2e-3, atol=2e-3)
+    assert len(places) - 1 <= pace.duration <= len(places) + 1 / speeds[-1]
+
+
+def test_an_expression_is_short_enough_for_blender() -> None:
+    pace = paced(1234, (0.123456789, 1.23456789, 0.987654321))
+    time = "(frame-1234+0.001)/1.23456789"
+    assert len(f"floor(min({pace.place(time)},1233))-(frame-1234)+1234") < LONGEST_EXPRESSION

@@ -1,4 +1,4 @@
-"""Runs the tests of ``inside`` with the bpy of this Python, each file in a process of its own.
+"""Runs the tests of ``inside`` with the bpy of this Python, in two processes: to start one takes as long as a file.
 
 bpy is one per process and a crash of it ends the process; so it stays out of this one. A single file, or a test of
 it, is run like any other: ``pytest tests/addon/inside/volume.py -k velocity``.
@@ -6,8 +6,6 @@ it, is run like any other: ``pytest tests/addon/inside/volume.py -k velocity``.
 Those that reconstruct clips, simulate, export or render are left to ``make test-blender``, which runs every file in
 every bpy: they take nearly as long as half of all other tests.
 """
-
-from __future__ import annotations
 
 import importlib.util
 import subprocess
@@ -33,9 +31,9 @@ SECONDS = 600
 
 
 @pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="there is no bpy for this Python")
-@pytest.mark.parametrize("name", FILES)
-def test_inside(name) -> None:
-    """Every test of a file passes."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(INSIDE / name)]
+@pytest.mark.parametrize("names", [FILES[::2], FILES[1::2]])
+def test_inside(names) -> None:
+    files = [str(INSIDE / name) for name in names]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files]
     done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
     assert done.returncode == 0, done.stdout[-20_000:] + done.stderr[-2_000:]

@@ -1,7 +1,5 @@
 """Jobs: what they make of everything that an engine can say or do. The engines here are scripts of a few lines."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -110,7 +108,6 @@ def finished(job: Job) -> Job:
 
 
 def test_progress(engine, log) -> None:
-    """Frames, time left, notes and the last word; all of it in the log."""
     job = engine(FRAMES)
     assert (job.outcome, job.done, job.total, job.seconds_left) == ("waiting", 0, 0, None)
     finished(job)
@@ -126,35 +123,24 @@ def test_progress(engine, log) -> None:
     assert text.endswith("[done, status 0]\n")
 
 
-def test_polling_says_whether_anything_changed(engine) -> None:
-    """So that nothing is drawn in vain."""
-    job = engine("import json, sys; print(json.dumps({'event': 'note', 'text': 'x'}), flush=True); sys.stdin.read()")
-    job.start()
-    until(job.poll)
-    assert not any(job.poll() for _ in range(20))
-    assert job.outcome == "running"
-
-
-def test_a_refusal_is_the_sentence(engine) -> None:
-    """The engine's own words, and its status."""
-    job = finished(
-        engine("import json, sys; print(json.dumps({'event': 'error', 'text': 'No clip.', 'status': 2})); sys.exit(2)")
-    )
-    assert (job.outcome, job.status, job.sentence) == ("failed", 2, "No clip.")
-
-
-def test_an_engine_that_breaks(engine, log) -> None:
-    """The last line of its traceback is the sentence; the whole is in the log."""
-    job = finished(engine("def f():\n    raise RuntimeError('the cat sat on it')\nf()"))
-    assert (job.outcome, job.status) == ("failed", 1)
-    assert job.sentence == "The engine stopped with an error of its own: RuntimeError: the cat sat on it"
-    assert "Traceback" in log.read_text()
-
-
-def test_an_engine_that_says_nothing_and_fails(engine) -> None:
-    """There is still a sentence."""
-    job = finished(engine("import sys; sys.exit(7)"))
-    assert (job.outcome, job.sentence) == ("failed", "The engine stopped with an error of its own: status 7")
+@pytest.mark.parametrize(
+    ("script", "status", "sentence"),
+    [
+        ("import json, sys; print(json.dumps({'event': 'error', 'text': 'No clip.'})); sys.exit(2)", 2, "No clip."),
+        ("raise RuntimeError('no cat')", 1, "The engine stopped with an error of its own: RuntimeError: no cat"),
+        ("import sys; sys.exit(7)", 7, "The engine stopped with an error of its own: status 7"),
+        pytest.param(
+            f"import os; os.kill(os.getpid(), {int(getattr(signal, 'SIGKILL', 9))})",
+            -9,
+            "The engine was ended from outside (signal 9), perhaps for lack of memory.",
+            marks=pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals"),
+        ),
+    ],
+)
+def test_an_engine_that_fails(engine, log, script, status, sentence) -> None:
+    job = finished(engine(script))
+    assert (job.outcome, job.status, job.sentence) == ("failed", status, sentence)
+    assert ("Traceback" in log.read_text()) == (status == 1)
 
 
 def test_lines_that_are_no_messages_go_to_the_log(engine, log) -> None:
@@ -183,7 +169,6 @@ def test_lines_that_are_no_messages_go_to_the_log(engine, log) -> None:
 
 
 def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
-    """A poll takes a bounded part, nothing is lost, and the engine waits meanwhile."""
     count = 20 * module.LINES_A_POLL
     job = engine(
         f"import json\nfor n in range({count}):\n"
@@ -198,27 +183,10 @@ def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
     assert (job.outcome, job.done) == ("done", count - 1)
 
 
-def test_a_line_without_an_end(engine) -> None:
-    """Ten megabytes of it."""
-    job = finished(engine(f"import sys; sys.stdout.write('x' * 10_000_000 + chr(10))\n{FRAMES}"))
-    assert (job.outcome, job.done) == ("done", 3)
-
-
-def test_what_is_said_last_is_heard(engine) -> None:
-    """Also when the process has ended before anybody looked."""
-    for _ in range(5):
-        job = engine(FRAMES)
-        job.start()
-        assert job._process is not None
-        job._process.wait()
-        assert finished(job).sentence == "3 frames."
-
-
 # how an engine ends
 
 
 def test_cancelling_a_polite_engine(own_engine) -> None:
-    """Closing its input interrupts it; it says its last word and is resumable."""
     job = own_engine(POLITE)
     job.start()
     until(lambda: job.poll() and job.total == 9)
@@ -229,16 +197,7 @@ def test_cancelling_a_polite_engine(own_engine) -> None:
     assert job.sentence == "Cancelled; finished frames stay: 2."
 
 
-def test_cancelling_at_once(own_engine) -> None:
-    """Before the engine has even begun."""
-    job = own_engine(POLITE)
-    job.start()
-    job.cancel()
-    assert finished(job).outcome == "cancelled"
-
-
 def test_cancelling_an_engine_that_does_not_listen(own_engine, monkeypatch) -> None:
-    """It is given some time, then ended."""
     monkeypatch.setattr(module, "GRACE_SECONDS", 0.3)
     job = own_engine(
         "import json, time\n"
@@ -253,25 +212,13 @@ def test_cancelling_an_engine_that_does_not_listen(own_engine, monkeypatch) -> N
 
 
 def test_an_engine_that_finishes_although_cancelled(engine) -> None:
-    """What is done is done."""
     job = engine(f"import sys; sys.stdin.read()\n{FRAMES}")
     job.start()
     job.cancel()
     assert finished(job).outcome == "done"
 
 
-def test_killing_does_not_wait_for_manners(engine) -> None:
-    """Afterwards the process is gone."""
-    job = engine("import time\nwhile True:\n    time.sleep(60)")
-    job.start()
-    job.kill()
-    assert job.outcome == "cancelled"
-    assert job._process is not None
-    assert job._process.returncode is not None
-
-
 def test_killing_in_the_middle_of_a_flood(engine) -> None:
-    """The reader, which waits for room, ends too."""
     job = engine("while True:\n    print('x' * 1000)")
     job.start()
     until(lambda: job._lines.full())
@@ -279,24 +226,14 @@ def test_killing_in_the_middle_of_a_flood(engine) -> None:
     assert job.outcome == "cancelled"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals")
-def test_an_engine_that_is_killed_from_outside(engine) -> None:
-    """As the system does when memory runs out."""
-    job = finished(engine(f"import os, signal; os.kill(os.getpid(), {int(signal.SIGKILL)})"))
-    assert (job.outcome, job.status) == ("failed", -signal.SIGKILL)
-    assert job.sentence == "The engine was ended from outside (signal 9), perhaps for lack of memory."
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="the grandchild is POSIX's")
 def test_a_grandchild_that_keeps_the_pipe_open(engine, monkeypatch) -> None:
-    """The job ends with its own process."""
     monkeypatch.setattr(module, "DRAIN_SECONDS", 0.1)
     job = finished(engine(f"import subprocess, sys; subprocess.Popen(['sleep', '1.5'])\n{FRAMES}"))
     assert (job.outcome, job.done) == ("done", 3)
 
 
 def test_a_program_that_is_not_there(log, tmp_path) -> None:
-    """An outcome like others."""
     job = Job([str(tmp_path / "no-python")], log)
     job.start()
     assert job.outcome == "failed"
@@ -304,17 +241,8 @@ def test_a_program_that_is_not_there(log, tmp_path) -> None:
     assert not job.poll()
 
 
-def test_a_log_that_cannot_be_written(tmp_path) -> None:
-    """Said, instead of raised into Blender."""
-    (tmp_path / "file").write_text("in the way")
-    job = Job([sys.executable, "-c", ""], tmp_path / "file" / "job.log")
-    job.start()
-    assert (job.outcome, "could not be started" in job.sentence) == ("failed", True)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="asks for a process by POSIX's means")
 def test_the_engine_ends_with_its_parent(own_engine, log) -> None:
-    """However the parent ends: nothing has to be done for it."""
     job = own_engine("import os, time\nprint(os.getpid(), flush=True)\nwhile True:\n    time.sleep(0.01)")
     parent = (
         "import os, subprocess, sys\n"
@@ -339,7 +267,6 @@ def test_the_engine_ends_with_its_parent(own_engine, log) -> None:
 
 
 def test_the_engine_gets_its_arguments_and_its_own_folder(own_engine, log, monkeypatch) -> None:
-    """And nothing of the user's own settings of Python."""
     monkeypatch.setenv("PYTHONPATH", "/somewhere/else")
     monkeypatch.setenv("PYTHONSTARTUP", "/somewhere/else.py")
     job = finished(own_engine("import sys\nprint(sys.argv[1:], sys.path[0], '/somewhere/else' in sys.path)"))
@@ -349,14 +276,12 @@ def test_the_engine_gets_its_arguments_and_its_own_folder(own_engine, log, monke
 
 
 def test_no_engine(monkeypatch) -> None:
-    """What to do is said."""
     monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(EngineMissingError, match="install the extension again"):
         engine_command([])
 
 
 def test_libraries_that_are_shipped_come_first(tmp_path, monkeypatch) -> None:
-    """The engine's own, and Taichi's where its extension lies beside."""
     monkeypatch.setattr(module, "HOME", tmp_path / "smokelift")
     own, gpu = (tmp_path / name / module.LIBRARIES for name in ("smokelift", "smokelift_gpu"))
     own.mkdir(parents=True)
@@ -366,7 +291,6 @@ def test_libraries_that_are_shipped_come_first(tmp_path, monkeypatch) -> None:
 
 
 def test_the_zip_for_another_blender(tmp_path, monkeypatch) -> None:
-    """It says which it is."""
     (tmp_path / "python3.9").mkdir()
     monkeypatch.setattr(module, "HOME", tmp_path)
     with pytest.raises(EngineMissingError, match=r"Blenders with python3\.9, and this one has python3"):
@@ -377,7 +301,6 @@ def test_the_zip_for_another_blender(tmp_path, monkeypatch) -> None:
 
 
 def test_jobs_run_one_after_the_other(engine) -> None:
-    """In the order in which they came; one that fails does not stop the next."""
     queue = Queue()
     jobs = [engine(FRAMES), engine("import sys; sys.exit(2)"), engine(FRAMES)]
     for job in jobs:
@@ -392,7 +315,6 @@ def test_jobs_run_one_after_the_other(engine) -> None:
 
 
 def test_a_waiting_job_can_be_cancelled(engine) -> None:
-    """It never starts."""
     queue = Queue()
     first, second = engine("import sys; sys.stdin.read()"), engine("raise SystemExit('never')")
     queue.add(first)
@@ -404,14 +326,3 @@ def test_a_waiting_job_can_be_cancelled(engine) -> None:
     first.cancel()
     until(lambda: (queue.poll(), queue.ended)[1])
     assert second.status is None
-
-
-def test_killing_a_queue(engine) -> None:
-    """The running job and the waiting ones."""
-    queue = Queue()
-    for _ in range(3):
-        queue.add(engine("import sys; sys.stdin.read()"))
-    queue.poll()
-    queue.kill()
-    assert queue.ended
-    assert [job.outcome for job in queue.jobs] == ["cancelled"] * 3

@@ -1,7 +1,5 @@
 """What the engine says, in the words of the panel."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path
@@ -40,10 +38,9 @@ def test_the_engine_gives_the_figures_of_the_panels_sentences(kind) -> None:
     assert figures(SENTENCES[kind]) <= figures(OWN[kind])
 
 
-@pytest.mark.parametrize("topic", TOPICS)
-def test_no_word_of_a_scene_file_or_of_an_option_is_in_the_others(topic) -> None:
-    said = [text for text in all_messages()[topic] if not any(words in text for words in FOREIGN)]
-    assert said
+def test_no_word_of_a_scene_file_or_of_an_option_is_in_the_others() -> None:
+    messages = all_messages()
+    said = [text for topic in TOPICS for text in messages[topic] if not any(words in text for words in FOREIGN)]
     assert [text for text in said if re.search(r"\[[a-z]|--[a-z]|scene file|[cC]olour", text)] == []
 
 
@@ -72,5 +69,4 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
     ],
 )
 def test_a_sentence(message, said) -> None:
-    """The engine's where the panel has no other; frames are counted from 1."""
     assert sentence(message) == said

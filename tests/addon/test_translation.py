@@ -1,7 +1,5 @@
 """The words of the add-on can be translated: what is filled in comes after that, as in Blender's own scripts."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 
@@ -21,7 +19,6 @@ def calls(module: str) -> list[tuple[str, ast.Call]]:
 
 @pytest.mark.parametrize("module", sorted(path.name for path in ADDON.glob("*.py")))
 def test_nothing_is_filled_in_before_it_is_translated(module) -> None:
-    """No f-string goes to the user, and what is looked up is a constant."""
     for name, call in calls(module):
         said = [*call.args, *(keyword.value for keyword in call.keywords if keyword.arg == "text")]
         if name in SAYING:

@@ -1,7 +1,5 @@
 """Speed against accuracy: what is read from the CSV, which runs are on the front, and what cannot be drawn."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from pathlib import Path
 
@@ -43,7 +41,6 @@ def test_runs_are_means_over_the_scenes(tmp_path) -> None:
 
 
 def test_the_input_view_counts_where_it_is_known(tmp_path) -> None:
-    """It is the first of the views."""
     text = (HEADER + ROWS).replace("seconds,psnr_new", "seconds,psnr_0,psnr_new")
     text = text.replace(",20,", ",40,20,").replace(",30,", ",40,30,").replace(",60,", ",60,60,")
     draft, _, billboard = read_runs(write(tmp_path, text)).runs
@@ -53,7 +50,6 @@ def test_the_input_view_counts_where_it_is_known(tmp_path) -> None:
 
 
 def test_a_run_says_what_was_changed() -> None:
-    """Runs that differ in resolution alone belong together."""
     run = Run("fine:resolution=32x32x48,transport=0", "default", "32x32x48", 1.0, {})
     assert (run.series, run.changes, run.label) == ("fine", {"transport": "0"}, "transport 0")
     grid = Run("fine:resolution=32x32x48", "default", "32x32x48", 1.0, {})

@@ -1,7 +1,5 @@
 """Runs of the accuracy benchmark by their names, and the methods without a part."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

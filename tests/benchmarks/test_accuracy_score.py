@@ -1,7 +1,5 @@
 """Figures and sheets of a run whose densities are known: the truth's own, and its front drawn out in depth."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -92,7 +90,6 @@ def test_a_run_without_densities_has_no_orbit(known, tmp_path) -> None:
 
 
 def test_pages_and_strips_show_truth_and_runs_below_each_other(known, drawn_out, tmp_path) -> None:
-    """Runs without densities are left out."""
     runs = ["draft", "billboard", "truth"]
     write_orbits(known, runs, lambda *_: drawn_out, tmp_path / "orbit.png")
     page = read_image(tmp_path / "orbit.png")

@@ -1,7 +1,5 @@
 """The benchmark's scene: as much smoke as it says, as thick as it says, and light as it says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

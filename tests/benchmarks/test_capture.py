@@ -1,7 +1,5 @@
 """The protocol for captured smoke: any number of cameras, as calibrated and registered, with and without a gain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

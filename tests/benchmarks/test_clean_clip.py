@@ -1,7 +1,5 @@
 """The clips that are compared with a clean one: their files, their figures and the table."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """``python -m benchmarks.pipeline.cost``: what a voxel costs, how that grows, and where it stops."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

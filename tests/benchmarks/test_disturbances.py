@@ -1,7 +1,5 @@
 """What disturbs a take, how a run is scored, and what the report makes of the figures."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -115,7 +113,6 @@ def test_grids_are_about_the_middle_of_the_box(known) -> None:
 
 
 def test_volumes_are_compared_in_the_same_box_only(known) -> None:
-    """Pictures are compared in any; a box of one voxel is as good as any other."""
     one = whole_run(spoiled.grid(known, 0), "default")
     assert one["psnr_new"] is not None and "mass_ratio" not in one
 

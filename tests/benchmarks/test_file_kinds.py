@@ -1,7 +1,5 @@
 """Clips of unusual kinds: a few of the files of the benchmark, read and compared with what was encoded."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The benchmark's built-in scene: its formula, and that its densities and its motion belong together."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import ndimage

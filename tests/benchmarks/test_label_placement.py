@@ -1,7 +1,5 @@
 """Labels of a chart lie beside their points, and none over another."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.accuracy.label_placement import place_labels

@@ -1,7 +1,5 @@
 """Every peer that is installed gives the right image and gradient; in a process of its own, as frameworks like it."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """``python -m benchmarks pipeline``: what is timed, the table, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, replace
 from pathlib import Path

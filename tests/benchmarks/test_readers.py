@@ -1,7 +1,5 @@
 """Every reader of a user's files: whatever these hold, there is a value or the one error that the reader promises."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from contextlib import suppress
@@ -136,7 +134,6 @@ def test_changed_values_of_an_index_end_well(tmp_path: Path, data: st.DataObject
 @TRIES
 @given(data=st.data())
 def test_other_arrays_end_well(tmp_path: Path, name: str, data: st.DataObject) -> None:
-    """Of any type and shape, in place of one or more, or missing."""
     path = written(name, tmp_path)
     with np.load(path) as file:
         arrays = dict(file)
@@ -157,7 +154,6 @@ def test_other_arrays_end_well(tmp_path: Path, name: str, data: st.DataObject) -
     names=st.lists(st.text("01ab._-", min_size=1, max_size=6), max_size=4),
 )
 def test_any_name_of_a_clip_ends_well(tmp_path: Path, pattern: str, names: list[str]) -> None:
-    """Among files of any names."""
     for name in names:
         with suppress(IsADirectoryError):  # "." and ".."
             (tmp_path / f"{name}.png").write_bytes(b"no picture")

@@ -1,7 +1,5 @@
 """The benchmark's right answers, against a second restatement of the same sums and its derivative by complex step."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """``python -m benchmarks renderer``: the figures, the table, and peers that fail or are wrong."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from dataclasses import replace

@@ -3,8 +3,6 @@
 `make stability` runs twenty of every class, from the same numbers on.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -66,7 +64,6 @@ def test_what_failed_once_fails_no_more(shot, tmp_path, name, number) -> None:
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_a_run_goes_on_when_the_system_is_well_again(shot, open_folder, name) -> None:
-    """To the bits of a run in one go; nothing that was said to be done is lost."""
     if reason := lacking(name, open_folder):
         pytest.skip(reason)
     statuses, failed = failures(shot, name, 1, open_folder)

@@ -1,7 +1,5 @@
 """``python -m benchmarks velocity``: the figures, the table and what is refused."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from dataclasses import replace
@@ -20,10 +18,7 @@ from smokelift.transport import Velocity
 SHAPE = (16, 16, 24)
 FRAMES = 6
 PLAN = run.Plan(
-    pairs=1,
-    iterations=(1, 10),
-    primal_dual_iterations=(3,),
-    others=({"linearisations": 1}, {"method": "paper"}),
+    pairs=1, iterations=(1, 10), primal_dual_iterations=(3,), others=({"linearisations": 1}, {"method": "paper"})
 )
 
 FEW = run.Plan(pairs=1, iterations=(1,), primal_dual_iterations=(), others=())

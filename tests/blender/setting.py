@@ -1,7 +1,5 @@
 """Where the tests in Blenders find things, and how they are run there."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

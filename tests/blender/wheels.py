@@ -1,7 +1,5 @@
 """The extension in the bpy wheels, each in an environment that has nothing else of what the engine needs."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -62,7 +60,6 @@ class InWheel:
         return [*offline(), str(folder / "bin" / "python")]
 
     def test_the_core_needs_no_newer_system_than_blender(self, tmp_path) -> None:
-        """As the file itself says, whatever its wheel was called; its C++ library is inside it."""
         with zipfile.ZipFile(shipped(self.python)) as archive:
             (name,) = (name for name in archive.namelist() if re.search(r"/smokelift/_core\.[^/]+\.so$", name))
             core = archive.extract(name, tmp_path)
@@ -74,7 +71,6 @@ class InWheel:
         assert "libstdc++" not in said
 
     def test_from_install_to_uninstall(self, interpreter) -> None:
-        """The whole story of `inside`."""
         folder = user_folder(f"bpy-{self.blender}")
         run([*interpreter, "-m", "pytest", *pytest_words(LIFECYCLE, folder)], variables(folder, self.python))
 

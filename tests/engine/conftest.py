@@ -1,7 +1,5 @@
 """One tiny plume for the tests of everything that needs footage: known volumes, and the pictures of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -69,11 +67,7 @@ class Plume:
         return np.maximum(ball * structure - 0.04, 0).astype(np.float32)
 
     def write(
-        self,
-        folder: Path,
-        densities: Sequence[np.ndarray],
-        scene: Scene | None = None,
-        suffix: str = ".png",
+        self, folder: Path, densities: Sequence[np.ndarray], scene: Scene | None = None, suffix: str = ".png"
     ) -> Scene:
         """Render volumes into a picture sequence; the scene with that clip."""
         scene = scene or self.scene

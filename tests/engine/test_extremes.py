@@ -1,7 +1,5 @@
 """Numbers at the ends of what a float can hold, into every public function: a finite answer, or one sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any

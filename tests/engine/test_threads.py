@@ -1,12 +1,9 @@
 """The core's worker threads are kept from call to call, whatever a process does meanwhile."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +13,6 @@ from smokelift.transport import face_shapes
 
 FACES = tuple(np.random.default_rng(0).random(shape, np.float32) for shape in face_shapes((33, 16, 16)))
 """Enough slabs for every thread, and so few voxels that a call is short."""
-
-
-TASKS = Path("/proc/self/task")
 
 
 def test_calls_at_the_same_time_have_threads_of_their_own(set_threads: Callable[[int], None]) -> None:
@@ -34,18 +28,6 @@ def test_calls_at_the_same_time_have_threads_of_their_own(set_threads: Callable[
     for caller in callers:
         caller.join()
     assert not wrong
-
-
-@pytest.mark.skipif(not TASKS.is_dir(), reason="Only Linux lists a process's threads.")
-def test_a_call_takes_the_threads_of_the_one_before(set_threads: Callable[[int], None]) -> None:
-    for wanted in (4, 2, 3):
-        set_threads(wanted)
-        _core.divergence(FACES)
-        first = set(TASKS.iterdir())
-        assert len(first) >= wanted
-        for _ in range(20):
-            _core.divergence(FACES)
-            assert set(TASKS.iterdir()) == first
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="This system cannot fork.")

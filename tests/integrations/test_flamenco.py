@@ -1,7 +1,5 @@
 """The Flamenco job type: its script in a model of the Manager, and its commands run for real."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

@@ -1,7 +1,5 @@
 """The extension's zips: the same files make the same bytes, and the manifest says what each is for."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tomllib
@@ -11,6 +9,7 @@ import pytest
 import build_extension
 import extension_products
 from build_extension import pack
+from engine_wheels import PYTHONS
 from extension_libraries import PINS
 from extension_products import PLATFORMS, Product
 
@@ -18,7 +17,6 @@ LINUX = PLATFORMS[0]
 
 
 def test_engines_are_found_by_version_platform_and_python(tmp_path) -> None:
-    """Others lie there unused."""
     for name in (
         "smokelift-1.0.0-cp311-cp311-manylinux_2_28_x86_64.whl",
         "smokelift-1.0.0-cp313-cp313-win_amd64.whl",
@@ -31,7 +29,6 @@ def test_engines_are_found_by_version_platform_and_python(tmp_path) -> None:
 
 
 def test_the_same_files_make_the_same_zip(tmp_path) -> None:
-    """Whenever they were written, in whatever order, and whoever may read them."""
     digests = set()
     for turn, names in enumerate((("b.py", "a/c.py"), ("a/c.py", "b.py"))):
         folder = tmp_path / str(turn)
@@ -47,7 +44,6 @@ def test_the_same_files_make_the_same_zip(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", PINS)
 def test_the_manifest_says_what_the_zip_is_for(name, tmp_path, monkeypatch) -> None:
-    """Its version is the project's; Blender refuses it where it has another Python."""
     monkeypatch.setattr(extension_products, "STAGE", tmp_path)
     monkeypatch.setattr(build_extension, "MANUAL", tmp_path / "none")
     manifest = tomllib.loads((build_extension.ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
@@ -58,3 +54,12 @@ def test_the_manifest_says_what_the_zip_is_for(name, tmp_path, monkeypatch) -> N
     assert (said["id"], said["version"], said["platforms"]) == (name, "2.3.4", ["linux-x64"])
     assert (said["blender_version_min"], said["blender_version_max"]) == ("4.2.0", "5.1.0")
     assert (product.stage / "__init__.py").is_file() and (product.stage / "LICENSE").is_file()
+
+
+def test_an_artist_finds_the_zip_by_its_blender() -> None:
+    products = [
+        Product(name, "1.0.0", platform, python) for name in PINS for platform in PLATFORMS for python in PYTHONS
+    ]
+    assert len({product.file for product in products}) == len(products)
+    assert products[0].file == "smokelift-1.0.0-blender4.2-5.0-linux_x64.zip"
+    assert products[1].file == "smokelift-1.0.0-blender5.1-linux_x64.zip"

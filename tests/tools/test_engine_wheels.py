@@ -1,7 +1,5 @@
 """The engine's wheels are built in an environment that stays."""
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess
@@ -22,7 +20,6 @@ def commands(monkeypatch) -> list[list[str]]:
 
 
 def test_what_a_build_needs_is_installed_once_and_said(tmp_path, commands, capsys) -> None:
-    """Again only where something else is needed, or for another Python."""
     folder = tmp_path / "env"
     folder.mkdir()
     programs = engine_wheels.build_environment("python3.11", folder)
@@ -36,7 +33,6 @@ def test_what_a_build_needs_is_installed_once_and_said(tmp_path, commands, capsy
 
 
 def test_blenders_pythons_take_what_was_compiled_for_the_tests() -> None:
-    """The numerics of the first serve the others; a Python that no Blender has shares nothing."""
     assert engine_wheels.versions("3.13", blender=True) == ["3.13", "3.11"]
     assert engine_wheels.versions("3.12", blender=True) == ["3.11", "3.13"]
     assert engine_wheels.versions("3.12", blender=False) == ["3.12"]
@@ -62,8 +58,6 @@ def test_only_what_is_for_other_machines_is_checked_and_named_for_them(tmp_path,
 
 
 def test_a_core_that_needs_a_newer_system_is_refused(tmp_path, monkeypatch) -> None:
-    """With what to do, and no wheel."""
-
     def run(command, **_) -> subprocess.CompletedProcess:
         if "wheel" in command:
             (Path(command[command.index("-w") + 1]) / "smokelift-1.0.0-cp313-cp313-linux_x86_64.whl").touch()

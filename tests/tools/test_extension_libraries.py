@@ -1,7 +1,5 @@
 """What the engine needs in the extension's zips: pinned to the byte, whole, without what is never imported."""
 
-from __future__ import annotations
-
 import ast
 import re
 
@@ -33,7 +31,6 @@ def test_every_wheel_has_a_version_and_hashes(name, count, platform, python) -> 
 
 
 def test_what_is_never_imported_is_left_out(tmp_path) -> None:
-    """Tests, parts of SciPy and pip's notes; licences and versions stay."""
     gone = [
         "scipy/stats/_stats.py",
         "scipy/fft/tests/test_fft.py",
@@ -64,7 +61,6 @@ def test_no_part_of_scipy_that_the_engine_imports_is_left_out() -> None:
 
 
 def test_requirements_are_met_by_the_libraries_or_blenders_numpy(tmp_path) -> None:
-    """Those of other systems and of extras do not count."""
     gpu = tmp_path / "gpu"
     needs = ["numpy>=1.26", "rich>=13", "colorama; sys_platform == 'win32'", "bpy; extra == 'vdb'"]
     distribution(tmp_path, "smokelift", "1.0.0", needs)

@@ -1,7 +1,5 @@
 """What `make extension` makes again after a change, and what it reuses."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -35,7 +33,6 @@ STEPS = {"wheels": "engine_wheels.py --blender", "manual": "mkdocs build", "zip"
     ],
 )
 def test_only_what_changed_is_made_again(tmp_path, changed, steps) -> None:
-    """And no zip without the manual as it is now."""
     for seconds, names in ((1000, SOURCES), (2000, MADE)):
         for name in names:
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,5 @@
 """The checklist of a release refuses what is not ready."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 
@@ -13,7 +11,6 @@ from engine_wheels import VERSION
 
 
 def test_the_version_stands_in_one_place() -> None:
-    """The build and the checklist read it where the engine has it."""
     assert smokelift.__version__ == VERSION
     for name in ("pyproject.toml", "blender_manifest.toml"):
         assert not re.search("^version =", (release.ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)

@@ -1,7 +1,5 @@
 """Frames between those of a take: where the smoke is, and that renders have it and its motion blur."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -19,7 +17,6 @@ from tests.example_shot import EXAMPLE, add_camera, smoke
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (32, 32, 48))
 FRAMES, FPS, VOXELS_A_FRAME = 4, 24.0, 4.0
-
 needs_nodes = pytest.mark.skipif(not between.AVAILABLE, reason="Blender moves grids since 5.0")
 
 
@@ -72,32 +69,12 @@ def seen(obj: bpy.types.Object, frame: int, name: str = "density") -> np.ndarray
 
 @needs_nodes
 def test_the_smoke_is_where_it_would_be(slow, tmp_path) -> None:
-    """In frames of the scene between two of the clip as in these; the last stays for its time."""
     volume.show(slow, flying(tmp_path, fire=True))
     for frame in range(1, 2 * FRAMES + 1):
         place = min((frame - 1) / 2, FRAMES - 1)
         wanted = ball(8.0 + VOXELS_A_FRAME * place)
         np.testing.assert_allclose(seen(slow, frame), wanted, atol=4e-3)
         np.testing.assert_allclose(seen(slow, frame, "flame"), 2.0 * wanted, atol=8e-3)
-
-
-@needs_nodes
-def test_a_ramp_that_is_tried_out_has_them(shot, tmp_path) -> None:
-    """Its expressions are as long as a driver may have."""
-    obj = smoke(shot)
-    obj.smokelift.between = True
-    directing = obj.smokelift.directing
-    directing.direction, directing.live, directing.use_ramp = "retime", True, True
-    directing.speed, directing.speed_middle, directing.speed_end = 0.123456, 0.654321, 0.234567
-    shot.render.fps = 24
-    volume.show(obj, flying(tmp_path))
-    places = []
-    for frame in range(1, obj.data.frame_duration, 3):
-        rho = seen(obj, frame)
-        places.append(float((rho.sum((1, 2)) * (np.arange(len(rho)) + 0.5)).sum() / rho.sum()))
-    steps = np.diff(places)
-    assert steps.min() > 0.0 and steps.max() < 3 * VOXELS_A_FRAME
-    assert all(driver.driver.is_valid for driver in obj.data.animation_data.drivers)
 
 
 @needs_nodes
@@ -127,7 +104,6 @@ def test_a_render_has_them_and_their_motion_blur(slow, tmp_path) -> None:
 
 @needs_nodes
 def test_only_renders_have_them_while_the_viewport_shows_a_proxy(slow, tmp_path) -> None:
-    """Nothing is computed for a viewport that does not show it."""
     volume.show(slow, flying(tmp_path, proxies=True))
     first, second = slow.modifiers
     assert (first.name, first.show_viewport, first.show_render) == (between.NAME, False, True)

@@ -1,16 +1,11 @@
 """Setting up a shot in parts, and the smoke over its clip in the compositor."""
 
-from __future__ import annotations
-
-import json
-
 import bpy
 import numpy as np
 import pytest
 
 from addon import compositing, projection, volume
-from addon.take import Take
-from conftest import made, pixels, quietly, rendered
+from conftest import changed, made, pixels, rendered
 from smokelift.output.images import write_image
 from tests.example_shot import add, smoke
 
@@ -28,10 +23,8 @@ def filmed(scene, tmp_path) -> bpy.types.Scene:
         write_image(tmp_path / f"clip_{frame:04d}.png", np.clip(PLATE + grain, 0.0, 1.0))
     write_image(tmp_path / "plate.png", np.full((SIZE, SIZE, 3), PLATE, np.float32))
     take = made(tmp_path / "out")
-    file = take.directory / "sequence.json"
-    index = json.loads(file.read_text())
-    index["scene"] |= {"camera": {}, "background": {"image": str(tmp_path / "plate.png")}}
-    file.write_text(json.dumps(index))
+    with changed(take) as index:
+        index["scene"] |= {"camera": {}, "background": {"image": str(tmp_path / "plate.png")}}
     camera = scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (0.4, -5.0, 3.5), (1.2, 0.0, 0.0)
     sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
@@ -65,7 +58,6 @@ def remove(scene: bpy.types.Scene, *names: str) -> None:
 
 
 def test_the_plate_is_behind_the_smoke_and_its_shadow(filmed, tmp_path) -> None:
-    """Without smoke it is the plate; the floor is darker where the sun does not come through."""
     found = shown(filmed, tmp_path, Grain=0.0)
     assert filmed.render.film_transparent
     assert found[SIZE * 3 // 4 :].min() < 0.7 * PLATE
@@ -76,7 +68,6 @@ def test_the_plate_is_behind_the_smoke_and_its_shadow(filmed, tmp_path) -> None:
 
 
 def test_grain_is_the_clips(filmed, tmp_path) -> None:
-    """As strong and at the same pixels; the smoke has it too."""
     smoke(filmed).hide_render = True
     still = shown(filmed, tmp_path, Grain=0.0)
     grain = shown(filmed, tmp_path, Grain=1.0) - still
@@ -87,31 +78,7 @@ def test_grain_is_the_clips(filmed, tmp_path) -> None:
     assert shown(filmed, tmp_path, Foreground=0.0, Grain=2.0).std() > 1.5 * grain.std()
 
 
-def test_smoke_in_the_clip_is_no_grain(filmed, tmp_path) -> None:
-    """Where it was filmed, no ghost of it is left when the smoke in Blender is moved away."""
-    for frame in range(1, 7):
-        clip = np.full((SIZE, SIZE, 3), PLATE, np.float32)
-        clip[8:20, 10:20] = 0.6
-        write_image(tmp_path / f"smoky_{frame:04d}.png", clip)
-    smoke(filmed).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "smoky_0001.png"))
-    smoke(filmed).hide_render = True
-    ghost = shown(filmed, tmp_path, Grain=1.0) - PLATE
-    assert np.abs(ghost[10:18, 12:18]).max() < 0.005
-    assert np.abs(ghost).max() < 0.25 * (0.6 - PLATE)
-
-
-def test_the_floor_throws_no_light_on_the_smoke(filmed, tmp_path) -> None:
-    """What was fitted to the clip has that already."""
-    bpy.ops.smokelift.set_up()
-    filmed.render.use_compositing, filmed.cycles.samples = False, 64
-    smoke_alone = slice(14, 20), slice(12, 19)
-    with_floor = rendered(filmed, tmp_path / "with.exr")[smoke_alone].mean()
-    filmed.objects[compositing.FLOOR].hide_render = True
-    assert with_floor == pytest.approx(rendered(filmed, tmp_path / "without.exr")[smoke_alone].mean(), rel=0.03)
-
-
 def test_the_clip_is_in_front_where_the_mask_says_so(filmed, tmp_path) -> None:
-    """All of it with the whole mask, as the clip's file has it."""
     found = shown(filmed, tmp_path, Foreground=1.0)
     assert found == pytest.approx(pixels_linear(tmp_path / "clip_0003.png"), abs=0.01)
 
@@ -123,7 +90,6 @@ def pixels_linear(path) -> np.ndarray:
 
 
 def test_what_is_held_out_hides_the_smoke(filmed, tmp_path) -> None:
-    """And shows the plate, wherever it stands in front of it."""
     bpy.ops.smokelift.set_up()
     mesh = bpy.data.meshes.new("Wall")
     mesh.from_pydata([(-9, 0, -9), (9, 0, -9), (9, 0, 9), (-9, 0, 9)], [], [(0, 1, 2, 3)])
@@ -134,24 +100,7 @@ def test_what_is_held_out_hides_the_smoke(filmed, tmp_path) -> None:
     assert found == pytest.approx(np.full_like(found, PLATE), abs=0.01)
 
 
-def test_the_smoke_is_composited_over_one_colour(filmed, tmp_path) -> None:
-    """Where the background has no picture; and again over a picture, where it gets one."""
-    take = volume.shown_take(smoke(filmed))
-    file = take.directory / "sequence.json"
-    pictured = file.read_text()
-    index = json.loads(pictured)
-    index["scene"]["background"] = {"color": [0.5, 0.1, 0.0]}
-    file.write_text(json.dumps(index))
-    smoke(filmed).hide_render = True
-    assert shown(filmed, tmp_path, Grain=0.0)[5, 5] == pytest.approx([0.5, 0.1, 0.0], abs=0.01)
-    file.write_text(pictured)
-    assert shown(filmed, tmp_path, Grain=0.0)[5, 5] == pytest.approx([PLATE] * 3, abs=0.01)
-    file.write_text(json.dumps(index))
-    assert shown(filmed, tmp_path, Grain=0.0)[5, 5] == pytest.approx([0.5, 0.1, 0.0], abs=0.01)
-
-
 def test_a_second_time_adds_nothing(filmed) -> None:
-    """What the artist changed of it stays: other pictures, another floor."""
     bpy.ops.smokelift.set_up()
     nodes = tree(filmed).nodes
     group = nodes[compositing.GROUP]
@@ -168,7 +117,6 @@ def test_a_second_time_adds_nothing(filmed) -> None:
 
 
 def test_the_artists_compositor_comes_first(filmed) -> None:
-    """What the output showed before goes through our group."""
     if compositing.SINCE_5:
         own = filmed.compositing_node_group = bpy.data.node_groups.new("Own", "CompositorNodeTree")
         own.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -188,19 +136,6 @@ def test_the_artists_compositor_comes_first(filmed) -> None:
     assert output.inputs[0].links[0].from_node == group
 
 
-def test_it_survives_saving(filmed, tmp_path) -> None:
-    """Set up again after loading, it is still one group."""
-    bpy.ops.smokelift.set_up()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
-    scene = bpy.context.scene
-    count = len(tree(scene).nodes)
-    bpy.ops.smokelift.set_up()
-    assert len(tree(scene).nodes) == count
-    assert tree(scene).nodes[f"{compositing.GROUP} Plate"].image.filepath == "//plate.png"
-    assert scene.view_layers[0].layer_collection.children[compositing.HOLDOUTS].holdout
-
-
 # ticks
 
 
@@ -217,7 +152,6 @@ def state(scene: bpy.types.Scene) -> dict[str, object]:
 
 @pytest.mark.parametrize("ticked", ["set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate"])
 def test_each_tick_sets_up_its_part_alone(filmed, ticked) -> None:
-    """The rest of the scene stays."""
     settings = smoke(filmed).smokelift
     settings.plate_place = "WORLD"
     filmed.render.engine, filmed.view_settings.view_transform = "BLENDER_WORKBENCH", "Raw"
@@ -227,17 +161,6 @@ def test_each_tick_sets_up_its_part_alone(filmed, ticked) -> None:
     assert bpy.ops.smokelift.set_up() == {"FINISHED"}
     after = state(filmed)
     assert [name for name in before if before[name] != after[name]] == [ticked]
-
-
-def test_without_a_camera_only_what_needs_one_is_refused(filmed) -> None:
-    """The message says which camera."""
-    filmed.camera = None
-    settings = smoke(filmed).smokelift
-    with pytest.raises(RuntimeError, match="has no camera"):
-        bpy.ops.smokelift.set_up()
-    settings.set_up_camera = False
-    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
-    assert isinstance(volume.shown_take(smoke(filmed)), Take)
 
 
 PLACES = ("WORLD", "COMPOSITE", "PROJECTION")
@@ -271,10 +194,8 @@ def plates(filmed) -> bpy.types.Scene:
     bpy.context.view_layer.update()
     table = {"type": "perspective", "size": [SIZE, SIZE], "fx": 40.0, "fy": 40.0, "cx": SIZE / 2, "cy": SIZE / 2}
     table["matrix"] = [list(row) for row in filmed.camera.matrix_world]
-    file = volume.shown_take(smoke(filmed)).directory / "sequence.json"
-    index = json.loads(file.read_text())
-    index["scene"]["camera"] = table
-    file.write_text(json.dumps(index))
+    with changed(volume.shown_take(smoke(filmed))) as index:
+        index["scene"]["camera"] = table
     filmed.render.resolution_x = filmed.render.resolution_y = SIZE
     filmed.world = bpy.data.worlds.new("Own")
     return filmed
@@ -282,7 +203,6 @@ def plates(filmed) -> bpy.types.Scene:
 
 @pytest.mark.parametrize("after", PLACES)
 def test_a_place_of_the_plate_undoes_the_one_before(plates, tmp_path, after) -> None:
-    """All nine orders: by what is set, and by the picture."""
     settings = smoke(plates).smokelift
     file = str(tmp_path / "fresh.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
@@ -303,19 +223,3 @@ def test_a_place_of_the_plate_undoes_the_one_before(plates, tmp_path, after) -> 
     for before in PLACES:
         assert found[before] == found[None], before
         assert pictures[before] == pytest.approx(pictures[None], abs=0.01), before
-
-
-def test_what_the_artist_made_of_the_composite_comes_back(plates) -> None:
-    """The floor where it was put, the grain as it was set, other stand-ins held out again."""
-    settings = smoke(plates).smokelift
-    bpy.ops.smokelift.set_up()
-    plates.objects[compositing.FLOOR].location.z = -1.0
-    tree(plates).nodes[compositing.GROUP].inputs["Grain"].default_value = 0.5
-    wanted = traces(plates)
-    for place in ("WORLD", "COMPOSITE"):
-        settings.plate_place = place
-        bpy.ops.smokelift.set_up()
-    assert traces(plates) == wanted
-    assert plates.objects[compositing.FLOOR].location.z == -1.0
-    assert tree(plates).nodes[compositing.GROUP].inputs["Grain"].default_value == 0.5
-    assert len([node for node in tree(plates).nodes if node.name.startswith(compositing.GROUP)]) == 3

@@ -1,11 +1,10 @@
 """A Blender without a window, with the add-on registered, as new for every test."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ sys.path += [str(folder) for folder in Path(bpy.utils.resource_path("LOCAL"), "p
 
 FRAMES = 6
 """Of a take that `made` makes."""
-
 
 _status = 0
 
@@ -84,6 +82,15 @@ def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium |
     index = {"complete": True, "scene": scene, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
     (take.directory / "sequence.json").write_text(json.dumps(index))
     return take
+
+
+@contextmanager
+def changed(take: Take) -> Iterator[dict[str, Any]]:
+    """The index of a take, to be changed."""
+    file = take.directory / "sequence.json"
+    index = json.loads(file.read_text())
+    yield index
+    file.write_text(json.dumps(index))
 
 
 def rendered(scene: bpy.types.Scene, path: Path) -> Any:

@@ -1,23 +1,19 @@
 """What is made of a result: what the scene tells the engine, the tab, a whole run, and the pace that is tried out."""
 
-from __future__ import annotations
-
 import math
 import shutil
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import direct_panel, directing, smoke_takes, volume
+from addon import directing, smoke_takes, volume
 from addon.blender_scene import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
-from smokelift.direct import Box, Continuation, Mesh, continue_sequence, open_source
+from smokelift.direct import Box, Mesh
 from smokelift.output.sequence import Sequence
-from tests.addon.inside.panel import LETTERS, drawn
 from tests.engine.direct.rising import DOMAIN, write_plume
 from tests.example_shot import smoke
 
@@ -99,14 +95,9 @@ def solid(content: bytes, tmp_path) -> np.ndarray:
 
 
 def test_frames_are_those_of_the_scene(shot, result) -> None:
-    """The take begins where the clip does, and may be moved in time."""
     settings = result.smokelift.directing
     settings.frames, settings.fade = 10, 4
-    assert directing.engine_request(result) == (
-        "continue",
-        ["--frames", "10", "--fade", "4", "--room", "8.000000"],
-        [],
-    )
+    assert directing.engine_request(result) == ("continue", ["--frames", "10", "--fade", "4", "--room", "8.000000"], [])
     result.data.frame_start = 101
     settings.use_start, settings.start = True, 105
     assert directing.engine_request(result)[1][-2:] == ["--start", "5"]
@@ -117,24 +108,6 @@ def test_frames_are_those_of_the_scene(shot, result) -> None:
     settings.fade = 11
     with pytest.raises(ShotError, match="fades in 11"):
         directing.engine_request(result)
-
-
-def test_frames_in_real_time(shot, result) -> None:
-    """Where the scene has another rate than the clip."""
-    shot.render.fps = 48
-    result.smokelift.speed = "REAL"
-    first = result.data.frame_start
-    assert [volume.number_at(result, first + frame) for frame in (0, 1, 2, 3, 11)] == [1, 1, 2, 2, 6]
-    assert [volume.scene_frame(result, number) - first for number in (1, 2, 6)] == [0, 2, 10]
-
-
-def test_sides_are_closed(result) -> None:
-    """From the frame on from which the smoke goes on, whatever the clip had."""
-    result.smokelift.closed = {"z-"}
-    settings = result.smokelift.directing
-    assert "--closed" not in directing.engine_request(result)[1]
-    settings.closed = {"x-", "y+"}
-    assert directing.engine_request(result)[1][-3:] == ["--closed", "x-", "y+"]
 
 
 def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
@@ -179,6 +152,8 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     moved = Sequence.open(volume.shown_take(result).directory)
     part = DOMAIN.slices_in(moved.scene.domain)
     assert not moved.density(FRAMES + 5)[part][wanted].any()
+    assert len(smokes(bpy.context.scene)) == 1
+    assert "Frames 7 to 11 are a simulation" in volume.provenance_note(result)
     build = obj.modifiers.new("Build", "BUILD")
     build.frame_start, build.frame_duration = last, 10
     with pytest.raises(ShotError, match="number of triangles"):
@@ -186,7 +161,6 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
 
 
 def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
-    """A smoke that was moved, rotated and scaled meets what stands in its way there."""
     mesh, place = cube()
     obj = placed(acting, "Crate", mesh, **place)
     fan = placed(
@@ -205,7 +179,6 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
 
 
 def test_winds_and_fans(result, acting) -> None:
-    """Winds add up; an Empty, a Force field and a Wind field with a distance are fans."""
     for name in ("One", "Two"):
         placed(acting, name, field="WIND", rotation_euler=(0.0, math.pi / 2, 0.0)).field.strength = 0.4
     placed(acting, "Empty", location=(0.1, 0.2, 0.3), empty_display_size=0.25)
@@ -230,7 +203,6 @@ def test_winds_and_fans(result, acting) -> None:
 
 
 def test_turbulence(result, acting) -> None:
-    """In the smoke's own metres; a size of 0 is what Blender takes for it."""
     field = placed(acting, "Stir", field="TURBULENCE").field
     field.strength, field.size, field.seed = 0.4, 0.25, 7
     assert words(directing.engine_request(result)[1], "--turbulence") == [[0.4, 0.25, 7.0]]
@@ -243,7 +215,6 @@ def test_turbulence(result, acting) -> None:
 
 
 def test_retime_and_loop(result) -> None:
-    """One speed or three; the whole or a part."""
     settings = result.smokelift.directing
     settings.direction, settings.speed = "retime", 0.25
     assert directing.engine_request(result)[:2] == ("retime", ["--speed", "0.250000"])
@@ -261,29 +232,7 @@ def test_retime_and_loop(result) -> None:
 # whole runs
 
 
-def test_smoke_goes_around_a_mesh(result, acting, tmp_path) -> None:
-    """The result is a new take of the same object, made by the engine; the one that it is made of stays."""
-    mesh, place = cube(0.3)
-    placed(acting, "Crate", mesh, **place)
-    result.location.x = 0.0
-    result.smokelift.directing.frames = 3
-    assert bpy.ops.smokelift.direct() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.done, row.total) == ("done", FRAMES + 3, FRAMES + 3), row.sentence
-    source, take = takes(tmp_path / "out")
-    assert volume.shown_take(result) == take
-    assert (take.read().title, take.read().source, take.read().complete) == ("Continued 2", source, True)
-    assert result.data.frame_duration == FRAMES + 3
-    assert source.read().complete
-    made = Sequence.open(take.directory)
-    inside = Box((-0.3, -0.3, 1.2), (0.3, 0.3, 1.8)).voxels(made.scene.domain)
-    assert not made.density(FRAMES + 3)[inside].any()
-    assert len(smokes(bpy.context.scene)) == 1
-    assert "Frames 7 to 9 are a simulation" in volume.provenance_note(result)
-
-
 def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
-    """In the volume on show."""
     settings = result.smokelift.directing
     settings.direction = "loop"
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
@@ -298,53 +247,14 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
     assert [take.read().title for take in takes(tmp_path / "out")] == ["Take 1", "Loop 2", "Retimed 3"]
 
 
-def test_a_stopped_run_is_resumed_after_its_project_was_moved(result, tmp_path) -> None:
-    """The other take lies beside it."""
-    result.smokelift.directing.frames = 3
-    take = smoke_takes.write_directed(result)
-    written = continue_sequence(open_source(take.read().source.directory), take.directory, Continuation(3))
-    assert [next(written)[0] for _ in range(FRAMES + 1)][-1] == FRAMES + 1
-    written.close()
-    (tmp_path / "out").rename(tmp_path / "moved")
-    result.smokelift.output = str(tmp_path / "moved")
-    assert bpy.ops.smokelift.resume() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.done) == ("done", FRAMES + 3), row.sentence
-    assert volume.shown_take(result) == Take(tmp_path / "moved" / "take_0002")
-
-
-def test_a_run_that_fails_leaves_the_result_on_show(result, acting, tmp_path) -> None:
-    """An obstacle that fills the box, and a run that is stopped."""
-    shown = volume.shown_take(result)
-    mesh, place = cube(9.0)
-    placed(acting, "Crate", mesh, **place)
-    assert bpy.ops.smokelift.direct() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.sentence) == ("failed", "the obstacles fill the whole box; make them smaller.")
-    assert volume.shown_take(result) == shown
-
-
 @pytest.mark.parametrize("outcome", ["cancelled", "failed", "done"])
 def test_frames_of_a_stopped_run_do_not_stay_on_show(result, tmp_path, outcome) -> None:
-    """They are seen while they are made, and can be resumed or picked."""
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
     smoke_takes.show_while_made(result, take, shown, "running")
     assert volume.shown_take(result) == take
     smoke_takes.show_while_made(result, take, shown, outcome)
     assert volume.shown_take(result) == (take if outcome == "done" else shown)
-
-
-def test_a_result_that_the_artist_chose_meanwhile_stays(result, tmp_path) -> None:
-    """A run does not take it away."""
-    shown = volume.shown_take(result)
-    take, other = (Take(tmp_path / "out" / name) for name in ("take_0002", "take_0003"))
-    for copy in (take, other):
-        shutil.copytree(shown.directory, copy.directory)
-    smoke_takes.show_while_made(result, take, shown, "running")
-    smoke_takes.present(result, other)
-    smoke_takes.show_while_made(result, take, shown, "done")
-    assert volume.shown_take(result) == other
 
 
 # the pace that is tried out
@@ -379,72 +289,3 @@ def test_a_pace_is_seen_at_once(shot, result, speeds) -> None:
     settings.live = False
     assert (data.frame_duration, data.velocity_scale) == (FRAMES, 1.0)
     assert not data.animation_data.drivers
-
-
-# results
-
-
-def test_two_results_are_compared(result, tmp_path) -> None:
-    """By turns in one place, or beside each other."""
-    one, two = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
-    assert not bpy.ops.smokelift.switch_take.poll()
-    shutil.copytree(one.directory, two.directory)
-    assert bpy.ops.smokelift.show_take(take=str(two.directory)) == {"FINISHED"}
-    result.location = (1.0, 0.0, 0.0)
-    for wanted in (one, two, one):
-        assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
-        assert volume.shown_take(result) == wanted
-    assert bpy.ops.smokelift.show_beside(take=str(two.directory)) == {"FINISHED"}
-    assert smokes(bpy.context.scene) == [result]
-    (copy,) = [obj for obj in bpy.context.scene.objects if obj.type == "VOLUME" and obj != result]
-    assert volume.take_of(copy.data) == two
-    assert volume.shown_take(result) == one
-    assert copy.location.x - result.location.x == pytest.approx(2.2)
-    assert copy.data.materials[0] == result.data.materials[0]
-    with pytest.raises(RuntimeError, match="show another one first"):
-        bpy.ops.smokelift.remove_take(take=str(two.directory))
-
-
-@pytest.mark.parametrize("output", ["", "//", "//chosen"])
-def test_duplicates_have_folders_of_their_own(shot, result, tmp_path, output) -> None:
-    """For what they make; until then a duplicate shows what the other does. The first one keeps its folder."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    result.smokelift.output = output
-    kept, data = smoke_takes.output_folder(result), result.data
-    other = result.copy()
-    shot.collection.objects.link(other)
-    assert smoke_takes.output_folder(other) == kept
-    result.smokelift.directing.frames = other.smokelift.directing.frames = 1
-    made = [smoke_takes.write_directed(obj) for obj in (other, result, other)]
-    assert [take.directory.parent == kept for take in made] == [False, True, False]
-    assert made[0].directory.parent == made[2].directory.parent
-    assert made[0].read().source == made[1].read().source == volume.shown_take(result)
-    assert (result.data, other.data == data) == (data, False)
-
-
-def test_a_result_that_a_run_reads_is_not_deleted(result, tmp_path) -> None:
-    """What is made of it waits in the queue."""
-    shown, other = volume.shown_take(result), Take(tmp_path / "out" / "take_0009")
-    take = smoke_takes.write_directed(result)
-    shutil.copytree(shown.directory, other.directory)
-    smoke_takes.present(result, other)
-    row = bpy.context.window_manager.smokelift.jobs.add()
-    row.take, row.smoke_uid = str(take.directory), result.session_uid
-    with pytest.raises(RuntimeError, match="a run needs it"):
-        bpy.ops.smokelift.remove_take(take=str(shown.directory))
-
-
-# the tab
-
-
-@pytest.mark.parametrize("direction", ["continue", "retime", "loop"])
-def test_the_tab_shows_what_a_direction_needs(shot, result, direction) -> None:
-    """No line is cut off, and there is no tab without a result."""
-    result.smokelift.directing.direction = direction
-    context = SimpleNamespace(scene=shot)
-    assert direct_panel.SMOKELIFT_PT_view_direct.poll(context)
-    texts = drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
-    assert any(text.startswith(direction.capitalize()) for text in texts)
-    assert [text for text in texts if len(text) > LETTERS] == []
-    result.data.filepath = ""
-    assert not direct_panel.SMOKELIFT_PT_view_direct.poll(context)

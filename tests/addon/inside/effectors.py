@@ -1,9 +1,6 @@
 """What is selected becomes what acts on the smoke."""
 
-from __future__ import annotations
-
 import bpy
-import pytest
 
 from addon import volume
 from conftest import made
@@ -17,7 +14,6 @@ def select(*objects: bpy.types.Object) -> None:
 
 
 def test_the_selected_act_on_the_smoke(shot, tmp_path) -> None:
-    """In a collection that is made, and then kept; they stay in their own collections too."""
     obj = smoke(shot)
     volume.show(obj, made(tmp_path))
     select(obj, obj.smokelift.box, shot.camera)
@@ -36,14 +32,3 @@ def test_the_selected_act_on_the_smoke(shot, tmp_path) -> None:
     assert obj.smokelift.directing.effectors == effectors
     assert set(effectors.objects) == {wind, ball}
     assert len(wind.users_collection) == 2
-
-
-def test_what_is_flat_is_named(shot, tmp_path) -> None:
-    """Before the engine starts, which does not know names."""
-    volume.show(smoke(shot), made(tmp_path))
-    bpy.ops.mesh.primitive_plane_add(rotation=(0.3, 0.2, 0.1))
-    bpy.context.object.name = "Card"
-    select(bpy.context.object)
-    bpy.ops.smokelift.add_effectors()
-    with pytest.raises(RuntimeError, match="Card is flat and encloses nothing"):
-        bpy.ops.smokelift.direct()

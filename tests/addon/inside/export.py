@@ -1,7 +1,5 @@
 """What the engine writes of a result: the files and assets that are handed on, and a proxy."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -9,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import export, look, proxy, smoke_takes, volume
+from addon import export, look, smoke_takes, volume
 from addon.take import Take
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.sequence import Sequence
@@ -63,7 +61,6 @@ def grids(data: bpy.types.Volume, frame: int) -> tuple[str, set[str]]:
 
 
 def test_an_export_beside_the_results(made) -> None:
-    """All frames, a USD file, and an asset whose files lie beside it."""
     export.folder_of(made).mkdir(parents=True)
     for name in ("export.json", "smoke.blend", "smoke_0009.vdb"):
         (export.folder_of(made) / name).write_text("of an earlier export")
@@ -96,7 +93,6 @@ def test_blender_reads_the_usd_file(made, host, velocity) -> None:
 
 
 def test_the_usd_file_is_sound(made) -> None:
-    """By USD's own module: names, fields, purposes, and a material whose nodes MaterialX knows."""
     from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdVol
 
     exported(made, proxy=2)
@@ -123,7 +119,6 @@ def test_the_usd_file_is_sound(made) -> None:
 
 
 def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
-    """Appended with its material, its files found, also after the folder has moved."""
     material = made.data.materials[0].name
     exported(made)
     export.write_asset(made, export.folder_of(made))
@@ -149,40 +144,3 @@ def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
             assert data.grids.load(), data.grids.error_message
             numbers.append(data.grids.frame)
     assert numbers == [3, 2, 1], "each instance plays a frame later"
-
-
-def test_a_result_gets_a_proxy(made) -> None:
-    """The viewport shows it from then on, and it can be switched off."""
-    assert proxy.modifier_of(made) is None
-    assert bpy.ops.smokelift.make_proxy() == {"FINISHED"}
-    assert proxy.in_viewport(made) != made.data
-    assert grids(proxy.proxy_of(made), made.data.frame_start + 1) == ("proxy_0002.vdb", {"density"})
-    proxy.modifier_of(made).show_viewport = False
-    assert proxy.in_viewport(made) == made.data
-
-
-def test_an_export_for_another_program_has_no_asset(made) -> None:
-    """Blender would not find its grids."""
-    for_blender = export.folder_of(made)
-    made.smokelift_export.host = "unreal"
-    assert export.folder_of(made) != for_blender
-    assert bpy.ops.smokelift.export() == {"FINISHED"}
-    names = {path.name for path in export.folder_of(made).iterdir()}
-    assert names == {*(f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)), "export.json"}
-
-
-def test_a_folder_with_other_files_is_left_alone(made, tmp_path) -> None:
-    """One sentence."""
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "holiday.jpg").touch()
-    made.smokelift_export.folder = "//other"
-    with pytest.raises(RuntimeError, match=r"holiday\.jpg.*choose an empty folder"):
-        bpy.ops.smokelift.export()
-    assert [path.name for path in (tmp_path / "other").iterdir()] == ["holiday.jpg"]
-
-
-def test_without_a_result_there_is_nothing_to_export(scene) -> None:
-    """The buttons are off."""
-    smoke(scene)
-    assert not bpy.ops.smokelift.export.poll()
-    assert not bpy.ops.smokelift.make_proxy.poll()

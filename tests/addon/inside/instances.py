@@ -1,7 +1,5 @@
 """Instances with their own time: what each of them shows, and what Cycles renders of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 
 from addon import instances, volume
-from addon.nodes import set_input
 from conftest import FRAMES, made, rendered
 from smokelift.scene import Medium
 from tests.example_shot import add, add_camera, smoke
@@ -45,7 +42,6 @@ def files(points: bpy.types.Object, frame: int) -> list[str]:
 
 
 def test_each_point_plays_later(shown) -> None:
-    """By its attribute, which the artist may change; the Volume itself stays as it was."""
     start = shown.data.frame_start
     points = scattered(count=3, step=2)
     assert not points.smokelift.is_smoke
@@ -59,7 +55,6 @@ def test_each_point_plays_later(shown) -> None:
 
 
 def test_before_its_time_an_instance_shows_nothing_unless_it_repeats(shown) -> None:
-    """As a Volume of Blender does."""
     start = shown.data.frame_start
     once = scattered(count=2, step=3)
     assert files(once, start + 1) == ["smoke_0002.vdb", ""]
@@ -69,25 +64,7 @@ def test_before_its_time_an_instance_shows_nothing_unless_it_repeats(shown) -> N
     assert files(again, start + FRAMES) == ["smoke_0001.vdb", "smoke_0004.vdb"]
 
 
-def test_points_without_the_attribute_have_random_times(shown) -> None:
-    """The same for the same seed; offsets beyond the last time begin with the first again."""
-    points = scattered(count=FRAMES, step=1, repeat=True)
-    mesh = bpy.data.meshes.new("Own")
-    mesh.from_pydata([(float(number), 0.0, 0.0) for number in range(200)], [], [])
-    points.data = mesh
-    frame = shown.data.frame_start
-    assert set(files(points, frame)) == {"smoke_0001.vdb"}
-    set_input(points.modifiers[instances.GROUP], "Random Offset", 5 * FRAMES)
-    points.update_tag()
-    drawn = files(points, frame)
-    assert set(drawn) == {f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)}
-    set_input(points.modifiers[instances.GROUP], "Seed", 1)
-    points.update_tag()
-    assert files(points, frame) != drawn
-
-
 def test_instances_keep_turn_scale_and_material(shown) -> None:
-    """Their place is that of their point."""
     shown.location, shown.scale, shown.rotation_euler = (1.0, 2.0, 3.0), (2.0, 2.0, 2.0), (0.0, 0.0, 1.0)
     points = scattered(count=2, step=1)
     bpy.context.view_layer.update()
@@ -101,7 +78,6 @@ def test_instances_keep_turn_scale_and_material(shown) -> None:
 
 
 def test_cycles_renders_them_at_their_times(shown, tmp_path) -> None:
-    """One that has not begun is not there; one of another frame has another density."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = 48, 16
@@ -118,48 +94,3 @@ def test_cycles_renders_them_at_their_times(shown, tmp_path) -> None:
     left, middle, right = (found[:, columns].sum() for columns in (slice(0, 16), slice(16, 32), slice(32, 48)))
     assert left > middle > 3.0
     assert right < 0.01 * middle
-
-
-def test_all_share_one_group_and_nothing_is_left(shown) -> None:
-    """What was scattered can be removed with all that it is made of."""
-    kinds = (bpy.data.objects, bpy.data.volumes, bpy.data.meshes, bpy.data.collections, bpy.data.node_groups)
-    before = [len(kind) for kind in kinds]
-    first = scattered(count=2)
-    bpy.context.view_layer.objects.active = shown
-    second = scattered(count=3)
-    assert first.modifiers[0].node_group == second.modifiers[0].node_group
-    instances.remove_scattered(first)
-    instances.remove_scattered(second)
-    assert [len(kind) for kind in kinds] == before
-
-
-def test_one_instance_is_an_object_of_its_own(shown) -> None:
-    """With its own time and the same material; it is no smoke to be made, and repeats if it shall."""
-    assert bpy.ops.smokelift.add_instance(offset=5, repeat=True) == {"FINISHED"}
-    instance = bpy.context.object
-    assert instance != shown and not instance.smokelift.is_smoke
-    assert instance.data.materials[0] == shown.data.materials[0]
-    start = shown.data.frame_start
-    assert instance.data.frame_start == start + 5
-    assert [file_of(shown.data, start + 1), file_of(instance.data, start + 6)] == ["smoke_0002.vdb"] * 2
-    assert file_of(instance.data, start + 5 + FRAMES) == "smoke_0001.vdb"
-    assert bpy.ops.smokelift.add_instance(offset=2) == {"FINISHED"}, "no instance of an instance"
-
-
-def file_of(data: bpy.types.Volume, frame: int) -> str:
-    """The file that a Volume shows in a frame."""
-    bpy.context.scene.frame_set(frame)
-    assert data.grids.load(), data.grids.error_message
-    return Path(data.grids.frame_filepath).name
-
-
-@pytest.mark.parametrize("operator", ["add_instance", "scatter"])
-def test_what_has_no_sequence_has_no_instances(scene, operator) -> None:
-    """A smoke without a result, and one whose frames a driver selects."""
-    button = getattr(bpy.ops.smokelift, operator)
-    bpy.context.view_layer.objects.active = smoke(scene)
-    assert not button.poll()
-    smoke(scene).data.is_sequence = True
-    assert button.poll()
-    smoke(scene).data.driver_add("frame_offset")
-    assert not button.poll()

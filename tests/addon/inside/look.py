@@ -1,7 +1,5 @@
 """How the smoke looks: presets and fire."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
@@ -61,7 +59,6 @@ def test_presets_look_different(lit, tmp_path) -> None:
 
 
 def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) -> None:
-    """A result made anew brings its extinction, and changes nothing of the artist's."""
     volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
     bpy.ops.smokelift.use_look(preset="DUST")
     volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5), number=2))
@@ -73,35 +70,11 @@ def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) ->
     assert node(lit).inputs["Color"].default_value[:] == (1.0, 1.0, 1.0, 1.0)
 
 
-def test_a_preset_with_a_scattering_of_its_own_can_be_left(lit, tmp_path) -> None:
-    """Steam keeps its own when the smoke is made anew; the other presets have what was fitted to the newest result."""
-    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
-    bpy.ops.smokelift.use_look(preset="STEAM")
-    node(lit).inputs["Anisotropy"].default_value = 0.5
-    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
-    assert node(lit).inputs["Anisotropy"].default_value == 0.5
-    bpy.ops.smokelift.use_look(preset="SMOKE")
-    assert node(lit).inputs["Anisotropy"].default_value == pytest.approx(-0.2)
-    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5, 0.4), number=3))
-    assert node(lit).inputs["Anisotropy"].default_value == pytest.approx(0.4)
-
-
-def test_a_preset_needs_our_material(lit, tmp_path) -> None:
-    """An artist's own is left alone, in one sentence."""
-    assert not bpy.ops.smokelift.use_look.poll()
-    obj = volume.show(smoke(lit), made(tmp_path))
-    obj.data.materials[0] = bpy.data.materials.new("Own")
-    with pytest.raises(RuntimeError, match="material is your own"):
-        bpy.ops.smokelift.use_look(preset="SOOT")
-    assert look.controls(obj) == []
-
-
 @pytest.mark.parametrize(
     ("name", "value", "least", "most"),
     [("Edge Contrast", 2.0, 0.03, 0.25), ("Edge Contrast", 0.5, 1.8, 5.0), ("Density", 4.0, 3.0, 4.5)],
 )
 def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
-    """Edge contrast acts where smoke is thin; below 1 thin smoke is seen better."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     lit.cycles.samples = 512
     volume.show(smoke(lit), made(tmp_path, medium=Medium(0.02, 0.8)))  # so thin that all of it is an edge
@@ -114,7 +87,6 @@ def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
 
 
 def test_smoke_evaporates_on_its_way_up(lit, tmp_path) -> None:
-    """The smoke is between a half and a bit more of its height; what is dense stays longer."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
     inputs = node(lit).inputs
@@ -130,23 +102,8 @@ def test_smoke_evaporates_on_its_way_up(lit, tmp_path) -> None:
     assert rendered(lit, tmp_path / "below.exr").sum() == pytest.approx(seen[0], rel=0.1)
 
 
-def test_brightness_goes_from_black_to_white(lit, tmp_path) -> None:
-    """And never beyond."""
-    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
-    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
-    seen = []
-    for value in (0.0, 0.5, 1.0, 4.0, 1000.0):
-        node(lit).inputs["Brightness"].default_value = value
-        seen.append(float(rendered(lit, tmp_path / "seen.exr").mean()))
-    assert seen[0] == 0.0
-    assert seen == sorted(seen)
-    node(lit).inputs["Albedo"].default_value = (1.0, 1.0, 1.0, 1.0)
-    assert rendered(lit, tmp_path / "white.exr").mean() == pytest.approx(seen[-1], rel=0.02)
-
-
 @pytest.mark.parametrize("grid", ["flame", "temperature"])
 def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
-    """In the dark; smoke without such a grid stays dark."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     bpy.data.objects["Sun"].hide_render = True
     volume.show(smoke(lit), made(tmp_path))
@@ -164,7 +121,6 @@ def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
 
 
 def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_path) -> None:
-    """Radiance per metre: 4 of it along 0.25 m are 1, in smoke that hides nothing."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     bpy.data.objects["Sun"].hide_render = True
     lit.cycles.samples = 4096
@@ -183,19 +139,7 @@ def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_pa
     assert node(lit).inputs["Flame Color"].default_value[:] == (0.0, 0.0, 1.0, 1.0)
 
 
-def test_all_smokes_share_one_group(lit, tmp_path) -> None:
-    """As the artist changed it; a group of another kind of the same name is left alone."""
-    bpy.data.node_groups.new(look.GROUP, "CompositorNodeTree")
-    obj = volume.show(smoke(lit), made(tmp_path))
-    other = add(lit, "Other", bpy.data.volumes.new("Other"))
-    other.smokelift.is_smoke = True
-    volume.show(other, made(tmp_path, number=2))
-    assert look.node_of(obj).node_tree == look.node_of(other).node_tree
-    assert obj.data.materials[0] != other.data.materials[0]
-
-
 def test_an_override_of_a_linked_smoke_gets_a_look_of_its_own(lit, tmp_path) -> None:
-    """It stays in this file, and the smoke that is linked keeps its look."""
     volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
     bpy.ops.wm.read_factory_settings(use_empty=True)

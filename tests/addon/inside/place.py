@@ -1,7 +1,5 @@
 """The click on where the smoke stands."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
@@ -38,7 +36,6 @@ def engines(scene: bpy.types.Scene) -> Scene:
 
 @pytest.mark.parametrize("turned", [0.0, 0.4])
 def test_a_click_gives_the_distance_that_the_engine_takes(shot, turned) -> None:
-    """In the axes of the box, however it is turned."""
     smoke(shot).smokelift.box.rotation_euler[2] = turned
     looking_down(shot)
     place = (0.2, 0.35, 0.0)
@@ -50,7 +47,6 @@ def test_a_click_gives_the_distance_that_the_engine_takes(shot, turned) -> None:
 
 
 def test_a_click_from_any_side_gives_the_cameras_distance(shot) -> None:
-    """So a plan of the floor can be clicked on as well."""
     looking_down(shot, (0.5, 0.0, 1.0))
     above, down = Vector((0.2, 0.35, 9.0)), Vector((0.0, 0.0, -1.0))
     rays = [(above, down), (above + Vector((0.0, -0.01, 0.0)), down)]
@@ -58,7 +54,6 @@ def test_a_click_from_any_side_gives_the_cameras_distance(shot) -> None:
 
 
 def test_the_distance_is_that_of_the_first_frame(shot) -> None:
-    """Where the camera moves, whichever frame is shown; the frame on show stays."""
     camera = looking_down(shot, (0.5, 0.0, 1.0))
     camera.keyframe_insert("location", frame=1)
     camera.location.y = -5.0
@@ -77,13 +72,7 @@ def test_the_distance_is_that_of_the_first_frame(shot) -> None:
     ],
 )
 def test_a_click_that_tells_nothing_is_refused(shot, height, points, words) -> None:
-    """Above the horizon, beside the box, and where a pixel is too much of the floor."""
     looking_down(shot).location.z = height
     bpy.context.view_layer.update()
     with pytest.raises(ShotError, match=words):
         clicked(shot, *points)
-
-
-def test_the_button_needs_a_box_and_a_view(shot) -> None:
-    """There is none to click in here."""
-    assert not bpy.ops.smokelift.place.poll()

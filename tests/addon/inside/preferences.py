@@ -1,7 +1,5 @@
 """What a user sets once: preferences, presets, and what is dropped into a window."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,7 +27,6 @@ def clip(blender) -> bpy.types.MovieClip:
 
 
 def test_without_preferences_everything_is_as_usual(scene, clip) -> None:
-    """As where the add-on runs from its sources."""
     obj = new_smoke(scene, clip)
     assert obj.smokelift.quality == "balanced"
     assert smoke_takes.output_folder(obj) == EXAMPLE / "clip_smokelift"
@@ -37,7 +34,6 @@ def test_without_preferences_everything_is_as_usual(scene, clip) -> None:
 
 
 def test_new_smokes_follow_the_preferences(scene, clip, user, tmp_path) -> None:
-    """Those that are there keep their quality; a smoke's own output counts first."""
     first = new_smoke(scene, clip)
     user.quality, user.output, user.threads = "draft", str(tmp_path), 1
     second = new_smoke(scene, clip)
@@ -48,30 +44,7 @@ def test_new_smokes_follow_the_preferences(scene, clip, user, tmp_path) -> None:
     assert preferences.thread_options() == ["--threads", "1"]
 
 
-def test_every_preference_has_a_name_and_a_tooltip(user) -> None:
-    """As Blender's rules ask."""
-    for setting in user.bl_rna.properties:
-        if setting.identifier in ("output", "quality", "threads"):
-            assert setting.name and setting.description and not setting.description.endswith(".")
-
-
-def test_the_manual_is_opened(scene, monkeypatch, tmp_path) -> None:
-    """The extension's own copy; without one a sentence says where it is."""
-    page = tmp_path / "a manual" / "index.html"
-    monkeypatch.setattr(preferences, "MANUAL", page)
-    with pytest.raises(RuntimeError, match=r"docs/blender\.md"):
-        bpy.ops.smokelift.open_manual()
-    page.parent.mkdir()
-    page.touch()
-    opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
-    assert bpy.ops.smokelift.open_manual() == {"FINISHED"}
-    assert opened == [page.as_uri()]
-
-
 def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> None:
-    """And given to another smoke; clip and frames are its own."""
-
     def folder(_kind: str, *, path: str = "", create: bool = False) -> str:
         (tmp_path / path).mkdir(parents=True, exist_ok=create)
         return str(tmp_path / path)
@@ -87,16 +60,8 @@ def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> No
     assert second.smokelift.first == 1
 
 
-def test_presets_are_of_a_smoke(scene) -> None:
-    """With another object active there is nothing to keep; every setting in a preset exists."""
-    assert not bpy.ops.smokelift.add_preset.poll()
-    known = bpy.types.Object.bl_rna.properties["smokelift"].fixed_type.properties
-    assert set(presets.SETTINGS) <= set(known.keys())
-
-
 @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
 def test_a_dropped_video_becomes_a_smoke(scene, suffix, tmp_path) -> None:
-    """Blender calls the handler's operator with the path, and no file browser opens."""
     handler = bpy.types.SMOKELIFT_FH_video
     assert suffix in handler.bl_file_extensions.split(";")
     dropped = tmp_path / f"my clip{suffix}"

@@ -1,7 +1,5 @@
 """The proxy: what viewports show and renders use, when it plays, and whose it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -59,7 +57,6 @@ def in_render(obj: bpy.types.Object) -> list[str]:
 
 
 def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) -> None:
-    """A render is the same to the bit as without a proxy."""
     scene.render.engine, scene.cycles.samples, scene.cycles.seed = "CYCLES", 2, 1
     scene.render.resolution_x = scene.render.resolution_y = 8
     add_camera(scene, (0.44, -3.0, 1.62), (np.pi / 2, 0.0, 0.0)).data.ortho_scale = 0.5
@@ -72,7 +69,6 @@ def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) ->
 
 
 def test_it_has_a_switch(obj, tmp_path) -> None:
-    """That stays as it is when the smoke is shown again, and when another result is."""
     proxy.modifier_of(obj).show_viewport = False
     volume.show(obj, volume.shown_take(obj))
     volume.show(obj, with_proxy(tmp_path, number=2))
@@ -84,7 +80,6 @@ def test_it_has_a_switch(obj, tmp_path) -> None:
 
 
 def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
-    """At another frame rate too, and with a clip that is moved."""
     settings = smoke(shot).smokelift
     shot.render.fps, settings.speed = 48, "REAL"
     obj = volume.show(smoke(shot), with_proxy(tmp_path))
@@ -95,22 +90,13 @@ def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
 
 
 def test_a_result_without_one_is_shown_itself(scene, obj, tmp_path) -> None:
-    """Nothing of the proxy is left."""
     volume.show(obj, made(tmp_path, number=2))
     assert in_viewport(obj, 3) == "smoke_0003.vdb"
     assert list(bpy.data.volumes) == [obj.data] and not obj.modifiers
     assert proxy.proxy_of(obj) is None
 
 
-def test_a_modifier_of_the_artist_acts_on_what_is_shown(scene, tmp_path) -> None:
-    obj = smoke(scene)
-    obj.modifiers.new("Own", "VOLUME_DISPLACE")
-    volume.show(obj, with_proxy(tmp_path))
-    assert [modifier.type for modifier in obj.modifiers] == ["NODES", "VOLUME_DISPLACE"]
-
-
 def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
-    """When it shows a result of its own; a copy beside the smoke at once."""
     twin = obj.copy()
     twin.data = obj.data.copy()
     scene.collection.objects.link(twin)
@@ -122,19 +108,7 @@ def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
     assert len({tuple(data.materials) for data in proxies}) == 1
 
 
-def test_a_duplicate_keeps_the_proxy_that_it_shares(scene, obj, tmp_path) -> None:
-    """Where the original shows a result without one, and the duplicate after that."""
-    twin = obj.copy()
-    twin.data = obj.data.copy()
-    scene.collection.objects.link(twin)
-    volume.show(obj, made(tmp_path, number=2))
-    assert in_viewport(twin, 3) == "proxy_0003.vdb"
-    volume.show(twin, volume.shown_take(obj))
-    assert set(bpy.data.volumes) == {obj.data, twin.data}
-
-
 def test_it_is_saved_with_the_file(scene, obj, tmp_path) -> None:
-    """Although it is in no collection."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     (again,) = [obj for obj in bpy.context.scene.objects if obj.type == "VOLUME"]
@@ -142,7 +116,6 @@ def test_it_is_saved_with_the_file(scene, obj, tmp_path) -> None:
 
 
 def test_it_follows_a_run(scene, tmp_path) -> None:
-    """Frames that are not finished are not waited for."""
     take = with_proxy(tmp_path)
     for number in range(3, FRAMES + 1):
         (take.directory / f"proxy_{number:04d}.vdb").unlink()

@@ -1,7 +1,5 @@
 """Registering and unregistering leave nothing behind."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import bpy
@@ -14,6 +12,8 @@ from smokelift.render.device import DeviceName
 from smokelift.scene import Medium
 from smokelift.setup.settings import QUALITIES, Settings
 from tests.example_shot import EXAMPLE, smoke
+
+MEDIUM = ("extinction", "albedo", "anisotropy")
 
 
 def ours() -> set[str]:
@@ -31,7 +31,6 @@ def handlers() -> int:
 
 
 def test_unregistering_leaves_nothing_behind() -> None:
-    """No class, operator, property or handler; and it can be done again."""
     assert {"Object.smokelift", "ops.run", "SMOKELIFT_PT_view"} <= ours()
     during = handlers()
     addon.unregister()
@@ -42,7 +41,6 @@ def test_unregistering_leaves_nothing_behind() -> None:
 
 
 def test_names_follow_blenders_rules() -> None:
-    """Every operator has a tooltip and every setting a name and a tooltip."""
     for name in dir(bpy.ops.smokelift):
         kind = getattr(bpy.ops.smokelift, name).get_rna_type()
         assert kind.description, name
@@ -57,34 +55,19 @@ def test_names_follow_blenders_rules() -> None:
     [("quality", QUALITIES), ("device", get_args(DeviceName)), ("transfer", ("AUTO", *get_args(Transfer)))],
 )
 def test_choices_are_the_engines(scene, name, expected) -> None:
-    """In the engine's order."""
     assert tuple(smoke(scene).smokelift.bl_rna.properties[name].enum_items.keys()) == expected
 
 
-def test_what_is_made_up_is_the_engines_by_default(scene) -> None:
-    """And the panel's limits are within the engine's."""
+def test_defaults_are_the_engines(scene) -> None:
     properties = smoke(scene).smokelift.bl_rna.properties
-    for name in ("detail", "seed"):
-        setting = properties[name]
-        assert setting.default == getattr(Settings.preset(), name)
-        for limit in (setting.hard_min, setting.hard_max):
-            Settings(**{name: limit})
-    assert properties["detail"].subtype == "FACTOR"
-
-
-def test_room_is_the_engines_by_default(scene) -> None:
-    """As large as the box of simulated smoke may become."""
+    for owner, kind, names in ((Settings.preset(), Settings, ("detail", "seed")), (Medium(), Medium, MEDIUM)):
+        for name in names:
+            setting = properties[name]
+            assert setting.default == pytest.approx(getattr(owner, name))
+            for limit in (setting.hard_min, setting.hard_max):
+                kind(**{name: limit})
     room = smoke(scene).smokelift.directing.bl_rna.properties["room"]
     assert (room.default, room.hard_min) == (ROOM, 1.0)
-
-
-def test_default_medium_is_the_engines(scene) -> None:
-    """And its limits are within the engine's."""
-    names = ("extinction", "albedo", "anisotropy")
-    properties = smoke(scene).smokelift.bl_rna.properties
-    assert [properties[name].default for name in names] == pytest.approx([getattr(Medium(), name) for name in names])
-    for name in names:
-        Medium(**{name: properties[name].hard_min}), Medium(**{name: properties[name].hard_max})
 
 
 def test_smoke_is_in_the_menu_for_volumes(scene, tmp_path) -> None:

@@ -1,19 +1,15 @@
 """Smokes are objects: several in a scene, each with its own clip, settings and results."""
 
-from __future__ import annotations
-
-import json
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import pytest
 
-from addon import paths, results_panel, run, smoke_takes, volume
-from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke, smokes
+from addon import paths, run, smoke_takes, volume
+from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke
 from addon.take import Take, takes
-from conftest import made
+from conftest import changed, made
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
 
 
@@ -24,7 +20,6 @@ def clip(blender) -> bpy.types.MovieClip:
 
 
 def test_new_smoke_is_a_volume_that_is_selected_and_active(scene, clip) -> None:
-    """With all frames of its clip."""
     camera = add_camera(scene, (0.0, 0.0, 0.0))
     camera.select_set(True)
     obj = new_smoke(scene, clip)
@@ -35,7 +30,6 @@ def test_new_smoke_is_a_volume_that_is_selected_and_active(scene, clip) -> None:
 
 
 def test_the_active_smoke_is_that_of_the_active_object(scene, clip) -> None:
-    """Also through its box and its camera; where nothing of a smoke is active, the first."""
     first, second = new_smoke(scene, clip), new_smoke(scene, clip)
     box = second.smokelift.box = add_box(scene, (0, 0, 0), (1, 1, 1))
     layer = bpy.context.view_layer
@@ -47,16 +41,7 @@ def test_the_active_smoke_is_that_of_the_active_object(scene, clip) -> None:
     assert active_smoke(scene) is None
 
 
-def test_other_volumes_are_no_smoke(scene) -> None:
-    """Nor is anything else."""
-    add(scene, "Cloud", bpy.data.volumes.new("Cloud"))
-    add_camera(scene, (0.0, 0.0, 0.0))
-    assert smokes(scene) == []
-    assert not bpy.ops.smokelift.run.poll()
-
-
 def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> None:
-    """And keep them under a new name."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     first, second = new_smoke(scene, clip), new_smoke(scene, clip)
     second.name = "Other"
@@ -66,19 +51,7 @@ def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> 
     assert smoke_takes.output_folder(second) == folders[1]
 
 
-def test_add_makes_one_more(scene) -> None:
-    """Each with its clip; the new one is active."""
-    for count in (1, 2):
-        assert bpy.ops.smokelift.add(filepath=str(EXAMPLE / "clip.mp4")) == {"FINISHED"}
-        assert len(smokes(scene)) == count
-        assert active_smoke(scene) == smokes(scene)[-1]
-    first = smokes(scene)[0]
-    assert bpy.ops.smokelift.show_smoke(smoke=first.name) == {"FINISHED"}
-    assert active_smoke(scene) == first
-
-
 def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
-    """Its run is cancelled, and its finished frames stay."""
     obj = new_smoke(scene, clip)
     obj.smokelift.output = str(tmp_path)
     take = smoke_takes.write_take(obj)
@@ -96,7 +69,6 @@ def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
 
 @pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
 def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
-    """A cube that somebody made something of stays."""
     cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
@@ -108,18 +80,6 @@ def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
         cube.data.vertices[0].co.x = -2.0
     hide_default_cube(scene)
     assert cube.hide_render == cube.hide_viewport == (change is None)
-
-
-def test_smoke_that_is_linked_is_finished(scene, clip, tmp_path) -> None:
-    """Its settings belong to the file it comes from."""
-    new_smoke(scene, clip)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
-        wanted.objects = ["Smoke clip.mp4"]
-    bpy.context.scene.collection.objects.link(wanted.objects[0])
-    assert smokes(bpy.context.scene) == []
-    volume.keep_step()
 
 
 # results
@@ -140,7 +100,6 @@ def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
 
 
 def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
-    """One that is on show is not deleted."""
     first, second = with_takes(shot, tmp_path / "out", 2)
     assert bpy.ops.smokelift.show_take(take=str(first.directory)) == {"FINISHED"}
     assert volume.shown_take(smoke(shot)) == first
@@ -155,27 +114,6 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
     assert first.size() == pytest.approx(1e-3, rel=0.5)
     with pytest.raises(RuntimeError, match="no finished frame"):
         bpy.ops.smokelift.show_take(take=str(second.directory))
-
-
-def test_what_is_freed_is_said_before_it_is_deleted(shot, tmp_path) -> None:
-    """By the button and by the question; what a Volume shows is not counted, and deleted is what was said."""
-    found = with_takes(shot, tmp_path / "out", 4)
-    (found[0].directory / "smoke_0001.vdb").write_bytes(b"x" * 3_000_000)
-    bpy.ops.smokelift.show_take(take=str(found[3].directory))
-    asked = []
-    manager = SimpleNamespace(
-        smokelift=bpy.context.window_manager.smokelift,
-        invoke_confirm=lambda _operator, _event, **words: asked.append(words["message"]) or {"RUNNING_MODAL"},
-    )
-    context = SimpleNamespace(scene=shot, window_manager=manager)
-    assert results_panel.unused_takes(context) == found[:3]
-    assert results_panel.freed(found[:3]) == "3 MB"
-    results_panel.SMOKELIFT_OT_remove_takes.invoke(None, context, None)
-    results_panel.SMOKELIFT_OT_remove_take.invoke(SimpleNamespace(take=str(found[0].directory)), context, None)
-    assert asked == ["3 results free 3 MB.", "Take 1 frees 3 MB."]
-    assert takes(tmp_path / "out") == found
-    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
-    assert takes(tmp_path / "out") == found[3:]
 
 
 @pytest.mark.parametrize("chosen", [False, True])
@@ -220,11 +158,9 @@ def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path,
 def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:
     """A take whose frames hold so much smoke, of so many that it will have."""
     take = made(folder, frames=len(masses))
-    file = take.directory / "sequence.json"
-    index = json.loads(file.read_text())
-    index["frames"] = {str(n): {"mass": mass} for n, mass in enumerate(masses, 1)}
-    index["scene"]["clip"]["frames"] = [10, 9 + (planned or len(masses))]
-    file.write_text(json.dumps(index))
+    with changed(take) as index:
+        index["frames"] = {str(n): {"mass": mass} for n, mass in enumerate(masses, 1)}
+        index["scene"]["clip"]["frames"] = [10, 9 + (planned or len(masses))]
     return take
 
 
@@ -256,23 +192,3 @@ def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
     empty = with_masses(tmp_path / "empty", [0.0, 0.0])
     smoke_takes.present(obj, empty)
     assert not volume.go_to_smoke(obj)
-
-
-def test_a_range_of_the_artist_stays(scene, clip, tmp_path) -> None:
-    """One that is neither Blender's nor the clip's."""
-    obj = new_smoke(scene, clip)
-    obj.smokelift.camera_mode = "SCENE"
-    scene.frame_start, scene.frame_end = 5, 30
-    smoke_takes.present(obj, with_masses(tmp_path, [1.0] * 80))
-    assert (scene.frame_start, scene.frame_end) == (5, 30)
-
-
-def test_a_run_hides_the_default_cube_also_without_a_window(scene, clip, tmp_path) -> None:
-    """Where the camera is assumed, and the smoke stands in the middle."""
-    cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
-    obj = new_smoke(scene, clip)
-    obj.smokelift.output = str(tmp_path)
-    smoke_takes.write_take(obj)
-    assert cube.hide_render and cube.hide_viewport

@@ -1,7 +1,5 @@
 """A clip whose lens was calibrated, made straight."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest
@@ -61,22 +59,17 @@ def test_the_clip_is_made_straight(bent, tmp_path) -> None:
     assert not bpy.ops.smokelift.undistort.poll()
 
 
-def test_a_distorted_clean_plate_is_refused(bent, tmp_path) -> None:
-    """It has the same distortion."""
-    smoke(bent).smokelift.plate_mode = "FILE"
-    with pytest.raises(RuntimeError, match="clean plate is distorted too"):
-        bpy.ops.smokelift.undistort()
-
-
-def test_a_distorted_mask_is_refused(bent) -> None:
-    smoke(bent).smokelift.mask = "//mask.png"
-    with pytest.raises(RuntimeError, match="mask is distorted too"):
+@pytest.mark.parametrize(
+    ("name", "value", "said"), [("plate_mode", "FILE", "clean plate"), ("mask", "//mask.png", "mask")]
+)
+def test_what_is_distorted_too_is_refused(bent, name, value, said) -> None:
+    setattr(smoke(bent).smokelift, name, value)
+    with pytest.raises(RuntimeError, match=f"{said} is distorted too"):
         bpy.ops.smokelift.undistort()
 
 
 @pytest.mark.parametrize("model", sorted(undistort.COEFFICIENTS))
 def test_every_model_of_a_lens_counts(bent, model) -> None:
-    """And only its own coefficients."""
     clip = smoke(bent).smokelift.clip
     lens = clip.tracking.camera
     lens.k1, lens.distortion_model = 0.0, model

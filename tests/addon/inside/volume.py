@@ -1,7 +1,5 @@
 """The result in Blender: what plays when, where it is, and what it is made of."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -16,7 +14,7 @@ from mathutils import Vector
 from addon import look, shot_setup, smoke_takes, volume
 from addon.box_table import box_corners
 from addon.take import Take
-from conftest import FRAMES, made, quietly, rendered
+from conftest import FRAMES, changed, made, quietly, rendered
 from smokelift.output.images import write_image
 from smokelift.output.video_file import write_video
 from smokelift.scene import Camera, Medium, Scene, scene_to_dict
@@ -45,19 +43,11 @@ def plays(scene: bpy.types.Scene, frame: int) -> int | None:
 
 
 def test_every_frame_has_its_file_and_nothing_plays_before_or_after(shot, tmp_path) -> None:
-    """One file a frame where the rates agree."""
     volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in range(0, 9)] == [None, 1, 2, 3, 4, 5, 6, None, None]
     data = smoke(shot).data
     assert (data.frame_start, data.frame_duration, data.frame_offset) == (1, FRAMES, 0)
     assert data.animation_data is None or not data.animation_data.drivers
-
-
-def test_part_of_a_clip_plays_where_the_clip_does(shot, tmp_path) -> None:
-    """Also if the clip starts late."""
-    smoke(shot).smokelift.first, smoke(shot).smokelift.clip.frame_start = 11, 101
-    volume.show(smoke(shot), made(tmp_path))
-    assert [plays(shot, frame) for frame in (110, 111, 116, 117)] == [None, 1, 6, None]
 
 
 @pytest.mark.parametrize(
@@ -69,38 +59,17 @@ def test_part_of_a_clip_plays_where_the_clip_does(shot, tmp_path) -> None:
     ],
 )
 def test_in_real_time_at_another_frame_rate(shot, tmp_path, fps, wanted) -> None:
-    """A second of the clip is a second of the scene."""
     shot.render.fps, smoke(shot).smokelift.speed = fps, "REAL"
     volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in range(len(wanted))] == wanted
     assert smoke(shot).data.velocity_scale == 1.0
 
 
-def test_frame_by_frame_at_another_frame_rate(shot, tmp_path) -> None:
-    """As Blender plays the clip itself, unless it is set otherwise; motion blur follows what is seen."""
-    shot.render.fps = 48
-    volume.show(smoke(shot), made(tmp_path))
-    assert [plays(shot, frame) for frame in (0, 1, 6, 7)] == [None, 1, 6, None]
-    assert smoke(shot).data.velocity_scale == pytest.approx(2.0)
-
-
 def tracked(take: Take, **tables: dict) -> dict:
     """Make the take one of a camera that moves, and return its index."""
-    file = take.directory / "sequence.json"
-    index = json.loads(file.read_text())
-    index["scene"] |= {"camera": {"matrices": [np.eye(4).tolist()] * FRAMES}, **tables}
-    file.write_text(json.dumps(index))
+    with changed(take) as index:
+        index["scene"] |= {"camera": {"matrices": [np.eye(4).tolist()] * FRAMES}, **tables}
     return index
-
-
-def test_smoke_keeps_step_with_a_camera_that_moves(shot, tmp_path) -> None:
-    """Blender plays clip and track frame by frame, whatever their rate."""
-    shot.render.fps, smoke(shot).smokelift.speed = 48, "REAL"
-    take = made(tmp_path)
-    tracked(take)
-    volume.show(smoke(shot), take)
-    assert [plays(shot, frame) for frame in range(0, 9)] == [None, 1, 2, 3, 4, 5, 6, None, None]
-    assert smoke(shot).data.velocity_scale == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("kind", ["pictures", "video"])
@@ -132,7 +101,6 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
 
 @pytest.mark.parametrize(("model", "bounces"), [("multiple", shot_setup.BOUNCES), ("single", 0), ("unshadowed", 0)])
 def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model, bounces) -> None:
-    """What the artist sets after that stays."""
     take = made(tmp_path)
     volume.show(smoke(shot), take)
     index = take.read().index
@@ -146,22 +114,11 @@ def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model
     assert (shot.cycles.volume_bounces, shot.cycles.max_bounces) == (7, 7)
 
 
-def test_changing_the_speed_acts_at_once_and_leaves_no_driver(shot, tmp_path) -> None:
-    """What was right for one speed is not kept for another."""
-    shot.render.fps = 48
-    volume.show(smoke(shot), made(tmp_path))
-    smoke(shot).smokelift.speed = "REAL"
-    assert [plays(shot, frame) for frame in (1, 2, 3, 12, 13)] == [1, 1, 2, 6, None]
-    smoke(shot).smokelift.speed = "FRAMES"
-    assert [plays(shot, frame) for frame in (1, 2, 6, 7)] == [1, 2, 6, None]
-
-
 def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     """Frames chosen for the next run move nothing; a start that the artist gave the Volume stays."""
     take = made(tmp_path)
-    index = json.loads((take.directory / "sequence.json").read_text())
-    index["scene"]["clip"]["frames"] = [10, 15]
-    (take.directory / "sequence.json").write_text(json.dumps(index))
+    with changed(take) as index:
+        index["scene"]["clip"]["frames"] = [10, 15]
     data = volume.show(smoke(shot), take).data
     assert data.frame_start == 11
     smoke(shot).smokelift.first = 3
@@ -176,24 +133,10 @@ def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     assert data.frame_start == 500
 
 
-def test_a_take_that_is_being_made_shows_its_finished_frames(shot, tmp_path) -> None:
-    """Frames are seen as soon as they are finished, in the same object."""
-    take = made(tmp_path)
-    whole = json.loads((take.directory / "sequence.json").read_text())
-    seen = []
-    for count in (0, 2, 5):
-        some = {**whole, "complete": False, "frames": {str(n): {} for n in range(1, count + 1)}}
-        (take.directory / "sequence.json").write_text(json.dumps(some))
-        obj = volume.show(smoke(shot), take)
-        seen.append(obj and (obj.name, obj.data.frame_duration))
-    assert seen == [None, ("Smoke", 2), ("Smoke", 5)]
-
-
 # where it is
 
 
 def test_grids_and_their_place(shot, tmp_path) -> None:
-    """Density and velocity, in the engine's voxels: the smoke is where the engine has it."""
     take = made(tmp_path)
     volume.show(smoke(shot), take)
     obj = evaluated(shot, 3)
@@ -213,7 +156,6 @@ def test_grids_and_their_place(shot, tmp_path) -> None:
 
 
 def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
-    """With the box's rotation, about the world's origin, as its scene was given."""
     smoke(shot).smokelift.box.rotation_euler = (0.1, 0.2, 0.7)
     bpy.context.view_layer.update()
     obj = volume.show(smoke(shot), made(tmp_path))
@@ -226,7 +168,6 @@ def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
 
 
 def test_smoke_that_was_moved_stays_where_it_was_put(shot, tmp_path) -> None:
-    """While it grows, and when it is made anew: also if the box was rotated meanwhile."""
     first = made(tmp_path)
     obj = volume.show(smoke(shot), first)
     obj.location.x, obj.rotation_euler.z, obj.scale = obj.location.x + 5.0, 0.5, (2.0, 2.0, 2.0)
@@ -236,15 +177,6 @@ def test_smoke_that_was_moved_stays_where_it_was_put(shot, tmp_path) -> None:
     volume.show(smoke(shot), made(tmp_path, number=2))
     assert obj.location.x == pytest.approx(5.0)
     assert (obj.rotation_euler.z, obj.scale.x) == pytest.approx((0.5, 2.0))
-
-
-def test_smoke_that_was_not_moved_follows_the_box(shot, tmp_path) -> None:
-    """Another take, in a box that was rotated meanwhile."""
-    obj = volume.show(smoke(shot), made(tmp_path))
-    smoke(shot).smokelift.box.rotation_euler.z = 0.7
-    bpy.context.view_layer.update()
-    volume.show(smoke(shot), made(tmp_path, number=2))
-    assert obj.rotation_euler.z == pytest.approx(0.7)
 
 
 # what it is made of
@@ -282,7 +214,6 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     ],
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
-    """In the panel, and with the Volume wherever it goes; nothing where the engine did not say."""
     assert volume.provenance_note(smoke(shot)) == ""
     take = made(tmp_path)
     file = take.directory / "sequence.json"
@@ -294,16 +225,7 @@ def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     assert volume.provenance_note(smoke(shot)) == ""
 
 
-def test_coloured_smoke_has_its_colour(shot, tmp_path) -> None:
-    """What it scatters of each colour."""
-    take = made(tmp_path, medium=Medium(4.0, 0.8, color=(1.0, 0.5, 0.25)))
-    obj = volume.show(smoke(shot), take)
-    color = obj.data.materials[0].node_tree.nodes[look.NODE].inputs["Albedo"]
-    assert list(color.default_value) == pytest.approx([0.8, 0.4, 0.2, 1.0])
-
-
 def test_a_new_result_replaces_the_old_one_in_the_same_object(shot, tmp_path) -> None:
-    """One object, one volume, one material, with the new values."""
     volume.show(smoke(shot), made(tmp_path))
     before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
     obj = volume.show(smoke(shot), made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
@@ -325,15 +247,6 @@ def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
     assert list(inputs["Albedo"].default_value) == pytest.approx([1.0, 0.5, 0.2, 1.0])
     assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
     assert obj.data.display.density == 1.5
-
-
-def test_a_material_of_the_users_own_is_left_alone(shot, tmp_path) -> None:
-    """And so is what was added to ours."""
-    obj = volume.show(smoke(shot), made(tmp_path))
-    own = bpy.data.materials.new("Own")
-    obj.data.materials[0] = own
-    volume.show(smoke(shot), made(tmp_path, number=2))
-    assert obj.data.materials[0] == own
 
 
 # saving
@@ -390,26 +303,6 @@ def test_deleting_earlier_results_spares_what_is_on_show(shot, tmp_path, saved_f
     assert plays(shot, 3) == 3
 
 
-def test_smoke_without_a_result_is_saved_and_shows_no_take(shot, tmp_path) -> None:
-    """Blender saves its empty path as that of a folder."""
-    obj = smoke(shot)
-    assert volume.shown_take(obj) is None
-    shot = reopened(tmp_path / "shot")
-    assert volume.shown_take(smoke(shot)) is None
-    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
-
-
-def test_a_stopped_run_is_found_again_under_its_own_name(shot, tmp_path) -> None:
-    """The engine resumes what lies at the path it knows: also after the file was first saved, somewhere else."""
-    take = made(tmp_path / "elsewhere")
-    index = json.loads((take.directory / "sequence.json").read_text())
-    (take.directory / "sequence.json").write_text(json.dumps({**index, "complete": False}))
-    take.write({}, [])
-    volume.show(smoke(shot), take)
-    shot = reopened(tmp_path / "shot")
-    assert smoke_takes.unfinished(smoke(shot)) == take
-
-
 def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tmp_path) -> None:
     """The project can be moved; the artist who takes another world and sets up again finds one world of ours."""
     plate = tmp_path / "plate.png"
@@ -427,21 +320,11 @@ def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tm
     assert sorted(world.name for world in bpy.data.worlds) == ["Smokelift", "World"]
 
 
-def test_nothing_of_the_session_is_saved(shot, tmp_path) -> None:
-    """Jobs belong to the Blender that runs them."""
-    bpy.context.window_manager.smokelift.jobs.add().take = "somewhere"
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
-    assert len(bpy.context.window_manager.smokelift.jobs) == 0
-
-
 # the camera that is assumed
 
 
 @pytest.mark.parametrize("size", [(256, 384), (384, 256)])
 def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
-    """With the engine's lens and place; the scene's own camera stays the scene's."""
     from bpy_extras.object_utils import world_to_camera_view
 
     own = shot.camera
@@ -449,9 +332,8 @@ def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
     shot.render.resolution_x, shot.render.resolution_y = size
     camera = Camera.look_at((0.0, -5.0, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=30.0, size=size)
     take = made(tmp_path)
-    index = json.loads((take.directory / "sequence.json").read_text())
-    index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
-    (take.directory / "sequence.json").write_text(json.dumps(index))
+    with changed(take) as index:
+        index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
     for _ in range(2):
         smoke_takes.present(smoke(shot), take)
     assert shot.camera == own
@@ -466,27 +348,3 @@ def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
     smoke_takes.present(smoke(shot), take)
     assert shot.camera == obj
     assert replace(camera, size=size) == camera
-
-
-def test_an_assumed_camera_that_was_changed_stays(shot, tmp_path) -> None:
-    """Under any name: its place and its lens, each on its own."""
-    smoke(shot).smokelift.camera_mode = "ESTIMATE"
-    takes = [made(tmp_path, number=number) for number in (1, 2)]
-    for take, distance in zip(takes, (5.0, 8.0), strict=True):
-        index = json.loads((take.directory / "sequence.json").read_text())
-        camera = Camera.look_at((0.0, -distance, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=6 * distance, size=(256, 384))
-        index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
-        (take.directory / "sequence.json").write_text(json.dumps(index))
-    smoke_takes.present(smoke(shot), takes[0])
-    (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != shot.camera)
-    obj.name, obj.location.y = "Mine", -6.0
-    smoke_takes.present(smoke(shot), takes[0])
-    assert obj.location.y == -6.0
-    smoke_takes.present(smoke(shot), takes[1])
-    assert len([obj for obj in shot.objects if obj.type == "CAMERA"]) == 2
-    assert obj.location.y == -6.0
-    lens = obj.data.lens
-    assert lens == pytest.approx(18.0 / math.tan(math.radians(24.0)), rel=1e-4), "the lens was not changed by hand"
-    obj.data.lens = 85.0
-    smoke_takes.present(smoke(shot), takes[0])
-    assert obj.data.lens == 85.0

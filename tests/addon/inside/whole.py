@@ -1,8 +1,5 @@
 """The whole job on the example clip, as the installed extension would run it, and renders of its result."""
 
-from __future__ import annotations
-
-import json
 import math
 import shutil
 from pathlib import Path
@@ -12,9 +9,9 @@ import numpy as np
 import pytest
 
 import smokelift
-from addon import look, run, shot_check, smoke_takes, volume
+from addon import look, shot_check, smoke_takes, volume
 from addon.contract import QUALITIES
-from addon.light_tables import point_intensity, sun_irradiance
+from addon.light_tables import sun_irradiance
 from addon.scene_file import shot_tables
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
@@ -123,7 +120,6 @@ def test_a_shot_of_which_everything_is_given_is_made(shot, kept, tmp_path) -> No
 
 
 def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
-    """The light that was estimated is made, the background that was estimated is shown."""
     smoke(shot).smokelift.light_mode, smoke(shot).smokelift.plate_mode = "ESTIMATE", "ESTIMATE"
     bpy.data.objects.remove(bpy.data.objects["Sun"])
     make(shot, tmp_path / "out")
@@ -188,113 +184,7 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
         assert psnr(picture, wanted) > WANTED_DB + 5
 
 
-def test_setting_up_twice_changes_nothing(shot, kept, tmp_path) -> None:
-    """No second world, light or background."""
-    made(shot, tmp_path / "out", kept)
-    smoke(shot).smokelift.light_mode = "ESTIMATE"
-
-    def census() -> list[int]:
-        kinds = (bpy.data.worlds, bpy.data.lights, bpy.data.objects, bpy.data.images, bpy.data.cameras)
-        return [len(kind) for kind in kinds] + [
-            len(shot.camera.data.background_images),
-            len(shot.world.node_tree.nodes),
-            len(shot.world.node_tree.links),
-        ]
-
-    bpy.ops.smokelift.set_up()
-    before = census()
-    bpy.ops.smokelift.set_up()
-    assert census() == before
-    assert bpy.data.worlds["World"].use_fake_user, "the user's own world would not be saved"
-
-
-def test_every_light_that_was_estimated_is_a_sun(shot, kept, tmp_path) -> None:
-    """Light from everywhere with shadows is several; those of another take go."""
-    take = made(shot, tmp_path / "out", kept)
-    smoke(shot).smokelift.light_mode = "ESTIMATE"
-    path = take.directory / "sequence.json"
-    index = json.loads(path.read_text())
-    lights = [
-        {"type": "directional", "direction": [0.0, 0.0, -1.0], "irradiance": [1.0, 0.5, 0.5]},
-        {"type": "directional", "direction": [1.0, 0.0, 0.0], "irradiance": [2.0, 1.0, 1.0]},
-    ]
-    for count in (2, 1):
-        path.write_text(json.dumps({**index, "scene": {**index["scene"], "lights": lights[:count]}}))
-        bpy.ops.smokelift.set_up()
-        suns = sorted(obj.name for obj in shot.objects if obj.name.startswith("Smokelift Light"))
-        assert suns == ["Smokelift Light", "Smokelift Light 2"][:count]
-        assert sum(shot.objects[name].data.energy for name in suns) == sum(range(1, count + 1))
-
-
-def test_running_twice_makes_a_second_take_and_one_smoke(shot, kept, tmp_path) -> None:
-    """The first take's files stay until they are asked to go."""
-    made(shot, tmp_path / "out", kept)
-    first = smoke(shot)
-    row = make(shot, tmp_path / "out")
-    assert row.take.endswith("take_0002")
-    assert smoke(shot) == first
-    assert [obj for obj in shot.objects if obj.type == "VOLUME"] == [first]
-    assert volume.shown_take(smoke(shot)) == Take(tmp_path / "out" / "take_0002")
-    assert Take(tmp_path / "out" / "take_0001").read().complete
-    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
-    assert not (tmp_path / "out" / "take_0001").exists()
-    assert Take(tmp_path / "out" / "take_0002").read().complete
-
-
-def test_another_variation(shot, kept, tmp_path) -> None:
-    """A second take with the next seed takes the place of the first, and the panel says which it is."""
-    made(shot, tmp_path / "out", kept)
-    assert "Variation 0" in volume.provenance_note(smoke(shot))
-    assert bpy.ops.smokelift.vary() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, smoke(shot).smokelift.seed) == ("done", 1)
-    assert row.take.endswith("take_0002")
-    assert Sequence.open(row.take).settings["seed"] == 1
-    assert "Variation 1" in volume.provenance_note(smoke(shot))
-
-
-def test_another_variation_needs_something_to_vary(shot, tmp_path) -> None:
-    """Without detail the button is off; a shot that cannot be run keeps its variation."""
-    smoke(shot).smokelift.detail = 0.0
-    assert not bpy.ops.smokelift.vary.poll()
-    smoke(shot).smokelift.detail, smoke(shot).smokelift.seed = 0.5, 7
-    smoke(shot).smokelift.first = 999
-    with pytest.raises(RuntimeError, match="Frames 999 to"):
-        bpy.ops.smokelift.vary()
-    assert smoke(shot).smokelift.seed == 7
-
-
-def test_a_failure_is_a_sentence_and_a_log(shot, kept, tmp_path) -> None:
-    """And leaves the smoke that was there."""
-    made(shot, tmp_path / "out", kept)
-    (tmp_path / "clip.mp4").write_bytes((EXAMPLE / "clip.mp4").read_bytes())
-    smoke(shot).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
-    (tmp_path / "clip.mp4").write_text("not a video " * 100)
-    row = make(shot, tmp_path / "out")
-    assert row.outcome == "failed"
-    assert "is not a video" in row.sentence
-    assert volume.shown_take(smoke(shot)) == Take(tmp_path / "out" / "take_0001")
-    assert bpy.ops.smokelift.open_log(take=row.take) == {"FINISHED"}
-    assert "is not a video" in bpy.data.texts["Smokelift Log"].as_string()
-
-
-def test_a_clip_without_smoke_is_not_done(scene, tmp_path) -> None:
-    """It fails, and the sentence says what to do in Blender."""
-    for number in (1, 2, 3):
-        write_image(tmp_path / f"wall_{number}.png", np.full((96, 64, 3), 0.2, np.float32))
-    settings = smoke(scene).smokelift
-    settings.clip = bpy.data.movieclips.load(str(tmp_path / "wall_1.png"))
-    settings.quality, settings.output = "draft", str(tmp_path / "out")
-    settings.plate_mode, settings.plate = "FILE", str(tmp_path / "wall_1.png")
-    assert bpy.ops.smokelift.run() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert row.outcome == "failed"
-    assert "No smoke found" in row.sentence
-    assert "The background that is given may hold the smoke" in row.sentence
-
-
 def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
-    """Time, memory, disk, and what is assumed; an impossible shot says why."""
     bpy.ops.smokelift.check()
     state = bpy.context.window_manager.smokelift
     assert state.check_done
@@ -314,93 +204,6 @@ def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
     bpy.ops.smokelift.check()
     assert not state.check_done
     assert "no camera" in state.check_error
-
-
-def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
-    """From the last finished frame, with the settings of then, to a complete take."""
-    settings = smoke(shot).smokelift
-    choose(shot, tmp_path / "out")
-    take = smoke_takes.write_take(smoke(shot))
-    stopped = Scene.load(take.scene_file)
-    with Clip.open(stopped.clip) as clip:
-        cut_off(smokelift.reconstruct(clip, stopped, Settings.preset("draft")), take.directory, 2)
-    settings.quality = "fine"
-    assert smoke_takes.unfinished(smoke(shot)) == take
-    assert bpy.ops.smokelift.resume() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.done, row.total) == ("done", 4, 4)
-    assert take.read().complete
-    assert smoke(shot).data.frame_duration == 4
-    assert smoke_takes.unfinished(smoke(shot)) is None
-    with pytest.raises(RuntimeError, match="No stopped run to resume"):
-        bpy.ops.smokelift.resume()
-
-
-@pytest.mark.parametrize("saved_first", [True, False])
-def test_going_on_where_the_output_is_not_beside_the_file(shot, tmp_path, saved_first) -> None:
-    """Blender writes the way to it with ``..``: from the start, or once an unsaved file is saved somewhere else."""
-    (tmp_path / "shot").mkdir()
-
-    def save() -> None:
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot" / "shot.blend"))
-
-    if saved_first:
-        save()
-    choose(shot, tmp_path / "out")
-    settings = smoke(shot).smokelift
-    settings.last, settings.longest_side, settings.plate_mode = FIRST + 1, 32, "ESTIMATE"
-    stopped = smoke_takes.write_take(smoke(shot))
-    known = Scene.load(stopped.scene_file)
-    with Clip.open(known.clip) as clip:
-        cut_off(smokelift.reconstruct(clip, known, Settings.preset("draft")), stopped.directory, 1)
-    smoke_takes.present(smoke(shot), stopped)
-    save()
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath))
-    assert smoke(bpy.context.scene).data.filepath.startswith("//..")
-    assert bpy.ops.smokelift.resume() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.done) == ("done", 2), row.sentence
-    assert stopped.read().complete
-
-
-def test_going_on_after_the_project_was_moved(shot, tmp_path) -> None:
-    """Clip, plate, .blend and results lie in another folder than when the run began."""
-    project = tmp_path / "project"
-    shutil.copytree(EXAMPLE, project)
-    settings = smoke(shot).smokelift
-    settings.clip, settings.plate = bpy.data.movieclips.load(str(project / "clip.mp4")), str(project / "plate.png")
-    settings.first, settings.last, settings.longest_side = FIRST, FIRST + 1, 32
-    bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
-    bpy.ops.file.make_paths_relative()
-    settings.plate = "//plate.png"
-    take = smoke_takes.write_take(smoke(shot))
-    stopped = Scene.load(take.scene_file)
-    with Clip.open(stopped.clip) as clip:
-        cut_off(smokelift.reconstruct(clip, stopped, Settings.preset("draft")), take.directory, 1)
-    bpy.ops.wm.save_mainfile()
-    moved = project.rename(tmp_path / "moved")
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend")))
-    assert bpy.ops.smokelift.resume() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.done) == ("done", 2), row.sentence
-    assert volume.shown_take(smoke(bpy.context.scene)).directory.is_relative_to(moved)
-
-
-def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
-    """Each with its own takes and its own volume."""
-    make(shot, tmp_path / "one")
-    other = bpy.data.scenes.new("Other")
-    smoke(other).smokelift.clip = smoke(shot).smokelift.clip
-    smoke(other).smokelift.quality, smoke(other).smokelift.longest_side = "draft", 32
-    smoke(other).smokelift.first, smoke(other).smokelift.last = FIRST, FIRST + 1
-    smoke(other).smokelift.output = str(tmp_path / "two")
-    run.enqueue(bpy.context, smoke(other), smoke_takes.write_take(smoke(other)))
-    rows = bpy.context.window_manager.smokelift.jobs
-    assert [row.outcome for row in rows] == ["done", "done"]
-    assert volume.shown_take(smoke(shot)) == Take(tmp_path / "one" / "take_0001")
-    assert volume.shown_take(smoke(other)) == Take(tmp_path / "two" / "take_0001")
-    assert smoke(other).name in other.objects
-    assert smoke(other).name not in shot.objects
 
 
 def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
@@ -479,43 +282,7 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
 # lights, as Cycles has them
 
 
-@pytest.mark.parametrize(
-    ("kind", "strength", "place"),
-    [("SUN", 3.0, (0.0, 0.0, 2.0)), ("POINT", 100.0, (0.0, 0.0, 2.0)), ("POINT", 100.0, (0.0, 0.0, 3.0))],
-)
-def test_irradiance_and_intensity_are_those_of_cycles(scene, tmp_path, kind, strength, place) -> None:
-    """A white, matt plane below the light shows its irradiance over pi."""
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x = scene.render.resolution_y = 8
-    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 16, False, 0
-    mesh = bpy.data.meshes.new("Plane")
-    mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
-    material = bpy.data.materials.new("White")
-    if material.node_tree is None:
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    white = nodes.new("ShaderNodeBsdfDiffuse")
-    white.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    material.node_tree.links.new(white.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
-    mesh.materials.append(material)
-    add(scene, "Plane", mesh)
-    light = add(scene, "Light", bpy.data.lights.new("Light", kind))
-    light.location, light.data.energy, light.data.color = place, strength, (1.0, 0.5, 0.25)
-    if kind == "POINT":
-        light.data.shadow_soft_size = 0.0
-    camera = scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
-    camera.location, camera.data.type, camera.data.ortho_scale = (0.0, 0.0, 5.0), "ORTHO", 0.05
-    shown = rendered(scene, tmp_path / "plane.exr").mean((0, 1))
-    if kind == "SUN":
-        wanted = np.array(sun_irradiance(light.data)) / math.pi
-    else:
-        wanted = np.array(point_intensity(light.data)) / place[2] ** 2 / math.pi
-    np.testing.assert_allclose(shown, wanted, rtol=2e-3)
-
-
 def test_everything_that_makes_a_light_stronger_counts(scene) -> None:
-    """Exposure and temperature, where this Blender has them."""
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy = 2.0
     if not hasattr(light, "exposure"):
@@ -529,7 +296,6 @@ def test_everything_that_makes_a_light_stronger_counts(scene) -> None:
 
 @pytest.mark.parametrize("kind", ["sun", "point", "panorama"])
 def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) -> None:
-    """The same smoke in the same light, by two renderers."""
     sequence = Sequence.open(made(shot, tmp_path / "out", kept).directory)
     bpy.data.objects["Sun"].hide_render = kind != "sun"
     if kind == "point":
@@ -556,27 +322,6 @@ def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) 
     wanted = area_average(wanted, found.shape[1], found.shape[0])
     assert found.sum() == pytest.approx(wanted.sum(), rel=0.03)
     assert np.linalg.norm(found - wanted) / np.linalg.norm(wanted) < 0.15  # most of it noise
-
-
-def test_cycles_and_the_engine_agree_on_all_orders_of_scattering(shot, kept, tmp_path) -> None:
-    """The same thick white smoke by two renderers; scattered once it has hardly half the light."""
-    take = made(shot, tmp_path / "out", kept)
-    density = Sequence.open(take.directory).density(LAST - FIRST + 1)
-    index = take.read().index
-    medium = index["scene"]["medium"] | {"extinction": 15.0, "albedo": 0.95, "scattering": "multiple"}
-    (take.directory / "sequence.json").write_text(json.dumps(index | {"scene": index["scene"] | {"medium": medium}}))
-    smoke_takes.present(smoke(shot), take)
-    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
-    tables = shot_tables(smoke(shot)) | {"background": {"color": [0.0, 0.0, 0.0]}}
-    known = [scene_from_dict(tables | {"medium": medium | {"scattering": model}}) for model in ("multiple", "single")]
-    shot.cycles.samples, shot.cycles.use_denoising = 64, False
-    shot.render.resolution_percentage = 10
-    shot.world.cycles_visibility.camera = False
-    shot.frame_set(LAST)
-    found = rendered(shot, tmp_path / "lit.exr")
-    wanted, once = (area_average(smokelift.render(density, one), *found.shape[1::-1]) for one in known)
-    assert found.sum() == pytest.approx(wanted.sum(), rel=0.05)
-    assert once.sum() < 0.6 * wanted.sum()
 
 
 def light_by_picture(scene: bpy.types.Scene, folder: Path) -> None:

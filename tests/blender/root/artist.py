@@ -18,7 +18,6 @@ import bpy
 FOLDER = Path(sys.argv[-1])
 PATIENCE_SECONDS = 400.0
 ENDED = ("done", "failed", "cancelled")
-
 report: dict[str, object] = {}
 
 

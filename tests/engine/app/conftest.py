@@ -1,7 +1,5 @@
 """The tiny plume as a scene file, and as a sequence that the command line made of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """``smokelift batch`` on real clips."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The exit status of everything else that ends a command: device, memory, and being cancelled."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os
@@ -12,13 +10,13 @@ import sys
 import zipfile
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, refused
 
+import smokelift
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
@@ -36,7 +34,6 @@ def workload(plume) -> Workload:
 
 
 def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
-    """Status 3, and what can be done."""
     if device.available_gpu() in ("cuda", "metal"):
         pytest.skip("there is a GPU here that cannot be hidden")
     done = subprocess.run(
@@ -55,20 +52,9 @@ def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
 
 
 def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
-    """Status 3 before anything is written, and the resolution that is named would fit."""
     clip = str(plume.scene.clip.path)
-    sentence = refused(
-        capsys,
-        "reconstruct",
-        clip,
-        "--out",
-        tmp_path / "out",
-        "--npz",
-        "--resolution",
-        "4000,4000,4000",
-        *QUICK,
-        status=3,
-    )
+    words = ("--out", tmp_path / "out", "--npz", "--resolution", "4000,4000,4000", *QUICK)
+    sentence = refused(capsys, "reconstruct", clip, *words, status=3)
     named = re.search(r"resolution that fits is (\d+),(\d+),(\d+)", sentence)
     assert named
     x, y, z = (int(count) for count in named.groups())
@@ -77,21 +63,9 @@ def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_the_named_resolution_is_accepted(plume, shot, tmp_path, capsys, monkeypatch) -> None:
-    """Whoever follows the advice on a calibrated domain gets a sequence."""
-    little = SimpleNamespace(available=cost.memory_needed((23, 23, 31), workload(plume)))
-    monkeypatch.setattr(cost.psutil, "virtual_memory", lambda: little)
-    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", *QUICK, status=3)
-    named = re.search(r"resolution that fits is (\S+?)\.?$", sentence)
-    assert named
-    arguments = ("--npz", "--frames", "0:1", "--resolution", named[1], *QUICK)
-    assert command("reconstruct", shot, "--out", tmp_path / "out", *arguments) == 0
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT to send")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys, number) -> None:
-    """Status 130 in the middle; --resume gives the rest, bit for bit as without the break."""
     heights = np.linspace(0.3, 0.9, 8)
     filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
     filmed.save(tmp_path / "scene.toml")
@@ -165,7 +139,6 @@ def test_an_interrupt_while_writing_is_quiet(shot, tmp_path, capsys, monkeypatch
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs Linux to count threads")
 def test_the_command_loads_no_threads_of_openblas() -> None:
-    """Where the system allows no more threads it would hang in them."""
     script = (
         "import smokelift_command, sys; sys.argv = ['smokelift', 'doctor', '--help']\n"
         "try: smokelift_command.main()\n"
@@ -177,7 +150,6 @@ def test_the_command_loads_no_threads_of_openblas() -> None:
 
 
 def test_threads_are_limited(tmp_path, capsys, monkeypatch) -> None:
-    """Before anything is computed; a number that no processor has is refused."""
     given: list[int] = []
     monkeypatch.setattr("smokelift.app.cli.set_threads", given.append)
     assert command("doctor", "--threads", 2) == 0
@@ -185,3 +157,20 @@ def test_threads_are_limited(tmp_path, capsys, monkeypatch) -> None:
     assert given == [2, 0]
     assert command("doctor", "--threads", "many") == 2
     assert "whole number from 0 to 1024" in capsys.readouterr().err
+
+
+def test_doctor_in_a_process_of_its_own() -> None:
+    done = subprocess.run([*MODULE, "doctor"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"smokelift {smokelift.__version__}, Python 3.")
+    for word in ("libraries: numpy ", "taichi ", "processor core", "GiB free", "GPU: ", "OpenVDB"):
+        assert word in done.stdout
+    assert done.stderr == ""
+
+
+def test_doctor_without_taichi(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(device, "has_taichi", lambda: False)
+    monkeypatch.setattr(device, "driver_installed", lambda: True)
+    monkeypatch.setattr(device, "_running", "cpu")
+    assert command("doctor") == 0
+    assert "GPU: not used, as Taichi is not installed: install it (pip" in capsys.readouterr().out

@@ -1,7 +1,5 @@
 """Progress: lines of JSON for programs, plain words for people, errors apart from results."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -26,7 +24,6 @@ def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
 
 
 def test_json_events_are_a_line_each(capsys) -> None:
-    """Every event with its fields, in order, even with line breaks and quotes in a text."""
     with reporter("json") as say:
         say.note('two\nlines and "quotes"')
         say.start(4, 1)
@@ -43,7 +40,6 @@ def test_json_events_are_a_line_each(capsys) -> None:
 
 
 def test_json_is_told_how_long_it_takes(capsys) -> None:
-    """Time left is the mean of the latest frames, for those still to come; none at the end."""
     with reporter("json") as say:
         say.start(13, 0)
         for number in range(1, 14):
@@ -71,23 +67,12 @@ def test_text_names_what_matters(capsys) -> None:
 
 
 def test_the_fit_that_stays_on_the_terminal_is_the_runs(capsys) -> None:
-    """The median, not the last frame's."""
     with reporter("text") as say:
         say.start(3, 0)
         for number, psnr in enumerate((40.0, 30.0, 20.0), 1):
             say.frame(number, figures(1.0, psnr=psnr))
         say.finish("done.", {})
     assert "fit 30.0 dB" in capsys.readouterr().out
-
-
-def test_text_errors_go_to_standard_error(capsys) -> None:
-    """A failure is one unbroken line there, and nothing on standard output."""
-    sentence = "shot.toml: " + "a very long sentence about what went wrong " * 5 + "[in brackets]."
-    with reporter("text") as say:
-        say.fail(sentence, 2)
-    captured = capsys.readouterr()
-    assert captured.err == sentence + "\n"
-    assert captured.out == ""
 
 
 def test_a_note_says_whether_it_is_a_doubt(capsys) -> None:

@@ -1,7 +1,5 @@
 """The commands of the manual's tour, run as they stand there on a tiny plume."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The paper's velocity estimate."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

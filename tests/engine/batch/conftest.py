@@ -1,7 +1,5 @@
 """Shots of an engine that computes nothing."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable

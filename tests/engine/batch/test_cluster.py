@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -112,23 +111,6 @@ def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, 
     assert sorted(line for line in said.splitlines() if line.startswith("shot")) == [f"shot{n} done" for n in range(3)]
     assert "went away; waiting for it to return" in said
     assert [ledger(shot) for shot in shots] == [list(range(1, 13))] * 3
-
-
-@needs_dask
-@posix
-def test_a_cancelled_batch_ends_on_its_workers(cluster, make_shot, ledger) -> None:
-    shot, waiting = (make_shot(name, frames=1000, seconds=0.02) for name in ("running", "waiting"))
-    cluster.scheduler(), cluster.worker()
-    driver = cluster.drive()
-    until((shot.folder / "running.ledger").exists)
-    driver.send_signal(signal.SIGINT)
-    said, _ = driver.communicate(timeout=SECONDS)
-    assert said.splitlines() == ["began", "cancelled"]
-    until(lambda: not list(shot.folder.glob(".*.lock")))
-    there = len(ledger(shot))
-    time.sleep(0.2)
-    assert len(ledger(shot)) == there < 1000
-    assert not (waiting.folder / "waiting.ledger").exists()
 
 
 @dataclass(frozen=True, eq=False)

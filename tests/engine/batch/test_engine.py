@@ -1,7 +1,5 @@
 """One run of the engine as a process."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -28,7 +26,6 @@ def test_a_log_that_cannot_be_written_stops_nothing(tmp_path) -> None:
 
 
 def test_the_real_command_ends_when_its_standard_input_closes() -> None:
-    """So it ends with whoever started it, however that ended."""
     environment = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
     command = [*ENGINE, "reconstruct", "/dev/null", "--out", "never"]
     done = subprocess.run(

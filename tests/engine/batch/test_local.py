@@ -1,7 +1,5 @@
 """Shots side by side on one machine."""
 
-from __future__ import annotations
-
 import threading
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The list of a batch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The work on one shot: nothing is lost, and nothing is done twice."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time
@@ -9,7 +7,7 @@ from dataclasses import replace
 
 import psutil
 
-from smokelift.batch import finish_shot, finished_frames, look_at_shot, read_record, read_state
+from smokelift.batch import finish_shot, finished_frames, look_at_shot, read_state
 from smokelift.batch.work import Patience
 
 SHORT = Patience(pause=0.05, longest_pause=0.05, total=5.0)
@@ -29,16 +27,6 @@ def test_a_shot_whose_options_changed_is_run_again(make_shot, fake) -> None:
     finish_shot(shot, threading.Event(), engine=fake)
     assert not read_state(replace(shot, options=("--quality=fine",))).finished
     shot.input.write_text(shot.input.read_text() + " ")
-    assert not read_state(shot).finished
-
-
-def test_a_shot_whose_mask_changed_is_run_again(make_shot, fake, tmp_path) -> None:
-    mask = tmp_path / "mask.png"
-    mask.write_text("white")
-    shot = replace(make_shot(), options=(f"--mask={mask}",))
-    finish_shot(shot, threading.Event(), engine=fake)
-    assert read_state(shot).finished
-    mask.write_text("black and white")
     assert not read_state(shot).finished
 
 
@@ -73,12 +61,6 @@ def test_a_full_disk_is_waited_for(make_shot, fake, tmp_path, ledger) -> None:
     assert said[0] == "shot: The disk is full. It is tried again in 0 s."
 
 
-def test_a_disk_that_stays_full_is_given_up(make_shot, fake, tmp_path) -> None:
-    shot = make_shot(n2=str(tmp_path))
-    record = finish_shot(shot, threading.Event(), patience=replace(SHORT, total=0.1), engine=fake)
-    assert (record.status, finished_frames(shot).count) == ("stuck", 1)
-
-
 def test_two_that_work_on_one_shot_do_it_once(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=4, seconds=0.05)
     records = []
@@ -106,15 +88,6 @@ def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake) -> None:
     time.sleep(0.1)
     assert finished_frames(shot).count == there
     assert not [child for child in psutil.Process().children() if "fake_engine" in " ".join(child.cmdline())]
-
-
-def test_a_damaged_record_counts_as_none(make_shot, fake, ledger) -> None:
-    shot = make_shot()
-    finish_shot(shot, threading.Event(), engine=fake)
-    (shot.folder / "shot.json").write_text('{"of": 3')
-    assert read_record(shot).status == "waiting"
-    assert finish_shot(shot, threading.Event(), engine=fake).status == "done"
-    assert ledger(shot) == [1, 2, 3]
 
 
 def test_a_shot_is_forecast_once(make_shot, fake) -> None:

@@ -1,7 +1,5 @@
 """What a worker of a cluster makes of how a shot ended."""
 
-from __future__ import annotations
-
 import importlib.util
 import threading
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Where in depth smoke stands: found by its contact with the floor, else on the domain's axis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -40,7 +38,6 @@ def rising(depth: float) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("depth", [-0.3, -0.15, 0.0, 0.1])
 def test_smoke_on_the_floor_shows_its_depth(depth) -> None:
-    """To less than a voxel, shrunk towards the axis a little, and the same at all heights."""
     found = axis_of(rising(depth), FRONT, BOX)
     assert found.at(np.array([-1.2])) == pytest.approx(0.8 * depth, abs=0.05)
     assert found.at(np.array([0.5])) == pytest.approx(0.8 * depth, abs=0.06)
@@ -64,7 +61,6 @@ def test_smoke_that_begins_above_the_floor_stands_upright(low) -> None:
 
 @pytest.mark.parametrize("depth", [-0.3, 0.3])
 def test_floating_smoke_is_left_on_the_axis(depth) -> None:
-    """Its lower end is no contact, wherever it floats."""
     for low in (0.05, 0.2, 1.0):
         distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
         ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
@@ -72,45 +68,18 @@ def test_floating_smoke_is_left_on_the_axis(depth) -> None:
 
 
 def test_drifting_smoke_is_believed_less() -> None:
-    """What leans across the picture may lean in depth as well."""
     straight, leaning = (axis_of(seen(column(-0.25, lean)), FRONT, BOX).at(np.array([0.4])) for lean in (0.0, 0.2))
     assert straight < -0.15
     assert abs(leaning) < 0.5 * abs(straight)
 
 
-def test_smoke_from_the_side_of_the_box_comes_back() -> None:
-    """A box stands around its smoke, so a column near its side leans to the middle, or it would stand wrongly."""
-    found = axis_of(rising(-0.6), FRONT, BOX)
-    contact, head = found.at(np.array([-1.3, 0.7]))
-    assert contact < -0.3
-    assert head > 0.5 * contact
-
-
-def test_smoke_that_leans_back_across_the_picture_does_so_in_depth() -> None:
-    """Wind that blows across the picture hardly ever blows across it alone."""
-    upright, leaning = (
-        axis_of(seen(*2 * [np.roll(column(-0.3, lean), by, 0)]), FRONT, BOX).at(np.array([-1.2, 0.0]))
-        for lean, by in ((0.0, -3), (-0.3, 5))
-    )
-    assert upright[1] / upright[0] > 0.7
-    assert leaning[1] / leaning[0] < 0.3
-
-
-def test_a_contact_in_few_frames_is_chance() -> None:
-    """Most frames have to show it."""
-    ball = column(0.3, low=1.0)
-    assert not axis_of(seen(column(0.3), ball, ball), FRONT, BOX).depths.any()
-
-
 @pytest.mark.parametrize("height", [-0.5, 0.02])
 def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_contact(height) -> None:
-    """The floor is a line to it."""
     low = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
     assert not axis_of(seen(column(0.3), camera=low), low, BOX).depths.any()
 
 
 def test_smoke_that_goes_on_below_the_box_has_no_contact() -> None:
-    """The box cuts it; where it stands is not seen."""
     deep = Domain((-1, -1, -1), (1, 1, 3), (32, 32, 64))
     z = -1 + (np.arange(64) + 0.5) / 16
     inside = (X[:, None, None] ** 2 + (Y[None, :, None] - 0.3) ** 2 < 0.06) & (z < 2)
@@ -121,19 +90,6 @@ def test_smoke_that_goes_on_below_the_box_has_no_contact() -> None:
 
 CORNER = np.zeros((113, 75), np.float32)
 CORNER[0, 0] = 1
-
-
-@pytest.mark.parametrize("amounts", [[], [0 * CORNER], [CORNER]])
-def test_no_smoke_in_the_box_is_on_the_axis(amounts) -> None:
-    """Nothing to find, nothing refused."""
-    assert not axis_of(amounts, FRONT, BOX).depths.any()
-
-
-def test_depth_is_away_from_the_camera() -> None:
-    """From behind, the same smoke is as far the other way."""
-    behind = Camera.look_at((0, 7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
-    found = axis_of(seen(column(0.25), camera=behind), behind, BOX)
-    assert found.at(np.array([0.0])) == pytest.approx(-0.2, abs=0.06)
 
 
 def test_known_inlets_need_no_contact() -> None:
@@ -157,18 +113,7 @@ def test_smoke_stands_where_its_lower_end_is_given(depth) -> None:
         np.testing.assert_allclose(found.axis.at(np.array([-1.2, 0.5])), depth, atol=0.04)
 
 
-def test_smoke_that_leans_comes_back_from_where_its_lower_end_is_given() -> None:
-    """As across the picture, so in depth."""
-    straight, leaning = (
-        estimate_axis(seen(column(0.4, lean)), FRONT, BOX, base=0.4).axis.at(np.array([-1.4, 0.4]))
-        for lean in (0.0, -0.3)
-    )
-    assert straight == pytest.approx([0.4, 0.4], abs=0.07)
-    assert leaning[1] < 0.3 < leaning[0]
-
-
 def test_a_distance_is_measured_level_and_straight_ahead() -> None:
-    """From the camera, however it is tilted."""
     for height in (1.5, 4.0):
         camera = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
         assert depth_at(7.2, camera, BOX) == pytest.approx(0.2)
@@ -176,7 +121,6 @@ def test_a_distance_is_measured_level_and_straight_ahead() -> None:
 
 @pytest.mark.parametrize("distance", [6.0, 8.2])
 def test_a_distance_outside_the_box_is_refused(distance) -> None:
-    """How far the box reaches is said."""
     with pytest.raises(ValueError, match=rf"distance {distance:g} m is outside the box, which reaches from 6 to 8 m"):
         depth_at(distance, FRONT, BOX)
 
@@ -191,7 +135,6 @@ def beside(lean: float = 0.0) -> np.ndarray:
 
 
 def test_columns_beside_one_another_have_depths_of_their_own() -> None:
-    """Each as deep as its source, and as wide as it is itself, however far apart they stand."""
     found = axis_of(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
     heights, right, left = np.array([-0.9, 0.0, 0.4]), np.full(3, 0.45), np.full(3, -0.35)
     np.testing.assert_allclose(found.at(heights, right), -0.3, atol=0.03)
@@ -200,23 +143,6 @@ def test_columns_beside_one_another_have_depths_of_their_own() -> None:
     assert (found.width_at(heights, left) < 0.27).all()  # the row of both has 0.42
     # before the far one begins there is only the near one
     np.testing.assert_allclose(found.at(np.array([-1.4, -1.4]), np.array([-0.35, 0.45])), -0.3, atol=0.03)
-
-
-def test_where_columns_meet_both_may_stand() -> None:
-    """Between them the depth is the mean, and the spread says how far they are apart."""
-    found = axis_of(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
-    middle = np.array([0.05])
-    assert abs(found.at(np.array([0.0]), middle)[0]) < 0.1
-    assert found.spread_at(np.array([0.0]), middle)[0] == pytest.approx(0.3, abs=0.05)
-
-
-def test_columns_are_followed_where_they_lean() -> None:
-    """A column keeps its depth on its way across the picture, and is believed less the further it went."""
-    smoke = beside(lean=0.12)
-    found = axis_of(seen(smoke, smoke), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
-    heights = np.array([-1.2, -0.5])
-    low, high = found.at(heights, 0.45 - 0.12 * (heights + 1.5))
-    assert -0.3 < low < -0.27 < high < -0.15
 
 
 def test_what_nothing_shows_is_as_uncertain_as_the_box_is_badly_centred() -> None:
@@ -238,12 +164,3 @@ def test_a_floor_contact_is_less_certain_the_less_of_it_is_believed() -> None:
     assert before.depth == pytest.approx(-0.2, abs=0.05)
     assert before.deviation < behind.deviation < far.deviation
     assert before.deviation < 0.6 * estimate_axis(seen(column(-0.25, low=1.0)), FRONT, BOX).deviation
-
-
-def test_an_inlet_is_as_certain_as_its_smoke_goes_straight_up() -> None:
-    """What drifts across the picture drifts in depth as well."""
-    inlet = [Inlet((0.2, 0.25, 0.1), 0.1)]
-    straight, drifting = (estimate_axis(seen(column(0.25, lean, radius=0.1)), FRONT, BOX, inlet) for lean in (0.0, 0.1))
-    assert straight.cue == "inlets"
-    assert straight.depth == pytest.approx(0.25, abs=0.02)
-    assert straight.deviation < 0.08 < drifting.deviation

@@ -1,7 +1,5 @@
 """The texture of a clip: its axis, its scales, its drift."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +55,6 @@ def moving(step: tuple[int, int], frames: int = 4, width: float = 6.0) -> Shadow
 
 @pytest.mark.parametrize(("step", "axis"), [((-1, 0), 2), ((0, 1), 0), ((0, 0), 2)])
 def test_smoke_turns_about_the_axis_that_it_travels_along(step, axis) -> None:
-    """Up for what rises or rests, across for a jet."""
     texture = ClipTexture.of(moving(step))
     assert texture is not None
     assert texture.turntable.axis == axis
@@ -65,7 +62,6 @@ def test_smoke_turns_about_the_axis_that_it_travels_along(step, axis) -> None:
 
 
 def test_wider_smoke_has_more_scales() -> None:
-    """The coarsest patches are as wide as the smoke, the finest have single pixels."""
     narrow, wide = (ClipTexture.of(moving((-1, 0), width=width)) for width in (3.0, 12.0))
     assert narrow is not None
     assert wide is not None
@@ -74,23 +70,5 @@ def test_wider_smoke_has_more_scales() -> None:
     assert wide.width > 2 * narrow.width
 
 
-def test_one_photograph_is_enough() -> None:
-    """It does not move."""
-    texture = ClipTexture.of(moving((0, 0), frames=1))
-    assert texture is not None
-    assert texture.drift == 0
-
-
 def test_a_clip_without_smoke_has_no_texture() -> None:
-    """None, and nothing fails."""
     assert ClipTexture.of(Shadows((np.zeros((36, 36), np.float32),))) is None
-
-
-def test_a_thread_of_single_pixels_has_a_texture() -> None:
-    """It is as wide as a voxel."""
-    thread = np.zeros((36, 36), np.float32)
-    thread[:, 18] = 1
-    texture = ClipTexture.of(Shadows((thread,)))
-    assert texture is not None
-    assert texture.width > 0
-    assert np.isfinite(texture.roughness).all()

@@ -1,7 +1,5 @@
 """How much each combination of the colours counts before a background that is uncertain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 
 from smokelift.density import DensitySettings, Observation, ViewSet, reconstruct_density
 from smokelift.density.colour_weight import MODEL_ERROR, ColourWeight
-from smokelift.density.objective import Term, noise_floor
+from smokelift.density.objective import Term
 from smokelift.density.observation import apparent_optical_depth
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.noise import EIGHT_BIT_NOISE
@@ -106,15 +104,6 @@ def test_the_objectives_gradient_is_that_of_what_it_counts(truth, small, optics,
     assert abs(np.vdot(term.renderer.gradient(plain.image_gradient(residual(0.0))), change) / slope - 1) > 0.1
 
 
-def test_noise_leaves_what_the_fit_stops_at(small, optics, picture) -> None:
-    term = term_of(small, optics, picture, found_plate(0.2))
-    random = np.random.default_rng(5)
-    losses = [
-        term.loss((term.view.noise * random.standard_normal(picture.shape)).astype(np.float32)) for _ in range(40)
-    ]
-    assert np.mean(losses) == pytest.approx(noise_floor([term]), rel=0.03)
-
-
 def test_the_other_colours_tell_smoke_from_a_wall_that_is_continued_too_dark(truth, small, picture) -> None:
     def errors(deviation: float) -> tuple[float, float]:
         settings = DensitySettings(fit_iterations=4, descent_iterations=6)
@@ -128,7 +117,6 @@ def test_the_other_colours_tell_smoke_from_a_wall_that_is_continued_too_dark(tru
 
 
 def test_a_wall_that_is_continued_too_bright_is_no_smoke_in_shadow(optics) -> None:
-    """It is darker than what is continued, as thick smoke in its own shadow would be."""
     bright, everywhere = replace(found_plate(0.2), image=1.2 * wall()), np.ones(SIZE, np.bool_)
     certain = replace(bright, errors=np.zeros((3, 3), np.float32))
     assert apparent_optical_depth(wall(), certain, everywhere, optics).min() > 2

@@ -1,7 +1,5 @@
 """What is assumed of the depth: how much smoke a picture shows, in the shadows that the smoke casts on itself."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from smokelift import Camera, DirectionalLight, Domain, Scene

@@ -1,7 +1,5 @@
 """Depth with detail: the front is fitted, the side has detail, and nothing of it is there where it is not asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -71,7 +69,6 @@ def test_the_side_gets_detail_and_the_front_stays(shot) -> None:
 
 
 def test_no_detail_is_the_smooth_prior_itself(shot) -> None:
-    """To the bit, and the clip is not read."""
     views = ViewSet.of(shot.observe(2), shot.optics, 2)
     prior = DetailedDepth(RoundDepth(), detail=0.0).of_clip(shot)
     assert prior.texture is None
@@ -81,7 +78,6 @@ def test_no_detail_is_the_smooth_prior_itself(shot) -> None:
 
 
 def test_another_seed_is_another_smoke(shot) -> None:
-    """From the side; from the front both show the picture, and the same seed is the same smoke."""
     found = [fitted(shot, DetailedDepth(RoundDepth(), seed=seed)) for seed in (0, 0, 1)]
     (first, psnr), (again, _), (other, psnr_other) = found
     np.testing.assert_array_equal(first, again)
@@ -90,7 +86,6 @@ def test_another_seed_is_another_smoke(shot) -> None:
 
 
 def test_what_is_known_of_the_side_is_kept(shot) -> None:
-    """Amount of smoke by height, and where it is in depth."""
     views = ViewSet.of(shot.observe(2), shot.optics, 2)
     estimate = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views)
     assert estimate.detail is not None
@@ -116,7 +111,6 @@ def lobes(scene: Scene, across: int) -> float:
 
 
 def test_lobes_are_as_strong_on_every_grid(plume, tmp_path, monkeypatch) -> None:
-    """Also where their amounts are kept on a grid half as fine."""
     scene = plume.write(tmp_path, rising(3))
     coarse = lobes(scene, 36)
     assert coarse > 0.15
@@ -126,7 +120,6 @@ def test_lobes_are_as_strong_on_every_grid(plume, tmp_path, monkeypatch) -> None
 
 
 def test_no_azimuth_is_near_to_a_camera(two_views) -> None:
-    """Theirs are known; what is taken otherwise is spread evenly."""
     with Clip.open(two_views.clip) as clip:
         seen = prepare_shot(clip, two_views, Settings.preset("draft"))
         views = ViewSet.of(seen.observe(1), seen.optics, 1)
@@ -137,26 +130,3 @@ def test_no_azimuth_is_near_to_a_camera(two_views) -> None:
     degrees = np.array([degrees for _, degrees in islice(detail.azimuths(), 60)])
     assert min(abs((each - camera + 90) % 180 - 90) for each in degrees for camera in cameras) >= OWN_PICTURE_DEGREES
     assert np.diff(np.sort(degrees)).max() < 2.5 * OWN_PICTURE_DEGREES
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_a_short_clip_gives_what_it_has(plume, tmp_path, count) -> None:
-    """A single picture is enough: the front is fitted all the same."""
-    scene: Scene = plume.write(tmp_path, rising(FRAMES)[:count])
-    with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, Settings.preset("draft"))
-        density, psnr = fitted(shot, DetailedDepth(RoundDepth()), 0)
-    assert np.isfinite(density).all()
-    assert psnr > 36
-
-
-def test_a_frame_without_smoke_stays_empty(plume, tmp_path) -> None:
-    """Whatever other moments show."""
-    densities = [*rising(3), np.zeros((24, 24, 32), np.float32)]
-    scene: Scene = plume.write(tmp_path, densities)
-    with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, Settings.preset("draft"))
-        prior = DetailedDepth(RoundDepth())
-        views = ViewSet.of(shot.observe(3), shot.optics, 3)
-        found = FIT.fit(views, prior.of_clip(shot).estimate(views), None)
-    assert not found.density.any()

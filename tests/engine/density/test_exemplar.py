@@ -1,7 +1,5 @@
 """Patches: their kernels against plain NumPy, and pictures that take over a distribution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -29,7 +27,6 @@ def fine(picture: np.ndarray) -> float:
 
 
 def test_unfolding_and_folding_are_plain_slices_and_means() -> None:
-    """Against a loop."""
     random = np.random.default_rng(0)
     picture = random.random((12, 15), np.float32)
     at = np.array([[1, 1, 6, 10], [1, 2, 9, 13]], np.int32)
@@ -42,12 +39,6 @@ def test_unfolding_and_folding_are_plain_slices_and_means() -> None:
         total[r - 1 : r + 2, c - 1 : c + 2] += values[:, n].reshape(3, 3)
         count[r - 1 : r + 2, c - 1 : c + 2] += 1
     np.testing.assert_allclose(_core.fold(values, at, 3, (12, 15)), total / np.maximum(count, 1), rtol=1e-6)
-
-
-def test_a_patch_outside_the_picture_is_refused() -> None:
-    """Nothing is read beyond an array."""
-    with pytest.raises(ValueError, match="shapes"):
-        _core.unfold(np.zeros((8, 8), np.float32), np.array([[0], [4]], np.int32), 3)
 
 
 @given(st.integers(1, 300), st.integers(1, 40), st.integers(0, 2**32 - 1))
@@ -66,7 +57,6 @@ def test_moved_values_have_the_wanted_distribution(count, known, seed) -> None:
 
 
 def test_reducing_keeps_means_and_enlarging_keeps_lines() -> None:
-    """At sizes that are no multiple of the scale as well."""
     picture = np.random.default_rng(2).random((13, 10), np.float32)
     assert reduced(picture, 4).sum() * 16 == pytest.approx(picture.sum(), rel=1e-5)
     line = np.broadcast_to(np.arange(16, dtype=np.float32)[:, None], (16, 8)).copy()
@@ -75,7 +65,6 @@ def test_reducing_keeps_means_and_enlarging_keeps_lines() -> None:
 
 @pytest.mark.parametrize("scale", [1, 2])
 def test_a_smooth_picture_takes_over_the_detail_of_an_exemplar(scale) -> None:
-    """In a few turns, and one that has it already keeps it."""
     exemplar = Exemplar.of([smoke(seed, 1.5 * scale) for seed in range(4)], scale)
     smooth = reduced(smoke(9, 12.0), scale)
     like = reduced(smoke(8, 1.5 * scale), scale)

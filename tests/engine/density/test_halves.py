@@ -1,7 +1,5 @@
 """Voxels of a grid and of one half as fine, also along an odd number of them."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import ndimage
 

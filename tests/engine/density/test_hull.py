@@ -1,7 +1,5 @@
 """Where voxels lie in pictures, computed for those that are asked for, against NumPy's and SciPy's own."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -48,11 +46,6 @@ def test_places_are_those_of_the_projection(camera):
     assert places.visible.any()
 
 
-def test_no_voxels_have_no_places(camera):
-    places = project_voxels(camera, DOMAIN).places(np.zeros(DOMAIN.resolution, np.bool_))
-    assert places.rows.size == places.read(np.ones((3, 3))).size == 0
-
-
 def test_a_voxel_is_shown_where_its_nearest_pixel_is_marked(camera):
     rows, columns, visible = _expected(camera)
     marked = np.random.default_rng(1).random(SIZE[::-1]) < 0.5
@@ -85,14 +78,6 @@ def test_one_pictures_hull_is_the_common_one():
     assert 0 < hull.sum() < projection.visible.sum()
     np.testing.assert_array_equal(common_hull([mask], [projection]), hull)
     np.testing.assert_array_equal(common_hull([mask, mask], [projection, projection]), hull)
-
-
-def test_a_map_refuses_what_does_not_fit():
-    projection = project_voxels(CAMERAS["in front"], DOMAIN)
-    with pytest.raises(ValueError, match="belong together"):
-        projection.places(np.ones((3, 3, 3), np.bool_))
-    with pytest.raises(ValueError, match="belong together"):
-        projection.shown(np.ones((3, 3), np.bool_))
 
 
 def test_what_is_outside_the_marked_voxels_is_zero() -> None:

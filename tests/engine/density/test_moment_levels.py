@@ -1,7 +1,5 @@
 """A moment on a grid half as fine, and what was found there on the finer one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -42,10 +40,6 @@ def level(shot: Shot) -> Level:
     return Level(estimate.views, estimate.inside)
 
 
-def test_small_smoke_has_no_coarser_grid(shot) -> None:
-    assert level(shot).coarser is None
-
-
 def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
     fine = level(shot)
     coarser = fine.coarser
@@ -60,7 +54,6 @@ def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
 
 
 def test_what_stays_there_stays_here(shot, large) -> None:
-    """To rounding; a factor is carried over, and what the finer grid holds of its own stays."""
     fine = level(shot)
     coarser = fine.coarser
     assert coarser is not None
@@ -88,28 +81,7 @@ def test_a_blur_on_the_coarser_grid_is_about_the_same(shot, monkeypatch: pytest.
     np.testing.assert_allclose(seen, wanted, rtol=0.02)
 
 
-def test_values_between_middles_are_linear(shot, large) -> None:
-    fine = level(shot)
-    coarser = fine.coarser
-    assert coarser is not None
-    ramp = np.broadcast_to(2 * np.arange(16, dtype=np.float32) + 0.5, (12, 12, 16))
-    inner = coarser.finer(np.ascontiguousarray(ramp), fine)
-    heights = np.nonzero(fine.views.hull)[2]
-    within = (heights > heights.min() + 1) & (heights < heights.max() - 1)
-    np.testing.assert_allclose(inner[within], heights[within], atol=1e-5)
-
-
-def test_expected_smoke_is_the_same(shot, monkeypatch: pytest.MonkeyPatch) -> None:
-    """But for few voxels at its edge."""
-    before = level(shot).views.hull
-    monkeypatch.setattr(expecting, "MIN_COARSENED_VOXELS", 2500)
-    after = level(shot).views.hull
-    assert np.count_nonzero(after != before) < 0.01 * np.count_nonzero(before)
-
-
 def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the same seed is the same smoke."""
-
     def fitted() -> tuple[np.ndarray, float]:
         views = ViewSet.of(shot.observe(1), shot.optics, 1)
         found = GradientFit().fit(views, DetailedDepth(RoundDepth()).of_clip(shot).estimate(views), None)

@@ -1,7 +1,5 @@
 """The profile of smoke in depth, as compiled for millions of voxels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Smoke that wanders in depth: by how much, that it travels, and what stays as it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

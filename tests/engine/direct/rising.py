@@ -1,7 +1,5 @@
 """Smoke that rises above a floor from a round inlet, made by a simulation whose physics is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

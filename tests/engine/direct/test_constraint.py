@@ -1,7 +1,5 @@
 """The projection with given faces: obstacles, and what is known of a flow."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from smokelift.direct import Ball, complete_velocity

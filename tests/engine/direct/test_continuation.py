@@ -1,7 +1,5 @@
 """Sequences that go on: what is kept, what is added, and how a run is resumed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -55,7 +53,6 @@ def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
 
 
 def test_fire_goes_on_and_fades_with_the_smoke(tmp_path):
-    """A stopped run goes on with it; retimed and looped it stays too."""
     write_plume(tmp_path / "source", 6, burning=True)
     burning = open_source(tmp_path / "source")
     whole, stopped = run_twice(burning, tmp_path, Continuation(3, fade=2), 8)
@@ -72,7 +69,6 @@ def test_fire_goes_on_and_fades_with_the_smoke(tmp_path):
 
 
 def test_sides_become_walls(source, tmp_path):
-    """No air goes through them any more, and a resumed run has them too."""
     walls = ("x-", "x+", "y-", "y+", "z+")
     for number, _ in continue_sequence(source, tmp_path / "shut", Continuation(4, closed=walls), npz=True):
         if number == 12:

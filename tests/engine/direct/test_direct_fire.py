@@ -1,7 +1,5 @@
 """Fire after its clip."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,17 +10,6 @@ from smokelift.direct.burning import Fire, fit_fire
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
 from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume
-
-
-def test_fire_goes_on_as_in_the_clip():
-    """It is fed where it was, rises and burns out."""
-    clip = plume(burning=True)
-    simulation = fit_simulation(clip[:10], DT)
-    assert simulation.fire is not None
-    assert simulation.fire.remaining == pytest.approx(LEFT, rel=0.05)
-    found, true = course(simulation, clip[9], 4)[-1].flame, clip[13].flame
-    assert found.sum() == pytest.approx(true.sum(), rel=0.05)
-    assert np.linalg.norm(found - true) < 0.15 * np.linalg.norm(true)
 
 
 def test_fire_without_fuel_burns_out():
@@ -38,10 +25,6 @@ def test_nothing_burns_in_an_obstacle():
     clip = plume(burning=True)
     after = fit_simulation(clip, DT, surroundings=around).next(clip[-1], 1)
     assert not after.flame[ball.voxels(DOMAIN)].any()
-
-
-def test_smoke_without_fire_gets_none():
-    assert course(fit_simulation(plume(), DT), plume()[-1], 1)[-1].flame is None
 
 
 def test_the_feed_makes_no_more_fire_than_the_clip_has() -> None:

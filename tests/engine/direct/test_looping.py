@@ -1,21 +1,17 @@
 """Loops: what they keep, and their seam."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from smokelift.direct import Moment, loop_sequence, open_source, steady_part
+from smokelift.direct import Moment, loop_sequence, open_source
 from smokelift.direct.looping import mix_by_edges, seam
 from smokelift.output.sequence import Sequence
-from smokelift.output.writer import SequenceWriter
 from smokelift.scene import SIDES
 from smokelift.transport import Velocity
-from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob, plume, write_plume
+from tests.engine.direct.rising import DOMAIN, DT, blob, write_plume
 
 
 def test_a_seam_moves_a_shape_instead_of_fading_it():
-    """Half way there is one blob half way, and the velocity says that it goes there."""
     way = 4 * DOMAIN.voxel_size
     still = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",))
     end, start = (Moment(blob((x, 0, 1), 0.25), still) for x in (-way / 2, way / 2))
@@ -45,25 +41,6 @@ def test_smoke_that_one_end_has_alone_goes_by_its_edges():
     assert mix_by_edges(both + high, both, 0.2, SIDES)[:, :, -1].max() > 0.5 * high.max()
     nothing = np.zeros_like(both)
     assert not mix_by_edges(nothing, nothing, 0.5).any()
-
-
-def test_the_part_is_where_the_smoke_is_steady(tmp_path):
-    """Smoke that rises first and stands then."""
-    with SequenceWriter(tmp_path / "smoke", SCENE, {}, npz=True) as writer:
-        for number in range(1, 25):
-            moment = at_rest(blob((0.0, 0.0, 0.5 + 0.15 * min(number, 10)), 0.3))
-            writer.write(number, moment.density, moment.velocity.faces)
-    source = open_source(tmp_path / "smoke")
-    first, last = steady_part(source)
-    assert 4 <= first <= 10
-    assert last == 24
-    assert steady_part(source, 12) == (1, 24)
-
-
-def test_without_smoke_there_is_nothing_to_carry():
-    empty = Moment(np.zeros(DOMAIN.shape, np.float32), plume()[0].velocity)
-    found = seam(empty, plume()[0], 0.5, DT)
-    assert found.density.sum() == pytest.approx(plume()[0].density.sum() / 2, rel=1e-4)
 
 
 def test_a_loop_ends_where_it_begins(tmp_path):

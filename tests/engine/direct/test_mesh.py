@@ -1,15 +1,11 @@
 """Meshes as obstacles: which voxels they enclose, and the files they come from."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Box, Continuation, Mesh, continue_sequence, open_source
+from smokelift.direct import Ball, Box, Mesh
 from smokelift.direct.mesh import HEADER, RECORD
-from smokelift.output.index import SequenceError
-from smokelift.output.sequence import Sequence
-from tests.engine.direct.rising import DOMAIN, write_plume
+from tests.engine.direct.rising import DOMAIN
 
 CUBE = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4)]
 CUBE += [(1, 5, 7), (1, 7, 3)]
@@ -46,7 +42,6 @@ def written(path, triangles) -> None:
 
 
 def test_a_cube_is_the_box_of_its_corners():
-    """Also where its faces and diagonals go through the centres of voxels."""
     for low, high in (((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1)), ((-0.4375, -0.5625, 0.5625), (0.4375, 0.5625, 1.4375))):
         inside, wanted = Mesh(cube(low, high)).voxels(DOMAIN), Box(low, high).voxels(DOMAIN)
         at_faces = Box([v + 0.01 for v in low], [v - 0.01 for v in high]).voxels(DOMAIN)
@@ -56,7 +51,6 @@ def test_a_cube_is_the_box_of_its_corners():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_round_mesh_is_a_ball(turned):
-    """Whichever way its triangles turn."""
     triangles = ball((0.1, -0.05, 1.4), 0.6)
     inside = Mesh(triangles[:, ::-1] if turned else triangles).voxels(DOMAIN)
     wanted = Ball((0.1, -0.05, 1.4), 0.6).voxels(DOMAIN)
@@ -64,7 +58,6 @@ def test_a_round_mesh_is_a_ball(turned):
 
 
 def test_parts_of_a_mesh_may_overlap_and_leave_the_box():
-    """What two parts share is solid, and nothing leaks out of what is cut off by the box."""
     triangles = np.concatenate([cube((-0.5, -0.5, -1), (0.3, 0.5, 1)), cube((-0.1, -0.3, 0.5), (5, 0.3, 2))])
     inside = Mesh(triangles).voxels(DOMAIN)
     wanted = Box((-0.5, -0.5, -1), (0.3, 0.5, 1)).voxels(DOMAIN) | Box((-0.1, -0.3, 0.5), (5, 0.3, 2)).voxels(DOMAIN)
@@ -72,7 +65,6 @@ def test_parts_of_a_mesh_may_overlap_and_leave_the_box():
 
 
 def test_a_mesh_with_a_hole_works_and_a_plane_is_refused():
-    """A few triangles of a round mesh are missing; a plane encloses nothing."""
     triangles = ball((0, 0, 1.5), 0.6)
     holed = Mesh(np.delete(triangles, slice(300, 306), axis=0)).voxels(DOMAIN)
     assert (holed ^ Mesh(triangles).voxels(DOMAIN)).sum() < 0.02 * holed.sum()
@@ -82,7 +74,6 @@ def test_a_mesh_with_a_hole_works_and_a_plane_is_refused():
 
 
 def test_an_stl_file_is_read_as_it_was_written(tmp_path):
-    """To the bit; what is no such file is refused in one sentence."""
     triangles = cube((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1))
     path = tmp_path / "cube.stl"
     written(path, triangles)
@@ -98,27 +89,3 @@ def test_an_stl_file_is_read_as_it_was_written(tmp_path):
     for missing in (tmp_path, tmp_path / "none.stl"):
         with pytest.raises(ValueError, match="is no file"):
             Mesh.read(missing)
-
-
-def test_smoke_goes_around_a_mesh(tmp_path):
-    """It is empty inside, and a run that goes on has to have the same mesh, wherever its file is."""
-    write_plume(tmp_path / "source")
-    source = open_source(tmp_path / "source")
-    mesh = Mesh(ball((0, 0, 1.4), 0.4))
-    out = tmp_path / "out"
-    for number, _ in continue_sequence(source, out, Continuation(4, obstacles=(mesh,)), npz=True):
-        if number == 12:
-            break
-    with pytest.raises(SequenceError, match="begun differently"):
-        next(
-            continue_sequence(
-                source, out, Continuation(4, obstacles=(Mesh(ball((0, 0, 1.3), 0.4)),)), npz=True, resume=True
-            )
-        )
-    for _, figures in continue_sequence(source, out, Continuation(4, obstacles=(mesh,)), npz=True, resume=True):
-        assert figures["divergence"] < 3e-3
-    made = Sequence.open(out)
-    assert made.complete
-    density, inside = made.density(14), mesh.voxels(made.scene.domain)
-    assert not density[inside].any()
-    assert density[~inside].any()

@@ -1,7 +1,5 @@
 """Clips whose background and smoke are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,21 +1,18 @@
 """Clips: every frame is the right one, upright, in the right colours; what cannot be read is said."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
-from av.video.reformatter import Interpolation
 from PIL import Image
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
-from smokelift.footage.stored_picture import CodedPicture, StoredPicture
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
@@ -155,32 +152,6 @@ def test_the_colour_range_is_honoured_and_rounding_is_unbiased(tmp_path: Path, f
     assert abs(np.mean(found - exact)) < 0.05
 
 
-@pytest.mark.parametrize(("name", "codec", "pixels"), [("c.mkv", "ffv1", "yuv420p"), ("c.mp4", "libx264", "yuvj422p")])
-def test_codes_are_those_that_ffmpeg_writes_as_pixels(tmp_path: Path, name: str, codec: str, pixels: str) -> None:
-    """They are taken from planes, which it writes in other code."""
-    random = np.random.default_rng(0)
-    pictures = [random.integers(0, 255, (50, 102, 3), np.uint8, endpoint=True)]
-    path = encode(tmp_path / name, pictures, codec=codec, pixels=pixels)
-    exact = Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
-    with av.open(str(path)) as file:
-        frame = next(file.decode(video=0))
-    video = Video(path, None)
-    expected = frame.reformat(102, 50, "rgb24", interpolation=int(Interpolation.BICUBIC | exact)).to_ndarray()
-    picture = video.read(0)
-    assert isinstance(picture, CodedPicture)
-    assert np.array_equal(picture.codes, expected)
-    video.close()
-
-
-def test_10_bits_are_kept(tmp_path: Path) -> None:
-    values = (np.arange(64, dtype=np.uint16) * 257 + 20000)[None, :, None].repeat(16, 0).repeat(3, 2)
-    path = encode(tmp_path / "a.mkv", [values], codec="ffv1", pixels="yuv444p10le", given="rgb48le")
-    found = Clip.open(path, transfer="linear").frame(0)[8, :, 1]
-    assert len(np.unique(found)) > 50
-    # FFmpeg's converter takes 255 * 256 for white when it writes 10 bits
-    np.testing.assert_allclose(found, values[8, :, 1] / 65280, atol=1.5 / 1023)
-
-
 def test_alpha_is_shown_over_black(tmp_path: Path) -> None:
     rgba = np.full((16, 16, 4), 255, np.uint8)
     rgba[:, :8, 3] = 51
@@ -201,11 +172,6 @@ def test_rotated_clips_are_upright(tmp_path: Path, rotation: int | None) -> None
         np.testing.assert_allclose(linear_to_srgb(clip.frame(1)), wanted / 255, atol=0.02)
 
 
-def test_odd_sizes(tmp_path: Path) -> None:
-    path = encode(tmp_path / "a.mp4", [flat(90, 35, 17)] * 2, pixels="yuv444p")
-    assert Clip.open(path).size == (35, 17)
-
-
 def test_a_varying_rate_is_evened_out(tmp_path: Path) -> None:
     # Ten frames; the first five last four times as long as the others.
     times = [0, 40, 80, 120, 160, 200, 210, 220, 230, 240]
@@ -215,24 +181,6 @@ def test_a_varying_rate_is_evened_out(tmp_path: Path) -> None:
         assert clip.fps == pytest.approx(240 / step)
         shown = [max(k for k, t in enumerate(times) if t <= n * step + 0.5) for n in range(10)]
         assert near(codes(clip), [LEVELS[k] for k in shown])
-
-
-def test_a_frame_through_a_function_is_the_function_of_the_frame(tmp_path: Path) -> None:
-    """Of a video, whose integers have a table, and of pictures with alpha, which have none."""
-    random = np.random.default_rng(0)
-    noisy = [random.integers(0, 256, (16, 32, 3), np.uint8) for _ in range(2)]
-    video = encode(tmp_path / "noisy.mp4", noisy)
-    Image.fromarray(random.integers(0, 256, (16, 32, 4), np.uint8)).save(tmp_path / "alpha.png")
-    for path in (video, tmp_path / "alpha.png"):
-        with Clip.open(path) as clip, Clip.open(path) as other:
-            last = len(clip) - 1
-            found = clip.stored(last).through(linear_to_srgb)
-            assert found.dtype == np.float32
-            assert np.array_equal(found, linear_to_srgb(other.frame(last)))
-            some = clip.stored(last).cut(lambda picture: picture[3:9, ::2]).through(linear_to_srgb)
-            assert np.array_equal(some, found[3:9, ::2])
-            with pytest.raises(ClipError, match="no frame"):
-                clip.stored(last + 1)
 
 
 def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,82 +198,6 @@ def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch
             list(shown)
         assert sorted(read) == list(range(len(clip)))
         assert float(brighter.frame(3).min()) >= 1
-
-
-def test_what_is_expected_is_kept_while_damage_is_looked_for(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As much of it as there is memory for, what comes first before the rest."""
-    with Clip.open(ramp) as clip:
-        frames = [clip.frame(n) for n in (2, 5)]
-        size = clip.stored(0).nbytes
-    read: list[int] = []
-    decode = Video._decode
-    monkeypatch.setattr(Video, "_decode", lambda video, index: read.append(index) or decode(video, index))
-    with Clip.open(ramp) as clip:
-        first = clip.part(1, 7)
-        first.expect([1, 4, 20])
-        assert first.damaged == ()
-        read.clear()
-        assert np.array_equal(first.frame(1), frames[0])
-        assert np.array_equal(clip.frame(5), frames[1])
-        assert read == []
-        clip.frame(8)  # which the part does not have
-        first.expect()
-        clip.frame(6)
-        assert read == [8, 6]
-    monkeypatch.setattr("smokelift.footage.kept_frames.DECODED_BYTES", size)
-    with Clip.open(ramp) as clip:
-        clip.expect([5, 3])
-        assert clip.damaged == ()
-        read.clear()
-        clip.frame(5)
-        clip.frame(3)
-        assert read == [3]
-
-
-def test_a_part_is_averaged_as_of_the_linear_frame(tmp_path: Path) -> None:
-    random = np.random.default_rng(5)
-    path = encode(tmp_path / "noisy.mp4", random.integers(0, 256, (3, 32, 64, 3), np.uint8))
-    with Clip.open(path) as clip, Clip.open(path) as other:
-        whole = other.frame(1)
-        for shown in (clip, clip.changed(lambda _, picture: picture / 1, lambda n, _: n == 1), other):
-            found = shown.stored(1).cut(lambda picture: picture[3:20, 7:50]).averaged(9, 5)
-            assert np.array_equal(found, area_average(whole[3:20, 7:50], 9, 5))
-
-
-def test_a_frame_that_a_change_leaves_as_it_is_stays_so(tmp_path: Path) -> None:
-    with Clip.open(encode(tmp_path / "two.mp4", [flat(50), flat(90)])) as clip:
-        seen = []
-
-        def keeps(number: int, tiny: Callable[[], Picture]) -> bool:
-            seen.append(tiny().shape)
-            return float(tiny().mean()) < 0.05
-
-        changed = clip.changed(lambda _, picture: 2 * picture, keeps)
-        assert np.array_equal(changed.frame(0), clip.frame(0))
-        assert np.array_equal(changed.frame(1), 2 * clip.frame(1))
-        assert set(seen) == {(16, 32, 3)}
-
-
-def test_decoding_goes_on_from_where_damage_was_looked_for(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What follows is the right frame, and no earlier one is decoded again."""
-    with Clip.open(ramp, frames=(0, 9)) as clip:
-        assert clip.damaged == ()
-        monkeypatch.setattr(Video, "_frames", None)
-        found = clip.whole().frame(13)
-    monkeypatch.undo()
-    with Clip.open(ramp) as other:
-        assert np.array_equal(found, other.frame(13))
-
-
-def test_what_is_expected_of_pictures_is_kept(tmp_path: Path) -> None:
-    for n in range(3):
-        write_image(tmp_path / f"a{n}.png", np.full((8, 16, 3), 0.1 * n, np.float32))
-    with Clip.open(tmp_path / "a#.png", fps=24) as clip:
-        clip.expect([2])
-        assert clip.damaged == ()
-        for n in range(3):
-            (tmp_path / f"a{n}.png").unlink()
-        assert clip.frame(2).mean() == pytest.approx(0.2, abs=0.01)
 
 
 def test_a_range_of_frames(ramp: Path) -> None:
@@ -384,24 +256,6 @@ def test_a_truncated_clip_offers_what_is_there(tmp_path: Path, name: str) -> Non
         Clip.open(whole)
 
 
-def test_longer_sound_is_no_truncation(tmp_path: Path) -> None:
-    silent = encode(tmp_path / "silent.mkv", [flat(v) for v in LEVELS[:6]])
-    with av.open(str(silent)) as video, av.open(str(tmp_path / "a.mkv"), "w") as out:
-        picture = out.add_stream_from_template(video.streams.video[0])
-        sound = out.add_stream("aac", rate=44100)
-        for packet in video.demux(video=0):
-            if packet.size:
-                packet.stream = picture
-                out.mux(packet)
-        for n in range(60):
-            frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), "fltp", "mono")
-            frame.sample_rate, frame.pts = 44100, 1024 * n
-            out.mux(sound.encode(frame))
-        out.mux(sound.encode())
-    with Clip.open(tmp_path / "a.mkv") as clip:
-        assert (len(clip), clip.warning) == (6, None)
-
-
 def blanked(path: Path, frames: Sequence[int]) -> Path:
     """Put zeros where the coded frames of some numbers are."""
     with av.open(str(path)) as container:
@@ -425,15 +279,6 @@ def test_a_damaged_frame_is_as_one_that_a_camera_dropped(tmp_path: Path, broken:
         changed = clip.changed(lambda n, picture: picture * (n == broken[0]))
         assert codes_of(changed, broken[0]) == 0
     assert changed.damaged == tuple(broken)  # known after the file is closed
-
-
-def test_a_clip_that_is_mostly_damaged_is_refused(tmp_path: Path) -> None:
-    path = encode(tmp_path / "a.mov", [flat(v) for v in LEVELS[:6]], codec="png", pixels="rgb24")
-    with (
-        Clip.open(blanked(path, [1, 2, 3, 4])) as clip,
-        pytest.raises(ClipError, match="4 of its 6 frames are"),
-    ):
-        clip.remarks()
 
 
 def wide_codes(path: Path, planes: Sequence[int], codec: str = "ffv1", **tags: int) -> Path:
@@ -464,15 +309,6 @@ def test_hlg_pq_and_linear_video(tmp_path: Path, transfer: int, luma: float, lin
         assert (Remark("high dynamic range", {"transfer": "HLG"}) in clip.notes) == (transfer == 18)
 
 
-def test_colours_of_bt_2020_are_brought_to_bt_709(tmp_path: Path) -> None:
-    # BT.709's red in linear BT.2020 (BT.2087): 0.6274, 0.0691, 0.0164; luma and chroma of it by BT.2020's matrix
-    r, g, b = (linear_to_srgb(v) for v in (0.6274, 0.0691, 0.0164))
-    y = 0.2627 * r + 0.6780 * g + 0.0593 * b
-    planes = [64 + 876 * y, 512 + 896 * (b - y) / 1.8814, 512 + 896 * (r - y) / 1.4746]
-    path = wide_codes(tmp_path / "a.mkv", [round(float(v)) for v in planes], color_primaries=9, colorspace=9)
-    np.testing.assert_allclose(Clip.open(path).frame(0)[8, 8], [1.0, 0.0, 0.0], atol=0.01)
-
-
 @pytest.mark.parametrize("shape", [Fraction(2, 1), Fraction(3, 4)])
 def test_anamorphic_pixels_become_square(tmp_path: Path, shape: Fraction) -> None:
     picture = np.zeros((48, 64, 3), np.uint8)
@@ -494,7 +330,6 @@ def test_anamorphic_pixels_become_square(tmp_path: Path, shape: Fraction) -> Non
 
 
 def test_interlaced_video_is_of_one_moment(tmp_path: Path) -> None:
-    """The odd lines show a later moment: none of it may be left."""
     picture = np.zeros((64, 64, 3), np.uint8)
     picture[::2] = np.linspace(40, 200, 32)[:, None, None]
     picture[1::2, :, 0] = 250
@@ -510,18 +345,6 @@ def test_interlaced_video_is_of_one_moment(tmp_path: Path) -> None:
         found = linear_to_srgb(clip.frame(0)[:63, 32]) * 255
         lines = np.interp(np.arange(63), np.arange(0, 64, 2), picture[::2, 0, 0])
         np.testing.assert_allclose(found, lines[:, None].repeat(3, 1), atol=2.5)
-
-
-def test_huge_pictures_are_reduced(tmp_path: Path) -> None:
-    picture = np.zeros((16, 5000), np.uint8)
-    picture[:, 2500:] = 200
-    path = encode(tmp_path / "a.mkv", [picture], codec="ffv1", pixels="gray", given="gray")
-    Image.fromarray(picture).save(tmp_path / "a.png")
-    for file in (path, tmp_path / "a.png"):
-        with Clip.open(file) as clip:
-            assert clip.size == (2500, 8)
-            assert [note.figures["size"] for note in clip.notes] == [(5000, 16)]
-            np.testing.assert_allclose(linear_to_srgb(clip.frame(0)[4, [1240, 1260], 1]) * 255, [0, 200], atol=1.1)
 
 
 def pictures(folder: Path, numbers: Sequence[int], suffix: str = "png") -> None:
@@ -545,16 +368,6 @@ def test_picture_sequences(tmp_path: Path) -> None:
         assert codes(clip) == [20]
     Image.fromarray(flat(77)).save(tmp_path / "still.png")
     assert codes(Clip.open(tmp_path / "still.png")) == [77]
-
-
-def test_a_name_may_hold_the_sign_of_a_pattern(tmp_path: Path) -> None:
-    encode(tmp_path / "take #1.mp4", [flat(70)])
-    pictures(tmp_path, [1, 2])
-    for n in (1, 2):
-        (tmp_path / f"frame_000{n}.png").rename(tmp_path / f"take #1 {n:02d}.png")
-    for name, levels in (("take #1.mp4", [70]), ("take #1 ##.png", [10, 20]), ("take #1 01.png", [10, 20])):
-        with Clip.open(tmp_path / name, fps=24) as clip:
-            assert near(codes(clip), levels)
 
 
 def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """How files encode light: the curves and matrices of the standards."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The gain of a frame against its background."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from films import HEIGHT, WIDTH, puff, wall
@@ -12,22 +10,13 @@ GAINS = np.array([1.3, 1.0, 0.8], np.float32)
 
 
 def test_a_gain_is_found_beside_smoke() -> None:
-    """A puff over a part of the picture does not disturb the gain of the rest, one a channel."""
     behind = wall(0.3, 0.7).astype(np.float32)
     alpha = puff(12)[..., None]
     seen = (behind * (1 - alpha) + 0.4 * alpha) * GAINS
     np.testing.assert_allclose(gain_of(seen.astype(np.float32), behind), GAINS, rtol=0.01)
 
 
-@pytest.mark.parametrize("channel", range(3))
-def test_a_gain_of_one_channel_is_seen(channel: int) -> None:
-    behind = wall(0.3, 0.7).astype(np.float32)
-    gains = np.where(np.arange(3) == channel, 0.8, 1).astype(np.float32)
-    np.testing.assert_allclose(gain_of(behind * gains, behind), gains, rtol=0.01)
-
-
 def test_smoke_is_no_gain() -> None:
-    """Before black nothing tells a gain, and smoke over most of a steady picture is none."""
     black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     assert (gain_of(black + 0.3, black) == 1).all()
     behind = wall(0.3, 0.7).astype(np.float32)
@@ -36,7 +25,6 @@ def test_smoke_is_no_gain() -> None:
 
 
 def test_a_flash_has_its_own_gain() -> None:
-    """It changes the gain of no other frame."""
     frames = np.repeat(wall(0.2, 0.4).astype(np.float32)[None], 9, 0)
     frames[4] *= 3
     gains = sample_gains(frames)
@@ -46,7 +34,6 @@ def test_a_flash_has_its_own_gain() -> None:
 
 @pytest.mark.parametrize(("value", "shown"), [(0.0, False), (0.002, False), (0.2, True), (1.0, False)])
 def test_black_and_white_show_no_exposure(value: float, shown: bool) -> None:
-    """A logo in a corner does."""
     background = np.full((40, 60, 3), value, np.float32)
     assert shows_exposure(background) is shown
     background[:6, :6] = 0.3

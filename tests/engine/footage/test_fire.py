@@ -5,10 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.footage import fire
 from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
-from smokelift.footage.matte import matte
 from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 
@@ -36,7 +34,6 @@ def test_a_flame_in_dark_smoke_is_fire() -> None:
 
 
 def test_a_core_that_is_clipped_to_yellow_is_no_bright_smoke() -> None:
-    """It has lost the color of fire, and says nothing of the smoke's."""
     overexposed = 8 * np.array(FLAME)
     seen, _ = pixels(flame=overexposed)
     assert (seen.min(-1) > 0.5).any()
@@ -45,11 +42,7 @@ def test_a_core_that_is_clipped_to_yellow_is_no_bright_smoke() -> None:
 
 @pytest.mark.parametrize(
     "what",
-    [
-        {"flame": np.zeros(3)},
-        {"smoke": np.array((0.9, 0.45, 0.1)), "flame": np.zeros(3)},
-        {"flame": np.ones(3)},
-    ],
+    [{"flame": np.zeros(3)}, {"smoke": np.array((0.9, 0.45, 0.1)), "flame": np.zeros(3)}, {"flame": np.ones(3)}],
     ids=["no flame", "orange smoke", "white light"],
 )
 def test_what_is_no_fire(what) -> None:
@@ -70,16 +63,11 @@ def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:
 
 
 def test_what_is_added_to_the_background_counts() -> None:
-    """Flames before land are fire, and a sky as red as they is not."""
     sky, land = np.full((90, 3), 0.45, np.float32), np.full((10, 3), 0.02, np.float32)
     flames = np.broadcast_to(np.float32((0.95, 0.35, 0.08)), (10, 3))
     seen = np.concatenate([0.7 * sky + 0.02, flames])
     assert fire_share(seen, np.concatenate([sky, land])) == pytest.approx(0.1)
     assert fire_share(seen, np.concatenate([sky, 0.9 * flames])) == 0
-
-
-def test_nothing_is_no_fire() -> None:
-    assert fire_share(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)) == 0
 
 
 def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> None:
@@ -104,23 +92,3 @@ def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
         added = light.frame(1)
         np.testing.assert_allclose(added[44, 32], picture(1)[44, 32] - SMOKE, atol=0.045)
         assert not added[:20].any() and added.min() == 0
-
-
-def test_the_smoke_of_a_frame_is_looked_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run asks for what is left without the fire and for its light, frame by frame."""
-    for number in range(3):
-        write_image(tmp_path / f"fire_{number:02d}.exr", picture(number))
-    with Clip.open(tmp_path / "fire_##.exr") as clip:
-        dark = without_fire(clip, known_plate(np.zeros(3), clip))
-        light, asked = firelight(clip, dark), []
-        monkeypatch.setattr(fire, "matte", lambda *given: asked.append(given) or matte(*given))
-        dark.frame(2)
-        light.frame(2)
-        assert len(asked) == 1
-
-
-def test_light_that_is_clipped_all_over_has_the_colour_that_is_seen(tmp_path: Path) -> None:
-    for name, level in (("clip", 1.0), ("light", 0.8)):
-        write_image(tmp_path / f"{name}.exr", np.full((4, 4, 3), level, np.float32) * np.float32((1, 0.5, 0.25)))
-    with Clip.open(tmp_path / "clip.exr") as clip, Clip.open(tmp_path / "light.exr") as light:
-        assert fire_colour(clip, light) == pytest.approx((1, 0.5, 0.25), abs=1e-3)

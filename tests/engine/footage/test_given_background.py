@@ -1,7 +1,5 @@
 """The background that a scene gives, and what a camera sees of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +9,6 @@ from films import COUNT, HEIGHT, WIDTH, codes_apart, pan, passing_wall
 
 from smokelift.footage.given_background import background_picture, given_plates, open_plates
 from smokelift.footage.plate import ChangingPlate, Plate
-from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix
 
 CAMERA = Camera.look_at((0, -4, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
@@ -24,12 +21,6 @@ def folder(tmp_path: Path) -> Path:
         (tmp_path / name).mkdir()
         pan(tmp_path / name, passing_wall(), smoke).close()
     return tmp_path
-
-
-def test_a_background_that_is_not_given_has_no_plates(folder: Path) -> None:
-    clip = pan(folder / "clip", passing_wall(), 1.0)
-    assert given_plates(None, None, clip) is None
-    assert given_plates(Background(), None, clip) is None
 
 
 def test_a_colour_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
@@ -79,9 +70,3 @@ def test_a_colour_is_seen_by_every_camera_and_nothing_is_black() -> None:
     scene = Scene(background=Background(color=(0.1, 0.2, 0.3)))
     np.testing.assert_array_equal(background_picture(scene, CAMERA), np.float32([0.1, 0.2, 0.3]))
     np.testing.assert_array_equal(background_picture(Scene(camera=CAMERA)), np.zeros(3))
-
-
-def test_the_size_of_a_plate_is_that_of_the_camera(tmp_path: Path) -> None:
-    write_image(tmp_path / "wall.png", np.full((HEIGHT, WIDTH, 3), 0.5))
-    scene = Scene(camera=CAMERA.resized(14, 18), background=Background(image=tmp_path / "wall.png"))
-    assert background_picture(scene).shape == (18, 14, 3)

@@ -1,7 +1,5 @@
 """Alpha channels: what is behind the smoke is one colour that is known."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +26,6 @@ def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(grey: floa
     assert backdrop_of(clip) == backdrop
     shown = clip[1].before(backdrop)
     np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * grey + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
-
-
-def test_opaque_pictures_have_no_backdrop() -> None:
-    assert backdrop_of([layer(0.5, None)]) is None
-    assert backdrop_of([Layer(np.ones((2, 2, 3), np.float32), np.ones((2, 2), np.float32))]) is None
 
 
 def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The focal length that a file gives."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import av
@@ -36,9 +34,3 @@ def test_exif(tmp_path: Path, said: int | None) -> None:
         tags.get_ifd(0x8769)[0xA405] = said
     Image.new("RGB", (32, 16)).save(tmp_path / "a0.jpg", exif=tags)
     assert Clip.open(tmp_path / "a#.jpg").lens == (said or None)
-
-
-def test_files_that_say_nothing(tmp_path: Path) -> None:
-    Image.new("RGB", (32, 16)).save(tmp_path / "a.png")
-    clips = [Clip.open(film(tmp_path / "a.mp4")), Clip.open(tmp_path / "a.png")]
-    assert [clip.lens for clip in clips] == [None, None]

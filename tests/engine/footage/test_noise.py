@@ -1,7 +1,5 @@
 """The noise of a clip, measured on what cannot be smoke."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import ndimage

@@ -1,7 +1,5 @@
 """The plate of a background that is known, once or frame by frame."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,7 +59,6 @@ def test_a_plate_for_every_frame(tmp_path: Path) -> None:
 
 
 def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
-    """A part of the clip has that part of the plates; too few are refused."""
     for name in ("clip", "plate"):
         (tmp_path / name).mkdir()
     wide = passing_wall()
@@ -88,17 +85,3 @@ def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> No
             mask = matte(picture, known).mask
             assert mask[puff(n) > 0.5].mean() > 0.95
             assert mask[puff(n) == 0.0].mean() < 0.1
-
-
-def test_a_background_that_is_told_wrong_stays_as_it_is_told(tmp_path: Path) -> None:
-    grey = np.full((HEIGHT, WIDTH, 3), 0.02, np.float32)
-    plate = known_plate((0.0, 0.0, 0.0), film(tmp_path, grey, puff, 0.5, 1.0))
-    assert codes_apart(plate.image, np.zeros_like(grey)).max() < 2
-
-
-def test_detailed_smoke_over_most_of_the_picture_is_no_noise(tmp_path: Path) -> None:
-    """It brightens black pixels, and neighbours differ; but some pixels show the black as it is given."""
-    texture = np.random.default_rng(0).uniform(0.2, 1.0, (HEIGHT, WIDTH))
-    texture[:, : WIDTH // 5] = 0
-    plate = known_plate((0.0, 0.0, 0.0), film(tmp_path, np.zeros((HEIGHT, WIDTH, 3)), lambda n: texture, 0.5, 0.0))
-    assert not plate.image.any()

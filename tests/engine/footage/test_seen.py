@@ -1,7 +1,5 @@
 """Quantiles over time of what is seen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,6 @@ def test_quantiles_are_those_of_numpy(shape: tuple[int, ...]) -> None:
 
 
 def test_what_is_not_seen_counts_for_nothing() -> None:
-    """Nor does it change what is seen elsewhere."""
     values = np.random.default_rng(0).random((7, 5, 6), np.float32)
     values[2:4, :, 1] = np.nan
     values[:, 0, 0] = np.nan
@@ -33,9 +30,3 @@ def test_what_is_not_seen_counts_for_nothing() -> None:
             if seen.size:
                 expected[place] = np.quantile(seen, share)
         np.testing.assert_allclose(quantile_of_seen(values, share), expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize("rank", [-1, 4])
-def test_only_ranks_that_there_are_can_be_asked_for(rank: int) -> None:
-    with pytest.raises(ValueError, match="belong together"):
-        _core.at_ranks(np.zeros((4, 2), np.float32), [0, rank])

@@ -1,7 +1,5 @@
 """Pictures as they are stored, beside the same ones in linear light."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -55,7 +53,6 @@ def test_codes_are_added_as_the_linear_picture_to_the_last_bit(dtype: type) -> N
 
 
 def test_both_kinds_are_read_and_filled_alike() -> None:
-    """What is filled in is, in codes, within one of what it should be."""
     coded = CodedPicture(np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8), code_values(255))
     linear = LinearPicture(coded.linear())
     assert coded.size == linear.size == (8, 6)

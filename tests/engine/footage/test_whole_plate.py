@@ -1,20 +1,16 @@
 """Backgrounds of large pictures, found on small ones."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 from films import codes_apart
-from PIL import Image
 
 from smokelift.checks import Remark
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Visitor
 from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
-from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.plate import Plate
 from smokelift.footage.stored_picture import CodedPicture
 
@@ -94,14 +90,6 @@ def test_a_wall_is_found_to_the_last_pixel(steps: bool) -> None:
     assert np.percentile(apart, 95) < 3
 
 
-def test_a_side_that_no_reduction_divides_is_as_right() -> None:
-    size = (SIZE[0], SIZE[1] + 13)
-    truth = wall(size)
-    plate = found(film(truth, size=size))
-    assert plate.image.shape == truth.shape
-    assert np.median(codes_apart(plate.image, truth)[plate.confidence > 0.5]) < 0.8
-
-
 def test_what_smoke_never_leaves_keeps_the_detail_that_shows_through() -> None:
     truth = wall()
     plate = found(film(truth, column=True))
@@ -119,33 +107,3 @@ def test_what_smoke_never_leaves_keeps_the_detail_that_shows_through() -> None:
 @pytest.mark.parametrize("codes", [1.0, 6.0])
 def test_noise_is_that_of_whole_pictures(codes: float) -> None:
     np.testing.assert_allclose(255 * found(film(wall(), noise=codes)).noise.white, codes, rtol=0.15)
-
-
-def test_noise_and_wall_are_those_of_what_a_mask_leaves(tmp_path: Path) -> None:
-    """What it hides is continued without any noise, and is most of the picture."""
-    truth = wall()
-    values = np.zeros(SIZE, np.uint8)
-    values[:, :250] = 255
-    Image.fromarray(values).save(tmp_path / "mask.png")
-    masked = Masked(film(truth, noise=4.0)._source, Mask(tmp_path / "mask.png", 0, COUNT - 1))
-    plate = found(Clip(Path("film"), masked, 24.0, None, masked=masked))
-    np.testing.assert_allclose(255 * plate.noise.total, 4.0, rtol=0.35)
-    known = plate.confidence > 0.5
-    assert known[:, :240].mean() > 0.9
-    assert not known[:, 260:].any()
-    assert np.median(codes_apart(plate.image, truth)[:, :240][known[:, :240]]) < 2
-
-
-def test_one_colour_is_told_with_what_stands_before_it() -> None:
-    behind = np.full((*SIZE, 3), 0.02, np.float32)
-    random = np.random.default_rng(2)
-    logo = np.s_[20:60, 1200:1280]
-    behind[logo] = random.uniform(0.1, 0.4, (40, 80, 3))
-    backdrop = find_backdrop(film(behind), None, None)
-    assert backdrop.source == "colour"
-    plate = backdrop.plates.at(0)
-    assert (plate.confidence == 1).all()
-    assert np.median(codes_apart(plate.image, behind)[logo]) < 2
-    colour = plate.image[0, 0]
-    assert codes_apart(colour[None, None], behind[:1, :1])[0, 0] < 0.5
-    assert (plate.image[:, :1150] == colour).all()

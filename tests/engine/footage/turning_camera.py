@@ -1,7 +1,5 @@
 """Clips of a camera that turns before a wall, with smoke in front of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the tests of the output share."""
 
-from __future__ import annotations
-
 import pytest
 
 from smokelift.output import vdb, writer

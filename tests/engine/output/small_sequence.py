@@ -1,7 +1,5 @@
 """A sequence of a few voxels, made up of noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -10,8 +8,10 @@ import numpy as np
 import pytest
 
 from smokelift.output import vdb
+from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed
+from smokelift.transport import Velocity
 
 SCENE = completed(
     Scene(
@@ -39,6 +39,16 @@ def write(directory: Path, numbers: Iterable[int], *, npz: bool = True, **option
     with SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer:
         for number in numbers:
             writer.write(number, *frame(number), {"loss": 1.0 / number})
+
+
+def at_rest(scene: Scene, densities: Iterable[np.ndarray], directory: Path) -> Sequence:
+    """Volumes without motion as a finished sequence."""
+    assert scene.domain is not None
+    rest = Velocity.zero(scene.domain.resolution, scene.domain.voxel_size).faces
+    with SequenceWriter(directory, completed(scene), {}, npz=True) as writer:
+        for number, density in enumerate(densities, 1):
+            writer.write(number, density, rest)
+    return Sequence.open(directory)
 
 
 def names(directory: Path) -> list[str]:

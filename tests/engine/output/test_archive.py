@@ -1,7 +1,5 @@
 """Reading archives: a damaged file, or one that lies about its size, ends in one sentence."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path
@@ -81,7 +79,6 @@ def test_what_is_no_archive_of_ours_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_any_damage_gives_the_arrays_or_an_error(tmp_path: Path, kind: int) -> None:
-    """Bytes are flipped, one after the other and several at once."""
     path = tmp_path / "a.npz"
     zipped(path, saved(DENSITY), kind)
     sound, random = path.read_bytes(), np.random.default_rng(2)
@@ -98,15 +95,3 @@ def test_any_damage_gives_the_arrays_or_an_error(tmp_path: Path, kind: int) -> N
         else:
             np.testing.assert_array_equal(found, DENSITY)
     assert refused > 100
-
-
-def test_other_arrays_are_read_up_to_a_size(tmp_path: Path) -> None:
-    path = tmp_path / "a.npz"
-    write_arrays(
-        path, {"density": DENSITY, "extra_gain": np.float64(2), "extra_half": DENSITY[::2], "note": np.ones(9)}
-    )
-    assert read_arrays(path, {"density": SHAPE}).keys() == {"density"}
-    found = read_arrays(path, {"density": SHAPE}, others={"extra_": SHAPE})
-    assert found.keys() == {"density", "extra_gain", "extra_half"}
-    with pytest.raises(OSError, match=r"extra_half\.npy cannot have the shape \(2, 5, 6\)"):
-        read_arrays(path, {}, others={"extra_": (1, 5, 6)})

@@ -1,7 +1,5 @@
 """Frames with boxes of their own: one sequence, in the box around all of them."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -42,7 +40,6 @@ def written(directory, boxes, npz=False) -> Sequence:
 
 @pytest.mark.parametrize("npz", [True, pytest.param(False, marks=needs_vdb)])
 def test_every_frame_is_where_it_was(tmp_path, npz):
-    """From OpenVDB and from NumPy files, whichever is read."""
     made = written(tmp_path / "out", [DOMAIN, GROWN, WHOLE], npz)
     assert [made.box(number) for number in (1, 2, 3)] == [DOMAIN, GROWN, WHOLE]
     assert made.scene.domain == WHOLE

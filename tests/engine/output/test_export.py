@@ -1,7 +1,5 @@
 """What an export leaves out, and that it does not show."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,13 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, has_vdb, needs_vdb, write
+from small_sequence import SCENE, SETTINGS, frame, needs_vdb
 
 from smokelift.output import export, vdb
-from smokelift.output.export import ExportSettings, export_sequence, export_size
+from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
+from smokelift.output.usd import UsdVolume, usd_text
 from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Domain, Medium
 
 DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction
 
@@ -74,36 +74,6 @@ def test_quantised_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: P
 
 
 @needs_vdb
-def test_fewer_grids_and_bits_make_a_smaller_export(sequence: Sequence, tmp_path: Path) -> None:
-    sizes = [
-        export_size(sequence, settings)
-        for settings in (ExportSettings(), ExportSettings("quantised"), ExportSettings("quantised", velocity=False))
-    ]
-    assert sizes == sorted(sizes, reverse=True) and len(set(sizes)) == 3
-    written = exported(sequence, tmp_path / "out", precision="quantised", velocity=False)
-    assert sum(size for _, size in written) == pytest.approx(sizes[-1], rel=0.01)
-    assert set(grids(tmp_path / "out" / "smoke_0001.vdb")) == {"density"}
-
-
-@needs_vdb
-def test_the_proxy_lies_where_the_smoke_is(sequence: Sequence, tmp_path: Path) -> None:
-    exported(sequence, tmp_path / "out", proxy=4)
-    (density,) = grids(tmp_path / "out" / "proxy_0001.vdb").values()
-    edge = DOMAIN.voxel_size
-    middle = tuple(low + 2 * edge for low in DOMAIN.min)
-    assert density.transform.voxelSize() == pytest.approx((4 * edge,) * 3)  # type: ignore[attr-defined]  # no stubs
-    assert density.transform.indexToWorld((0, 0, 0)) == pytest.approx(middle)  # type: ignore[attr-defined]  # no stubs
-
-
-@needs_vdb
-def test_an_export_takes_the_place_of_an_earlier_one(sequence: Sequence, tmp_path: Path) -> None:
-    exported(sequence, tmp_path / "out", proxy=2)
-    exported(sequence, tmp_path / "out", velocity=False)
-    assert not list((tmp_path / "out").glob("proxy_*"))
-    assert "proxy" not in (tmp_path / "out" / "smoke.usda").read_text()
-
-
-@needs_vdb
 def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> None:
     with pytest.raises(SequenceError, match=r"sequence\.json"):
         exported(sequence, sequence.directory)
@@ -118,27 +88,8 @@ def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> 
 
 
 @needs_vdb
-def test_nothing_to_export(tmp_path: Path) -> None:
-    write(tmp_path / "smoke", [])
-    with pytest.raises(SequenceError, match="no finished frame"):
-        exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out")
-
-
-@pytest.mark.skipif(has_vdb(), reason="there is an OpenVDB module")
-def test_without_a_module_it_is_said(sequence: Sequence, tmp_path: Path) -> None:
-    with pytest.raises(vdb.VdbUnavailable, match="smokelift"):
-        exported(sequence, tmp_path / "out")
-
-
-def test_a_proxy_is_coarser() -> None:
-    with pytest.raises(ValueError, match=r"1 .none. to 16"):
-        ExportSettings(proxy=0)
-
-
-@needs_vdb
 @pytest.mark.parametrize("precision", ["half", "quantised"])
 def test_fire_is_exported(tmp_path: Path, precision: str) -> None:
-    """In every frame of a clip with fire, also in those of which none is known."""
     burning = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
     flame = frame(7)[0]
     with SequenceWriter(tmp_path / "smoke", burning, SETTINGS, npz=True) as writer:
@@ -160,19 +111,7 @@ def placed(path: Path, name: str, axis: int) -> tuple[float, float]:
 
 
 @needs_vdb
-def test_files_for_blender(sequence: Sequence, tmp_path: Path) -> None:
-    """The frame rate and the units are in every grid."""
-    exported(sequence, tmp_path / "out")
-    found: dict[str, Any] = grids(tmp_path / "out" / "smoke_0001.vdb")
-    assert set(found) == {"density", "velocity"}
-    for grid in found.values():
-        assert (grid["fps"], grid["length_unit"], grid["velocity_unit"]) == (24.0, "m", "m/s")
-        assert grid["extinction"] == pytest.approx(EXTINCTION)
-
-
-@needs_vdb
 def test_files_for_houdini(sequence: Sequence, tmp_path: Path) -> None:
-    """Y is up, and the velocity is called vel and turned with the smoke."""
     exported(sequence, tmp_path / "out", host="houdini", proxy=2)
     path = tmp_path / "out" / "smoke_0002.vdb"
     assert set(grids(path)) == {"density", "vel"}
@@ -212,3 +151,34 @@ def test_files_for_unreal(sequence: Sequence, tmp_path: Path) -> None:
                 assert placed(path, name, axis) == pytest.approx((DOMAIN.min[axis], DOMAIN.max[axis]))
         density: Any = grids(path)["density"]
         assert density["extinction"] == pytest.approx(EXTINCTION * peak)
+
+
+DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12))
+
+
+def test_every_frame_has_its_file() -> None:
+    files = {3: "smoke_0003.vdb", 4: "smoke_0004.vdb"}
+    volumes = [
+        UsdVolume("Volume", "render", files, ("density", "velocity"), DOMAIN),
+        UsdVolume("Proxy", "proxy", {n: f"proxy_{n:04d}.vdb" for n in files}, ("density",), DOMAIN),
+    ]
+    text = usd_text(volumes, 23.976, Medium(5.0, 0.8, 0.1, color=(1.0, 0.5, 0.25)))
+    assert text.startswith("#usda 1.0\n")
+    for line in (
+        "startTimeCode = 3",
+        "endTimeCode = 4",
+        "timeCodesPerSecond = 23.976",
+        "double extinction = 5",
+        'uniform token purpose = "proxy"',
+        "rel field:velocity = </Smoke/Volume/velocity>",
+        "4: @./smoke_0004.vdb@,",
+        "3: @./proxy_0003.vdb@,",
+        "float3[] extent = [(-1, -1, 0), (1, 1, 3)]",
+        "rel material:binding = </Smoke/Material>",
+        "float3 inputs:in1 = (4, 2, 1)",
+        "float3 inputs:in1 = (1, 3, 4)",
+        "float inputs:anisotropy = 0.1",
+    ):
+        assert line in text
+    assert text.count("field:velocity") == 1
+    assert text.count("{") == text.count("}")

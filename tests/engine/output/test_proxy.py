@@ -1,7 +1,5 @@
 """The coarse copies for viewports: where their smoke is, which runs write them, and that they can be made later."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +8,6 @@ import pytest
 from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
 
 from smokelift.output import proxy_files, vdb, writer
-from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Domain
@@ -27,7 +24,6 @@ def test_a_coarser_box_keeps_the_mass() -> None:
 
 @needs_vdb
 def test_a_large_sequence_has_proxies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run writes them beside its frames, with the fire, and goes on in that directory."""
     monkeypatch.setattr(writer, "MIN_PROXY_VOXELS", 1)
     burning = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
     with SequenceWriter(tmp_path, burning, SETTINGS) as out:
@@ -41,7 +37,6 @@ def test_a_large_sequence_has_proxies(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @needs_vdb
 def test_a_small_sequence_has_none_until_they_are_made(tmp_path: Path) -> None:
-    """Its files stay as they were."""
     write(tmp_path, [1, 2])
     before = {name: (tmp_path / name).read_bytes() for name in names(tmp_path)}
     assert not any(name.startswith("proxy") for name in before)
@@ -50,10 +45,3 @@ def test_a_small_sequence_has_none_until_they_are_made(tmp_path: Path) -> None:
     coarse = np.zeros([-(-n // proxy_files.TIMES) for n in SCENE.domain.resolution], np.float32)
     vdb.vdb_module().read(str(tmp_path / "proxy_0002.vdb"), gridname="density").copyToArray(coarse)
     assert coarse.sum() * proxy_files.TIMES**3 == pytest.approx(Sequence.open(tmp_path).density(2).sum(), rel=1e-2)
-
-
-@needs_vdb
-def test_nothing_to_copy(tmp_path: Path) -> None:
-    write(tmp_path, [])
-    with pytest.raises(SequenceError, match="no finished frame"):
-        list(proxy_files.write_proxies(Sequence.open(tmp_path)))

@@ -1,7 +1,5 @@
 """Reading sequences: what was written opens, and renders as it was fitted."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -52,7 +50,6 @@ def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("npz", [True, pytest.param(False, marks=needs_vdb)])
 def test_a_frame_renders_as_its_scene_says(tmp_path: Path, npz: bool) -> None:
-    """From the scene's camera or another, from either kind of file."""
     write(tmp_path, [1, 2], npz=npz)
     opened = Sequence.open(tmp_path)
     for camera in (None, orbit(SCENE.camera, SCENE.domain, 30)):
@@ -110,7 +107,6 @@ def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
 
 @pytest.mark.parametrize("kind", ["npz", pytest.param("vdb", marks=needs_vdb)])
 def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path: Path, kind: str) -> None:
-    """A flipped bit in an OpenVDB file can cost minutes and all memory."""
     write(tmp_path, [1, 2], npz=kind == "npz")
     path = tmp_path / f"smoke_0002.{kind}"
     changed = bytearray(path.read_bytes())
@@ -121,13 +117,3 @@ def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path: Path, ki
         with pytest.raises(SequenceError, match=rf"smoke_0002\.{kind}: is not the file that was written"):
             read(2)
     assert opened.density(1).any()
-
-
-def test_the_file_of_a_frame_is_not_read_again_for_a_fire_that_no_clip_shows(tmp_path: Path, no_vdb: None) -> None:
-    """Whether the clip shows fire is said by the scene."""
-    write(tmp_path, [1])
-    sequence = Sequence.open(tmp_path)
-    (tmp_path / "smoke_0001.npz").write_bytes(b"damaged")
-    assert sequence.flame(1) is None
-    with pytest.raises(SequenceError, match="there is no frame 2"):
-        sequence.flame(2)

@@ -1,11 +1,8 @@
 """What a camera sees of a density: from where, and before which background."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from smokelift.footage.images import area_average
 from smokelift.output.images import write_image
@@ -15,19 +12,11 @@ from smokelift.scene import Background, completed, orbit
 
 
 def test_the_front_is_the_scenes_own_view(plume) -> None:
-    """Without another camera the picture is that of the scene."""
     image = Viewer(completed(plume.scene)).image(3, plume.densities[2])
     np.testing.assert_allclose(image, render(plume.densities[2], plume.scene), atol=1e-6)
 
 
-def test_another_camera_is_taken(plume) -> None:
-    camera = orbit(plume.scene.camera, plume.scene.domain, 90)
-    image = Viewer(completed(plume.scene), camera).image(3, plume.densities[2])
-    np.testing.assert_allclose(image, render(plume.densities[2], plume.scene, camera), atol=1e-6)
-
-
 def test_a_clean_plate_stands_behind_what_the_camera_itself_shows(plume, tmp_path) -> None:
-    """All of it in front, a part behind a part of the picture, and elsewhere its mean colour."""
     plate = np.zeros((56, 40, 3), np.float32)
     plate[:, :20] = 0.5
     write_image(tmp_path / "plate.exr", plate)
@@ -46,11 +35,6 @@ def test_a_clean_plate_stands_behind_what_the_camera_itself_shows(plume, tmp_pat
         np.testing.assert_allclose(viewer.background(1) - expected, 0, atol=1e-3)
 
 
-def test_a_background_can_be_given(plume) -> None:
-    viewer = Viewer(completed(plume.scene), background=np.full(3, 0.4, np.float32))
-    np.testing.assert_allclose(viewer.image(2, np.zeros_like(plume.densities[0])), 0.4, atol=1e-6)
-
-
 def test_a_moving_camera_is_followed(plume, tracked, tmp_path) -> None:
     """In front each frame is seen as it was filmed, before its own plate; turned by so much from there."""
     scene = replace(tracked, background=Background(image=tmp_path / "plate_#.exr"))
@@ -66,14 +50,7 @@ def test_a_moving_camera_is_followed(plume, tracked, tmp_path) -> None:
         np.testing.assert_allclose(turned.image(number, density), render(density, tracked, aside), atol=1e-3)
 
 
-def test_a_moving_camera_is_no_picture_of_its_own(plume, tracked) -> None:
-    """Which frame's is meant has to be said."""
-    with pytest.raises(ValueError, match=r"camera\.at\(frame\)"):
-        render(plume.densities[0], tracked)
-
-
 def test_a_flame_adds_its_light(plume) -> None:
-    """In its color and behind the smoke; a scene without that color shows none."""
     scene = completed(replace(plume.scene, medium=replace(plume.scene.medium, flame_color=(1.0, 0.5, 0.0))))
     flame = 4 * np.roll(plume.densities[2], -4, 2)
     dark, lit = (Viewer(scene).image(3, plume.densities[2], each) for each in (None, flame))

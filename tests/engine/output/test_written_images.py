@@ -1,6 +1,4 @@
-"""Pictures as they are written."""
-
-from __future__ import annotations
+"""Pictures and videos as they are written."""
 
 import errno
 import os
@@ -11,11 +9,12 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from smokelift.footage.clip import Clip
 from smokelift.output.images import eight_bit, write_image
+from smokelift.output.video_file import write_video
 
 
 def test_eight_bit_is_srgb() -> None:
-    """Linear light is encoded, rounded and cut at both ends."""
     image = np.array([[[0, 0.2159, 1], [-1, 7, 0.0031308]]], np.float32)
     np.testing.assert_array_equal(eight_bit(image), [[[0, 128, 255], [0, 255, 10]]])
     assert eight_bit(image).dtype == np.uint8
@@ -25,8 +24,6 @@ def test_eight_bit_is_srgb() -> None:
 def test_a_picture_that_does_not_fit_is_an_error_of_the_system(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
-    """OpenEXR says it in words; the file that was there stays."""
-
     def full(*_: Any) -> NoReturn:
         raise RuntimeError(f'Failed to write pixel data to image file "x". {os.strerror(number)}.')
 
@@ -38,3 +35,27 @@ def test_a_picture_that_does_not_fit_is_an_error_of_the_system(
     assert (raised.value.errno, raised.value.filename) == (number, str(path))
     assert path.read_bytes() == b"before"
     assert [each.name for each in tmp_path.iterdir()] == ["picture.exr"]
+
+
+@pytest.mark.parametrize("name", ["video.mp4", "video.mkv", "video.mov", "video.webm"])
+def test_a_video_reads_back(tmp_path, name) -> None:
+    """Frames, rate and grey levels survive in every kind of file that is offered; odd sides lose a pixel."""
+    levels = [0.1, 0.3, 0.6]
+    frames = (np.full((33, 47, 3), level, np.float32) for level in levels)
+    write_video(tmp_path / name, frames, 12.0)
+    with Clip.open(tmp_path / name) as clip:
+        assert clip.fps == pytest.approx(12)
+        assert clip.size == (46, 32)
+        found = [float(frame.mean()) for frame in clip]
+    assert found == pytest.approx(levels, abs=0.02)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+
+
+def test_a_video_that_breaks_off_leaves_nothing(tmp_path) -> None:
+    def frames():
+        yield np.zeros((16, 16, 3), np.float32)
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_video(tmp_path / "a.mp4", frames(), 24.0)
+    assert list(tmp_path.iterdir()) == []

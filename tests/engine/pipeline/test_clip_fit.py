@@ -1,7 +1,5 @@
 """The fit at the clip's own pixels: exact where rays are sampled, and blind to nothing that the grid lacks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -44,7 +42,6 @@ def shot(sharp, draft) -> Iterator[Shot]:
 
 
 def test_all_pixels_are_those_of_the_clips_camera(shot, sharp) -> None:
-    """The part of the picture where the box is, and the smoke's pixels in it."""
     beside = beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], step=1)
     part = shot.views[0].working.part
     whole = render(sharp.densities[1], sharp.scene)
@@ -59,7 +56,6 @@ def test_all_pixels_are_those_of_the_clips_camera(shot, sharp) -> None:
 
 @pytest.mark.parametrize("step", [3, 5])
 def test_rays_between_pixels_are_left_out_and_none_is_moved(shot, sharp, step) -> None:
-    """Every n-th pixel is as it is among all; the mean over them stands for that over all."""
     every, some = (beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], n) for n in (1, step))
     rows, columns = every.inside.shape
     down, right = (n % step // 2 + step // 2 for n in (rows, columns))
@@ -70,45 +66,16 @@ def test_rays_between_pixels_are_left_out_and_none_is_moved(shot, sharp, step) -
 
 
 def test_detail_that_the_grid_lacks_counts(sharp, draft) -> None:
-    """The working picture has none of it, and is fitted far better."""
     with Clip.open(sharp.scene.clip) as clip:
         for frame in reconstruct(clip, sharp.scene, draft):
             assert 15 < frame.figures["psnr"] < frame.figures["psnr_working"] - 5
 
 
 def test_the_truth_is_as_good_as_the_clips_detail(shot, sharp) -> None:
-    """What is left is the grain: 0.15 of the smoke's radiance, root mean square."""
     beside = beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], step=1)
     error = np.square(0.15 * beside.shown)[beside.inside].mean()
     assert beside.psnr == pytest.approx(-10 * np.log10(error), abs=0.1)
     assert clip_psnr(shot, 1, sharp.densities[1])["psnr"] == pytest.approx(beside.psnr, abs=1)
-
-
-def test_every_view_has_a_figure(two_views, draft) -> None:
-    """Named as the working picture's is."""
-    with Clip.open(two_views.clip) as clip:
-        for frame in reconstruct(clip, two_views, draft):
-            names = {name for name in frame.figures if name.startswith("psnr")}
-            assert names == {"psnr", "psnr_view_1", "psnr_working", "psnr_working_view_1"}
-
-
-def test_a_moving_camera_is_followed(plume, tracked, draft) -> None:
-    """The true density has hardly any error in the picture of any frame."""
-    with Clip.open(tracked.clip) as clip:
-        shot = prepare_shot(clip, tracked, draft)
-        for number, density in enumerate(plume.densities):
-            assert clip_psnr(shot, number, density)["psnr"] > 40
-
-
-@pytest.mark.parametrize("width", [1, 2, 7])
-def test_a_sliver_of_the_box_is_enough(shot, sharp, width) -> None:
-    """Of which fewer pixels are left than there are to a step."""
-    view = shot.views[0]
-    sliver = replace(view, working=replace(view.working, left=view.working.left + 90, width=width))
-    beside = beside_clip(sliver, shot.optics, 1, sharp.densities[1], step=9)
-    assert beside.seen.shape == beside.shown.shape
-    assert 0 < beside.seen.shape[1] <= width
-    assert beside.inside.any()
 
 
 def test_no_smoke_has_no_figure(plume, draft, tmp_path) -> None:

@@ -1,12 +1,10 @@
 """The whole loop on a tiny plume: it fits its footage, moves upward, and can be cut off and gone on with."""
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,20 +21,11 @@ from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
-from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
 from smokelift.pipeline.loop import Carried, frames_after
 from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.render import render, scene_renderer
-from smokelift.scene import (
-    Background,
-    ClipSource,
-    DirectionalLight,
-    Inlet,
-    Scene,
-    completed,
-    look_at_matrix,
-)
+from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -120,7 +109,6 @@ def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) 
 
 
 def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
-    """A given distance moves the smoke away from the camera, and what is given is not estimated."""
     depth = view_frame(plume.scene.camera)[1]
     offset = (voxel_centres(plume.scene.domain) - np.array(plume.scene.domain.centre)) @ depth
     shift = 3 * plume.scene.domain.voxel_size
@@ -133,7 +121,6 @@ def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
 
 
 def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path) -> None:
-    """From the floor contact of the smoke."""
     x, y, z = np.moveaxis(voxel_centres(plume.scene.domain), -1, 0)
     column = (np.hypot(x, y + 0.1) < 0.15) & (z < 1.2)
     scene = plume.write(tmp_path, [column.astype(np.float32)] * 2)
@@ -151,19 +138,7 @@ def test_the_example_stands_upright() -> None:
     np.testing.assert_allclose(axis.at(np.linspace(-1.4, 1.2, 14)), 0.1, atol=0.2)
 
 
-def test_frames_come_in_order(run, plume) -> None:
-    """Numbers from 1, none left out, arrays of the domain's shape."""
-    frames, _ = run
-    assert [frame.number for frame in frames] == [1, 2, 3, 4, 5]
-    for frame in frames:
-        assert frame.density.shape == plume.scene.domain.resolution
-        assert frame.density.dtype == np.float32
-        assert frame.velocity.shape == plume.scene.domain.resolution
-        assert frame.velocity.voxel_size == pytest.approx(plume.scene.domain.voxel_size)
-
-
 def test_the_picture_is_met(run, plume) -> None:
-    """Seen from the camera the reconstruction is the footage, to 35 dB at least in linear light."""
     frames, _ = run
     with Clip.open(plume.scene.clip) as clip:
         for index, frame in enumerate(frames):
@@ -180,34 +155,7 @@ def test_the_amount_of_smoke_is_about_right(run, plume) -> None:
         assert frame.figures["mass"] == pytest.approx(float(frame.density.sum()) * cell, rel=1e-4)
 
 
-def test_there_is_no_smoke_where_the_camera_sees_none(run, plume) -> None:
-    """Density is nowhere negative, and zero in voxels well beside everything that the clip shows."""
-    frames, _ = run
-    everywhere = np.ones(plume.scene.domain.resolution, np.bool_)
-    places = project_voxels(plume.scene.camera, plume.scene.domain).places(everywhere)
-    with Clip.open(plume.scene.clip) as clip:
-        for index, frame in enumerate(frames):
-            assert frame.density.min() >= 0
-            rows, columns = np.nonzero(clip.frame(index).max(-1) > 0)
-            beside = (
-                (places.rows < rows.min() - 6)
-                | (places.rows > rows.max() + 6)
-                | (places.columns < columns.min() - 6)
-                | (places.columns > columns.max() + 6)
-            )
-            assert beside.any()
-            assert frame.density.ravel()[beside].max() == 0
-
-
-def test_the_first_frame_has_the_seconds_velocity(run) -> None:
-    """Nothing comes before the first frame, so it moves as the second does."""
-    frames, _ = run
-    for first, second in zip(frames[0].velocity.faces, frames[1].velocity.faces, strict=True):
-        np.testing.assert_array_equal(first, second)
-
-
 def test_rising_smoke_has_upward_velocity(run, plume) -> None:
-    """The mean velocity of the smoke points up, at about the blob's speed."""
     frames, _ = run
     with Clip.open(plume.scene.clip) as clip:
         speed = 0.075 * clip.fps
@@ -218,7 +166,6 @@ def test_rising_smoke_has_upward_velocity(run, plume) -> None:
 
 
 def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
-    """Nothing goes through the floor, no motion is taken from the inlet, and both are on record."""
     inflows = []
 
     class Watched(CoarseToFine):
@@ -241,34 +188,6 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
     sequence = Sequence.open(tmp_path / "out")
     assert (sequence.scene.closed, sequence.scene.inlets) == (scene.closed, scene.inlets)
     assert frames_written(scene, draft, tmp_path / "out", resume=True) == []
-
-
-def test_what_is_written_is_what_was_yielded(run, plume) -> None:
-    """The directory opens as a complete sequence with the same arrays, scene and settings."""
-    frames, out = run
-    sequence = Sequence.open(out)
-    assert sequence.complete
-    assert sequence.frames == (1, 2, 3, 4, 5)
-    assert sequence.scene == completed(plume.scene)
-    assert sequence.settings["quality"] == "draft"
-    for frame in frames:
-        assert (out / f"smoke_{frame.number:04d}.npz").is_file()
-        np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
-        for found, wanted in zip(sequence.velocity(frame.number).faces, frame.velocity.faces, strict=True):
-            np.testing.assert_array_equal(found, wanted)
-        assert sequence.figures(frame.number)["psnr"] == pytest.approx(frame.figures["psnr"])
-
-
-def test_vdb_files_hold_the_same(run, plume) -> None:
-    """The OpenVDB files hold the densities at 16 bits."""
-    try:
-        vdb_module()
-    except VdbUnavailable as missing:
-        pytest.skip(str(missing))
-    frames, out = run
-    for frame in frames:
-        density, _ = read_vdb(out / f"smoke_{frame.number:04d}.vdb", plume.scene.domain)
-        np.testing.assert_allclose(density, frame.density, rtol=1e-3, atol=1e-6)
 
 
 BESIDE = np.s_[:, :8]
@@ -299,7 +218,6 @@ def test_what_a_mask_hides_is_no_smoke(run, plume, draft, tmp_path) -> None:
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, count) -> None:
-    """Resuming gives the rest, and the files are those of an uninterrupted run bit for bit."""
     _, uninterrupted = run
     out = tmp_path / "out"
     cut_off(plume.scene, draft, out, count)
@@ -317,7 +235,6 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, cou
     ("replaced", "file"), [("clip", "clip/frame_0004.png"), ("background", "plate.png"), ("mask", "mask.png")]
 )
 def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path, replaced, file) -> None:
-    """Half a sequence of one clip and half of another would look like one."""
     scene = plume.write(tmp_path / "clip", plume.densities)
     write_image(tmp_path / "plate.png", np.zeros((56, 40, 3)))
     write_image(tmp_path / "mask.png", np.ones((56, 40, 3)))
@@ -331,24 +248,6 @@ def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, t
     with pytest.raises(SequenceError, match=rf"begun differently .* sources\.{replaced}\."):
         frames_written(scene, draft, tmp_path / "out", resume=True)
     assert Sequence.open(tmp_path / "out").frames == (1, 2)
-
-
-def test_a_run_is_resumed_after_its_project_was_moved(plume, draft, tmp_path) -> None:
-    """The files have other paths, and the same names and content."""
-    project = tmp_path / "project"
-    project.mkdir()
-
-    def shot(folder: Path) -> Scene:
-        clip = replace(written.clip, path=folder / "clip" / written.clip.path.name)
-        return replace(plume.scene, clip=clip, background=Background(image=folder / "plate.png"))
-
-    written = plume.write(project / "clip", plume.densities)
-    write_image(project / "plate.png", np.zeros((56, 40, 3)))
-    cut_off(shot(project), draft, project / "out", 3)
-    moved = project.rename(tmp_path / "moved")
-    rest = frames_written(shot(moved), draft, moved / "out", resume=True)
-    assert [frame.number for frame in rest] == [4, 5]
-    assert Sequence.open(moved / "out").scene.clip.path.is_relative_to(moved)
 
 
 def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> None:
@@ -394,7 +293,6 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
 
 
 def test_where_no_picture_is_followed_a_run_goes_on_without_the_frame_before(two_views, draft, monkeypatch) -> None:
-    """Its picture is not read again."""
     observed: list[int] = []
     observe = Shot.observe
     with Clip.open(two_views.clip) as clip:
@@ -407,7 +305,6 @@ def test_where_no_picture_is_followed_a_run_goes_on_without_the_frame_before(two
 
 
 def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
-    """The pictures of all views of that moment, and nothing else."""
     settings = replace(draft, transport=0.0, detail=0.0)
     scene = two_views.with_frames(0, 2)
     frames = frames_of(scene, settings)
@@ -432,18 +329,27 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
     def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
         dt = 1 / plume.scene.clip.fps
         found = estimator.estimate(
-            before,
-            after,
-            dt,
-            domain.voxel_size,
-            closed=shot.scene.closed,
-            inflow=shot.scene.inflow(),
-            prediction=None,
+            before, after, dt, domain.voxel_size, closed=shot.scene.closed, inflow=shot.scene.inflow(), prediction=None
         )
         return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
 
     np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())
     assert not np.array_equal(second.estimated.centres(), velocity(first.density, second.density).centres())
+
+
+def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
+    paper = Settings.preset("draft", "paper")
+    starts, density_fit = [], FixedRateDescent(iterations=1)
+
+    class Watched:
+        def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
+            starts.append(initial)
+            return density_fit.fit(views, depth, initial)
+
+    scene = plume.write(tmp_path / "clip", plume.densities[:4])
+    frames = frames_of(scene, paper, method=replace(compose(paper), density_fit=Watched()))
+    assert [start is None for start in starts] == [True, True, False, False]
+    assert all(frame.figures["transport"] == {} for frame in frames)
 
 
 def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, along_the_path) -> None:
@@ -490,7 +396,6 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
 
 
 def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
-    """A wall that passes by behind the smoke is no smoke, and the pictures are fitted."""
     blocks = np.random.default_rng(0).uniform(0.05, 0.2, (7, 7, 3)).astype(np.float32)
     wide = np.kron(blocks, np.ones((8, 8, 1), np.float32))
     for n, density in enumerate(plume.densities):
@@ -506,23 +411,7 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
     assert Sequence.open(tmp_path / "out").scene == completed(scene)
 
 
-def test_an_exception_of_the_caller_leaves_what_can_be_resumed(plume, draft, tmp_path) -> None:
-    """Whoever uses the frames may fail: the finished ones stay, and the directory is free again."""
-    out = tmp_path / "out"
-
-    def fail(_frame: Frame) -> NoReturn:
-        raise RuntimeError
-
-    with Clip.open(plume.scene.clip) as clip:
-        run = reconstruct(clip, plume.scene, draft)
-        with pytest.raises(RuntimeError):
-            run.write(out, npz=True, on_frame=fail)
-    assert Sequence.open(out).frames == (1,)
-    assert frames_written(plume.scene, draft, out, resume=True)[-1].number == 5
-
-
 def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
-    """There is nothing left to do, and nothing is changed."""
     _, out = run
     before = {path.name: path.read_bytes() for path in out.glob("smoke_*")}
     assert frames_written(plume.scene, draft, out, resume=True) == []
@@ -530,22 +419,7 @@ def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
     assert Sequence.open(out).complete
 
 
-def test_a_second_run_needs_resume(run, plume, draft) -> None:
-    """Finished frames are not overwritten."""
-    _, out = run
-    with pytest.raises(SequenceError, match="resume"):
-        frames_written(plume.scene, draft, out)
-
-
-def test_other_settings_do_not_resume(run, plume, draft) -> None:
-    """A run goes on only as it began; the sentence names the difference."""
-    _, out = run
-    with pytest.raises(SequenceError, match=r"transport was .* and is now 0\.125"):
-        frames_written(plume.scene, replace(draft, transport=0.125), out, resume=True)
-
-
 def test_frames_without_smoke_are_empty(plume, draft, tmp_path) -> None:
-    """Smoke that comes, goes and comes again: zeros in between, and no failure."""
     nothing = np.zeros_like(plume.densities[0])
     clip = [nothing, nothing, plume.densities[0], nothing, nothing, plume.densities[1], plume.densities[2]]
     frames = frames_written(plume.write(tmp_path / "clip", clip), draft, tmp_path / "out")
@@ -556,34 +430,12 @@ def test_frames_without_smoke_are_empty(plume, draft, tmp_path) -> None:
 
 
 def test_a_clip_of_one_frame_works(plume, draft, tmp_path) -> None:
-    """One picture gives one frame at rest."""
     scene = plume.write(tmp_path / "clip", plume.densities[:1])
     (frame,) = frames_written(scene, draft, tmp_path / "out")
     assert frame.number == 1
     assert frame.figures["psnr"] >= 35
     assert not any(face.any() for face in frame.velocity.faces)
     assert Sequence.open(tmp_path / "out").frames == (1,)
-
-
-def test_a_clip_of_two_frames_works(plume, draft, tmp_path) -> None:
-    """The shortest clip with a velocity."""
-    frames = frames_of(plume.write(tmp_path / "clip", plume.densities[:2]), draft)
-    assert [frame.number for frame in frames] == [1, 2]
-    np.testing.assert_array_equal(frames[0].velocity.faces[2], frames[1].velocity.faces[2])
-
-
-def test_the_papers_method_lowers_the_loss(plume, tmp_path) -> None:
-    """Each frame's picture is nearer after the paper's descent than after its first step."""
-    scene = plume.write(tmp_path / "clip", plume.densities[:3])
-    paper = Settings.preset("draft", "paper")
-    losses = {}
-    for steps in (1, 12):
-        method = replace(compose(paper), density_fit=FixedRateDescent(iterations=steps))
-        frames = frames_of(scene, paper, method=method)
-        assert [frame.number for frame in frames] == [1, 2, 3]
-        losses[steps] = [frame.figures["loss"] for frame in frames]
-        assert all(frame.density.min() >= 0 for frame in frames)
-    assert all(late < early for early, late in zip(losses[1], losses[12], strict=True))
 
 
 def test_what_is_taken_over_is_on_record(run) -> None:
@@ -593,14 +445,6 @@ def test_what_is_taken_over_is_on_record(run) -> None:
     taken = [sequence.figures(number)["transport"] for number in sequence.frames]
     assert taken[:2] == [{}, {}]
     assert all(0.5 < figures["share"] < 1 for figures in taken[2:])
-
-
-def test_what_a_smooth_frame_takes_over_is_on_record(plume, draft) -> None:
-    """Without detail it says what decided the share as well."""
-    frames = frames_of(plume.scene, replace(draft, detail=0.0))
-    for figures in (frame.figures["transport"] for frame in frames[2:]):
-        assert 0 < figures["share"] <= Settings().transport
-        assert figures["loss_carried"] < figures["loss_before"]
 
 
 def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
@@ -624,34 +468,6 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
         np.testing.assert_array_equal(frame.density, frames[1].density)
 
 
-def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
-    """By the paper's method the fit starts from the carried density, as it is."""
-    paper = Settings.preset("draft", "paper")
-    starts, density_fit = [], FixedRateDescent(iterations=1)
-
-    class Watched:
-        def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
-            starts.append(initial)
-            return density_fit.fit(views, depth, initial)
-
-    scene = plume.write(tmp_path / "clip", plume.densities[:4])
-    frames = frames_of(scene, paper, method=replace(compose(paper), density_fit=Watched()))
-    assert [start is None for start in starts] == [True, True, False, False]
-    assert all(frame.figures["transport"] == {} for frame in frames)
-
-
-def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft) -> None:
-    """What the shot decided is what the estimator is made with, and what is on record."""
-    finest = max(plume.scene.domain.resolution) - 1
-    draft = replace(draft, selection=replace(draft.selection, velocity_side=finest))
-    with Clip.open(plume.scene.clip) as clip:
-        shot = prepare_shot(clip, plume.scene, draft)
-    estimator = compose(shot.settings).velocity_estimator
-    assert isinstance(estimator, CoarseToFine)
-    assert estimator.settings.coarsening == 1
-    assert shot.settings.as_dict()["velocity"]["coarsening"] == 1
-
-
 def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
     """While a frame is computed nothing holds the ones before: at large grids they would not fit together."""
     given: list[weakref.ref[Frame]] = []
@@ -671,19 +487,6 @@ def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
     assert alive == [0, 0, 0]
 
 
-def test_without_transport_every_picture_stands_alone(by_themselves) -> None:
-    """With a share of 0 nothing is carried into a start."""
-    assert all(frame.figures["transport"] == {} for frame in by_themselves)
-
-
-def test_the_threads_of_products_change_nothing(run, plume, draft) -> None:
-    """Another program's settings of the linear algebra are no part of a run: it can be resumed anywhere."""
-    with threadpool_limits(limits=1):
-        one = frames_of(plume.scene, draft)
-    for alone, as_ever in zip(one, run[0], strict=True):
-        np.testing.assert_array_equal(alone.density, as_ever.density)
-
-
 def test_transport_keeps_the_mass_of_every_height(by_themselves, all_carried) -> None:
     """What is taken over moves smoke along the rays: per height it stays within an eighth of what the picture says."""
     for one, other in zip(by_themselves, all_carried, strict=True):
@@ -692,7 +495,6 @@ def test_transport_keeps_the_mass_of_every_height(by_themselves, all_carried) ->
 
 
 def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
-    """It shows what it adds to the pictures, and is written; without fire there is none."""
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
     scene = replace(plume.write(tmp_path / "clip", plume.densities[:2], dim), lights=())
     with Clip.open(scene.clip) as clip:

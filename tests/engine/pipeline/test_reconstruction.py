@@ -1,7 +1,5 @@
 """What reconstruct returns: checked and prepared at once, computed when it is iterated over or written."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -13,22 +11,11 @@ from smokelift.footage.clip import Clip
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Reconstruction, compose, reconstruct
-from smokelift.scene import Scene, completed
+from smokelift.scene import completed
 from smokelift.setup.prepare import prepare_shot
 
 
-def test_what_cannot_be_is_refused_at_the_call(plume, draft) -> None:
-    """Not when the first frame is computed."""
-    scene = Scene(clip=plume.scene.clip, domain=plume.scene.domain)
-    with (
-        Clip.open(plume.scene.clip) as clip,
-        pytest.raises(ValueError, match="gives a box but no camera"),
-    ):
-        reconstruct(clip, scene, draft)
-
-
 def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None:
-    """What was decided is there at once; a directory that cannot be written to costs no frame."""
     computed = []
 
     class Counted:

@@ -1,7 +1,5 @@
 """The velocity that one camera's pictures correct: what it takes from them, and what it leaves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -68,7 +66,6 @@ def test_what_moves_as_the_picture_does_already_is_hardly_changed() -> None:
 
 
 def test_motion_along_the_line_of_sight_is_left() -> None:
-    """Towards the camera of parallel rays nothing moves in the picture."""
     towards = np.zeros((*COARSE, 3), np.float32)
     towards[..., 1] = -0.5
     velocity = Velocity(on_faces(towards), 2 * DOMAIN.voxel_size)

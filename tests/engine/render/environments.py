@@ -1,7 +1,5 @@
 """Environment pictures that the tests light smoke with."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -25,7 +25,6 @@ def loss_gradient_and_image():
 
 
 def test_gpu_and_cpu_agree():
-    """One code: the same picture and derivative from kernels compiled for a GPU."""
     if device.available_gpu() is None:
         pytest.skip("neither a GPU nor Vulkan in software (Debian: mesa-vulkan-drivers) here")
     device.start("cpu")
@@ -39,7 +38,6 @@ def test_gpu_and_cpu_agree():
 
 
 def test_one_process_has_one_device():
-    """A second back end in the same process is refused with a sentence."""
     assert device.start("cpu") == "cpu"
     assert device.start("auto") == "cpu"
     if device.available_gpu() is not None:
@@ -48,7 +46,6 @@ def test_one_process_has_one_device():
 
 
 def test_without_taichi(monkeypatch):
-    """The processor renders; who asks for a GPU learns what to install."""
     monkeypatch.setattr(device, "_running", None)
     monkeypatch.setattr(device, "find_spec", lambda name: None)
     monkeypatch.setattr(device, "driver_installed", lambda: True)
@@ -59,7 +56,6 @@ def test_without_taichi(monkeypatch):
 
 
 def test_where_no_gpu_is_none_is_looked_for(monkeypatch):
-    """Vulkan in software is for who asks for it; to find it takes seconds."""
     asked = []
     monkeypatch.setattr(device, "_running", None)
     monkeypatch.setattr(device, "available_gpu", lambda: asked.append("auto"))

@@ -45,7 +45,6 @@ def test_image_equals_the_sums_in_double_precision(density, lights, extinction):
 
 
 def test_coloured_smoke_in_white_light_is_deeper_in_colour_where_light_is_scattered_again(density):
-    """As the sums have it; single scattering shows the colour itself."""
     thick = replace(MEDIUM, extinction=100.0, color=(1.0, 0.8, 0.5))
     image = renderer(medium=thick, background=np.zeros(3, np.float32)).image(density)
     black = np.zeros(3)
@@ -81,28 +80,6 @@ def test_gradient_equals_a_complex_step(density, lights, hull, colour):
         assert gradient[tuple(voxel)] == pytest.approx(slope, rel=2e-3, abs=1e-3 * float(np.abs(gradient).max()))
 
 
-def test_gradient_of_thick_smoke_before_black_equals_a_complex_step(density):
-    """Light in empty blocks beside the smoke counts; before a wall, what the smoke hides would outweigh it."""
-    medium, black = replace(MEDIUM, extinction=40.0), np.zeros(3, np.float32)
-    ours = renderer(medium=medium, background=black)
-    ours.image(density, keep_record=True)
-    gradient = ours.gradient(np.ones((11, 12, 3), np.float32))
-    for voxel in ((4, 0, 31), (2, 0, 30), (2, 2, 37), (3, 2, 39)):
-        moved = density.astype(complex)
-        moved[voxel] += 1e-30j
-        image = reference.render(moved, CAMERA, DOMAIN, medium, (SUN,), black.astype(float), "multiple")
-        slope = np.sum(image).imag / 1e-30
-        assert gradient[voxel] == pytest.approx(slope, rel=3e-3, abs=1e-3 * float(np.abs(gradient).max()))
-
-
-def test_the_box_around_the_smoke_changes_nothing(density):
-    """Blocks lie alike whatever the support, and light crosses the empty ones."""
-    values = density.copy()
-    values[:4], values[:, :2], values[:, :, SMOKY.stop - 2 :] = 0, 0, 0
-    whole, part = renderer().image(values).copy(), renderer(support=values > 0).image(values)
-    np.testing.assert_allclose(part, whole, rtol=1e-4)
-
-
 def test_light_that_has_left_the_blocks_does_not_come_back():
     """Rows of blocks lie one behind the other in memory; in a box full of smoke the next one is near."""
     shape, black = (12, 10, 10), np.zeros(3, np.float32)
@@ -127,13 +104,6 @@ def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
     image = room_renderer.image(smoke)
     assert image.min() > 1 - lost
     assert image.max() < 1 + 1e-3
-
-
-def test_thin_smoke_scatters_once(density):
-    medium = replace(MEDIUM, extinction=1e-4)
-    single = Renderer(CAMERA, DOMAIN, medium, (SUN,), np.zeros(3, np.float32)).image(density)
-    multiple = renderer(medium=medium, background=np.zeros(3, np.float32)).image(density)
-    np.testing.assert_allclose(multiple, single, rtol=1e-3)
 
 
 def test_anisotropic_smoke_is_refused():

@@ -32,7 +32,6 @@ def taichi_on_the_processor():
 @pytest.mark.parametrize(("scattering", "anisotropy"), [("multiple", 0.0), ("single", 0.3), ("unshadowed", 0.3)])
 @pytest.mark.parametrize("hull", [False, True])
 def test_both_backends_agree(lights, scattering, anisotropy, hull):
-    """The same picture and the same derivative, twice in a row, with and without a hull."""
     rng = np.random.default_rng(1)
     density = (rng.random(SHAPE) * (rng.random(SHAPE) > 0.3)).astype(np.float32)
     support = None

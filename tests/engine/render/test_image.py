@@ -8,9 +8,8 @@ import pytest
 import renderer_reference as reference
 
 from smokelift import render, render_gradient
-from smokelift.output.images import write_image
 from smokelift.render import image as image_module
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium, Scene, completed
 
 SHAPE = (14, 12, 16)
 SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
@@ -40,7 +39,6 @@ def test_examples_of_the_documentation_run():
 
 @pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
 def test_render_gradient_of_every_model(density, target, scattering):
-    """loss, gradient and image agree with each other and with finite differences."""
     scene = replace(SCENE, scattering=scattering)
     loss, gradient, image = render_gradient(density, scene, target)
     assert loss == pytest.approx(np.sum((image.astype(np.float64) - target) ** 2), rel=1e-6)
@@ -75,33 +73,6 @@ def test_a_complete_scene_shows_the_same_as_its_description(density):
     np.testing.assert_array_equal(render(density, completed(SCENE), ASIDE), render(density, SCENE, ASIDE))
     without = replace(SCENE, camera=None)
     np.testing.assert_array_equal(render(density, without, ASIDE), render(density, SCENE, ASIDE))
-
-
-def test_background_colour_is_attenuated(density):
-    """Absorption only: what is left of the background is the transmittance."""
-    medium = Medium(3.0 / (density.sum(1).max() * SCENE.domain.voxel_size))
-    scene = replace(SCENE, medium=medium, background=Background(color=(1.0, 0.5, 0.25)), scattering="absorption")
-    image = render(density, scene)
-    np.testing.assert_allclose(image[..., 1], image[..., 0] / 2, rtol=1e-5)
-    assert image[..., 0].min() == pytest.approx(np.exp(-3), rel=0.5)
-
-
-def test_a_background_picture_belongs_to_the_scenes_own_camera(target, tmp_path):
-    """Before another camera its mean colour takes its place."""
-    write_image(tmp_path / "wall.exr", target, half=False)
-    scene = replace(SCENE, background=Background(image=tmp_path / "wall.exr"))
-    clear = np.zeros(SHAPE, np.float32)
-    np.testing.assert_allclose(render(clear, scene), target, rtol=1e-6)
-    mean = np.broadcast_to(target.reshape(-1, 3).mean(0), (14, 18, 3))
-    np.testing.assert_allclose(render(clear, scene, ASIDE), mean, rtol=1e-6)
-
-
-@pytest.mark.parametrize(("value", "words"), [(np.nan, "not finite"), (np.inf, "not finite"), (-1e-6, "negative")])
-def test_density_that_is_no_density_is_refused(density, value, words):
-    bad = density.copy()
-    bad[1, 2, 3] = value
-    with pytest.raises(ValueError, match=words):
-        render(bad, SCENE)
 
 
 def test_incomplete_scenes_and_other_shapes_are_refused(density, target):

@@ -1,7 +1,5 @@
 """The renderer where methods fail: thin and opaque smoke, grazing light, the eye inside, grids of one voxel."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import renderer_reference as reference
@@ -14,11 +12,14 @@ DEPTHS = [0.001, 0.01, 0.1, 1.0, 10.0, 100.0]
 WALL = np.array([0.4, 0.5, 0.6])
 
 
-def make_domain(shape):
+SHAPE = (9, 8, 10)
+
+
+def make_domain(shape=SHAPE):
     return Domain((0.0, 0.0, 0.0), tuple(0.1 * n for n in shape), shape)
 
 
-def make_density(shape):
+def make_density(shape=SHAPE):
     rng = np.random.default_rng(3)
     return (rng.random(shape) * (rng.random(shape) > 0.2) + 0.01).astype(np.float32)
 
@@ -48,26 +49,9 @@ def check(density, camera, domain, medium, lights, voxels=6):
 @pytest.mark.parametrize("depth", DEPTHS)
 @pytest.mark.parametrize("anisotropy", [-0.9, 0.0, 0.9])
 def test_image_and_gradient_at_every_optical_depth(depth, anisotropy):
-    shape = (9, 8, 10)
-    domain, density = make_domain(shape), make_density(shape)
+    domain, density = make_domain(), make_density()
     medium = Medium(depth / (density.sum(1).max() * domain.voxel_size), 0.9, anisotropy)
     check(density, make_camera(domain), domain, medium, (SUN, PointLight((-0.5, 0.4, 1.6), (1, 2, 3))))
-
-
-@pytest.mark.parametrize("depth", DEPTHS)
-def test_white_smoke_in_a_white_room_is_never_brighter_than_the_room(depth):
-    """Light of radiance 1 from everywhere: what is scattered once and what is transmitted are at most 1."""
-    shape = (12, 12, 12)
-    domain, density = make_domain(shape), np.ones(shape, np.float32)
-    rng = np.random.default_rng(2)
-    lights = [DirectionalLight(tuple(d), (4 * np.pi / 20,) * 3) for d in rng.standard_normal((20, 3))]
-    medium = Medium(depth / 1.2, 1.0, 0.0)
-    image = Renderer(make_camera(domain), domain, medium, lights, np.ones(3)).image(density)
-    assert image.max() <= 1 + 1e-5
-    lost = 1 - image.min()
-    assert lost >= -1e-6
-    if depth <= 0.01:  # thin: nearly all of it arrives, and not a dark spot of underflow
-        assert lost < 2 * depth
 
 
 @pytest.mark.parametrize(
@@ -75,27 +59,24 @@ def test_white_smoke_in_a_white_room_is_never_brighter_than_the_room(depth):
     [(1, 0, 0), (0, -1, 0), (0, 0, 1), (1, 1, 0), (1, 1, 1), (-1, 1, 1), (1, 1e-7, 0), (1e-6, -1, 1e-6), (1, -1, 1e-9)],
 )
 def test_light_along_axes_and_diagonals(direction):
-    shape = (9, 8, 10)
-    domain = make_domain(shape)
-    check(make_density(shape), make_camera(domain), domain, Medium(5.0), (DirectionalLight(direction, (1, 1, 1)),))
+    domain = make_domain()
+    check(make_density(), make_camera(domain), domain, Medium(5.0), (DirectionalLight(direction, (1, 1, 1)),))
 
 
 @pytest.mark.parametrize(
     "position", [(0.45, 0.4, 1.001), (-1e-4, 0.4, 0.5), (-0.01, -0.01, -0.01), (900.0, 700.0, 500.0)]
 )
 def test_point_light_at_the_surface_and_far_away(position):
-    shape = (9, 8, 10)
-    domain = make_domain(shape)
+    domain = make_domain()
     power = float(np.sum(np.square(np.subtract(position, domain.centre))))
-    check(make_density(shape), make_camera(domain), domain, Medium(5.0), (PointLight(position, (power,) * 3),))
+    check(make_density(), make_camera(domain), domain, Medium(5.0), (PointLight(position, (power,) * 3),))
 
 
 @pytest.mark.parametrize("eye", [(0.45, 0.4, 0.5), (0.41, 0.33, 0.57), (0.02, 0.4, 0.98), (0.45, -0.001, 0.5)])
 def test_camera_inside_the_smoke(eye):
-    shape = (9, 8, 10)
-    domain = make_domain(shape)
+    domain = make_domain()
     camera = Camera.look_at(eye, (0.8, 0.75, 0.2), fov_y_degrees=75, size=(16, 18))
-    check(make_density(shape), camera, domain, Medium(5.0, 0.9, 0.6), (SUN,))
+    check(make_density(), camera, domain, Medium(5.0, 0.9, 0.6), (SUN,))
 
 
 @pytest.mark.parametrize("shape", [(1, 8, 10), (9, 1, 10), (9, 8, 1), (1, 1, 10), (1, 1, 1)])
@@ -106,42 +87,8 @@ def test_grids_one_voxel_thick(shape):
     check(make_density(shape), camera, domain, Medium(5.0, 0.9, 0.3), lights, voxels=3)
 
 
-def test_result_does_not_depend_on_the_hull():
-    """A hull saves work and changes nothing: the columns of every light stay where they are."""
-    shape = (14, 12, 16)
-    domain, density = make_domain(shape), make_density(shape)
-    density[:4], density[:, :3], density[..., 11:] = 0, 0, 0
-    lights = (SUN, DirectionalLight((-0.2, 1.0, 0.3), (1, 1, 2)), PointLight((-0.3, 0.2, 0.1), (1, 0, 0)))
-    results = []
-    for hull in (None, density > 0):
-        renderer = Renderer(make_camera(domain), domain, Medium(5.0, 0.9, 0.3), lights, WALL, support=hull)
-        image = renderer.image(density, keep_record=True)
-        results.append((image, renderer.gradient(np.ones_like(image))))
-    np.testing.assert_allclose(results[0][0], results[1][0], rtol=1e-5)
-    inside = density > 0
-    np.testing.assert_allclose(results[0][1][inside], results[1][1][inside], rtol=1e-3, atol=1e-6)
-
-
-def test_same_result_for_any_number_of_threads(set_threads):
-    """Sums are made in an order that does not depend on who makes them."""
-    shape = (14, 12, 16)
-    domain, density = make_domain(shape), make_density(shape)
-    scene = replace(Scene(camera=make_camera(domain), domain=domain, lights=(SUN,)), medium=Medium(5.0, 0.9, 0.3))
-    set_threads(3)
-    several = render(density, scene)
-    set_threads(1)
-    np.testing.assert_array_equal(render(density, scene), several)
-
-
 @pytest.mark.parametrize("density", [1e38, np.inf, np.nan])
 def test_a_density_without_a_finite_depth_is_refused(density):
     domain = make_domain((4, 4, 4))
     with pytest.raises(ValueError, match=r"optical depth|not finite"):
         render(np.full((4, 4, 4), density, np.float32), Scene(domain=domain, camera=make_camera(domain)))
-
-
-def test_a_light_that_is_too_far_away_is_refused():
-    domain = make_domain((4, 4, 4))
-    scene = Scene(camera=make_camera(domain), lights=(PointLight((1e9, 0, 0), (1, 1, 1)),))
-    with pytest.raises(ValueError, match="more than a million voxels away"):
-        render(np.ones((4, 4, 4), np.float32), replace(scene, domain=domain))

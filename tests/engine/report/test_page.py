@@ -1,7 +1,5 @@
 """A page of pictures and of what is known about them."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re
@@ -9,7 +7,7 @@ import re
 import numpy as np
 from PIL import Image
 
-from smokelift.report.page import COLUMNS, TILE, Fact, Page, Panel, fitted, write_page
+from smokelift.report.page import COLUMNS, Fact, Page, Panel, write_page
 
 RED = np.zeros((50, 80, 3), np.uint8) + np.uint8([200, 10, 10])
 PAGE = Page(
@@ -25,7 +23,6 @@ PAGE = Page(
 
 
 def test_a_page_as_html_needs_no_other_file(tmp_path) -> None:
-    """Every picture is in it, and what would be markup is text."""
     write_page(tmp_path / "page.html", PAGE)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "clip &lt;1&gt;.mp4" in text
@@ -42,7 +39,6 @@ def test_a_page_as_html_needs_no_other_file(tmp_path) -> None:
 
 
 def test_a_page_as_a_picture_shows_every_panel_and_line(tmp_path) -> None:
-    """In rows; a long sentence is broken into lines inside the picture."""
     write_page(tmp_path / "page.png", PAGE)
     with Image.open(tmp_path / "page.png") as picture:
         page = np.asarray(picture).astype(int)
@@ -55,12 +51,3 @@ def test_a_page_as_a_picture_shows_every_panel_and_line(tmp_path) -> None:
     assert not ink[:, -4:].any()
     below = ink[np.flatnonzero(red.any(1))[-1] + 1 :]
     assert 5 < np.sum(np.diff(below.any(1).astype(int)) == 1) < 40
-
-
-def test_pictures_fit_into_their_places() -> None:
-    """Whatever their shape."""
-    for size in ((1920, 1080), (10, 4000), (4000, 10), (3, 2)):
-        width, height = fitted(*size)
-        assert 1 <= width <= TILE[0]
-        assert 1 <= height <= TILE[1]
-        assert width == TILE[0] or height == TILE[1]

@@ -1,7 +1,5 @@
 """What is said of a result's origin follows from what was given and chosen."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -37,7 +35,6 @@ def test_only_what_the_pictures_show_is_measured(shot) -> None:
 
 
 def test_made_up_detail_names_its_settings(shot) -> None:
-    """So that the same can be made again."""
     other = replace(shot, settings=replace(shot.settings, detail=0.5, seed=3))
     assert parts(other)["fine structure along the rays"].settings == {"detail": 0.5, "seed": 3}
     assert made_up(other) == (parts(other)["fine structure along the rays"].how,)
@@ -45,14 +42,12 @@ def test_made_up_detail_names_its_settings(shot) -> None:
 
 @pytest.mark.parametrize("settings", [replace(Settings.preset(), detail=0.0), Settings.preset(method="paper")])
 def test_without_detail_nothing_is_made_up(shot, settings) -> None:
-    """Whatever the seed."""
     smooth = replace(shot, settings=replace(settings, seed=3))
     assert "made up" not in {part.origin for part in provenance(smooth)}
     assert made_up(smooth) == ()
 
 
 def test_nothing_is_made_up_where_cameras_stand_all_around(shot) -> None:
-    """With all the detail asked for; a camera less, and what it would see is made up."""
     front = shot.views[0]
     near = front.working.camera
     around = [
@@ -65,8 +60,6 @@ def test_nothing_is_made_up_where_cameras_stand_all_around(shot) -> None:
 
 
 def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
-    """Further cameras limit it; the paper's method takes the picture for the side view."""
-
     def assumed(shot: Shot) -> str:
         return parts(shot)["distribution along the rays"].how.kind
 
@@ -79,7 +72,6 @@ def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
 
 
 def test_json_holds_it(shot) -> None:
-    """As plain values, in sentences."""
     plain = [part.as_dict() for part in provenance(shot)]
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
     assert [part["how"] for part in plain] == [sentence(part.how) for part in provenance(shot)]

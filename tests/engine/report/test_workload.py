@@ -1,7 +1,5 @@
 """Workloads: how many voxels may hold smoke is what the run finds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -28,7 +26,6 @@ def shares_of_a_run(shot: Shot) -> list[float]:
 
 
 def test_shares_are_those_of_the_run(plume, shot) -> None:
-    """Of a grid that is measured as it is."""
     found, shares = Workload.of(shot, SMOOTH), shares_of_a_run(shot)
     assert found.largest == pytest.approx(max(shares), rel=0.02)
     assert found.mean == pytest.approx(sum(shares) / len(shares), rel=0.1)
@@ -36,7 +33,6 @@ def test_shares_are_those_of_the_run(plume, shot) -> None:
 
 
 def test_a_large_grid_is_looked_at_coarsely(plume) -> None:
-    """Then shares are a little larger than those of the run."""
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, replace(SMOOTH, resolution=(96, 96, 128)))
         assert max(shot.optics.domain.resolution) > MAX_SIDE_VOXELS
@@ -44,7 +40,6 @@ def test_a_large_grid_is_looked_at_coarsely(plume) -> None:
 
 
 def test_frames_without_smoke_count_in_the_mean(shot) -> None:
-    """They cost nothing."""
     one = Workload.of(replace(shot, smoky=shot.smoky[:1]), SMOOTH)
     assert one.mean == pytest.approx(one.largest / shot.length)
     none = Workload.of(replace(shot, smoky=()), SMOOTH)

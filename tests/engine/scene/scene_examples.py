@@ -1,12 +1,9 @@
 """What several tests of scenes need: a file that uses every table, and a camera that moves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from smokelift.scene import Camera, Scene, look_at_matrix
 
-DATA = Path(__file__).parents[4] / "shared" / "data"
 FRONT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, -7.0), (0.0, 1.0, 0.0, 1.5), (0.0, 0.0, 0.0, 1.0))
 
 GOOD = """\

@@ -1,14 +1,86 @@
-"""What a description refuses as a whole, and what it says of itself."""
+"""A scene as a whole: its box and inlets, what is missing, what is refused."""
 
-from __future__ import annotations
-
+import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scene_examples import GOOD, load, moving_camera
 
-from smokelift.scene import Camera, Domain, Scene, SceneError
+from smokelift.scene import (
+    Background,
+    Camera,
+    Domain,
+    Inlet,
+    Medium,
+    Scene,
+    SceneError,
+    completed,
+    scene_from_dict,
+    scene_to_dict,
+)
+from smokelift.scene.domain import box_around
+
+
+def test_domain_helpers() -> None:
+    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    assert domain.centre == (0.0, 0.0, 1.5)
+    assert domain.shape == (64, 64, 96)
+    assert domain.voxel_size == 1 / 32
+
+
+def test_an_inlet_is_the_voxels_in_its_ball() -> None:
+    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    inlet = Inlet((0.1, -0.2, 0), 0.4)
+    found = inlet.voxels(domain)
+    centres = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in found.shape), indexing="ij"), -1) / 32 + domain.min
+    np.testing.assert_array_equal(found, np.linalg.norm(centres - inlet.centre, axis=-1) <= 0.4)
+    assert found.sum() / 32**3 == pytest.approx(2 / 3 * math.pi * 0.4**3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("centre", "voxel"), [((0.01, 0.02, 0.05), (32, 32, 1)), ((-1.005, 0.99, 3), (0, 63, 95))], ids=["in", "beside"]
+)
+def test_a_small_inlet_is_the_nearest_voxel(centre, voxel) -> None:
+    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    np.testing.assert_array_equal(np.argwhere(Inlet(centre, 0.006).voxels(domain)), [voxel])
+
+
+def test_the_box_around_marked_voxels_ends_at_the_grid() -> None:
+    marked = np.zeros((9, 8, 7), np.bool_)
+    assert all(marked[box_around(marked, 2)].shape[axis] == 0 for axis in range(3))
+    marked[4, 1, 6] = marked[5, 3, 5] = True
+    assert box_around(marked, 0) == (slice(4, 6), slice(1, 4), slice(5, 7))
+    assert box_around(marked, 2) == (slice(2, 8), slice(0, 6), slice(3, 7))
+
+
+def test_a_complete_scene_comes_back_as_it_was_written(tmp_path: Path) -> None:
+    scene = completed(replace(load(tmp_path, GOOD), scattering="absorption"))
+    assert completed(scene_from_dict(scene_to_dict(scene))) == scene
+
+
+def test_inlets_add_up(tmp_path: Path) -> None:
+    scene = completed(load(tmp_path, GOOD))
+    inlets = Inlet((0, 0, 0), 0.2), Inlet((0.5, 0.5, 1), 0.1)
+    expected = inlets[0].voxels(scene.domain) | inlets[1].voxels(scene.domain)
+    np.testing.assert_array_equal(replace(scene, inlets=inlets).inflow(), expected)
+    assert scene.inflow() is None
+
+
+def test_what_is_missing_takes_a_default_but_camera_and_domain(tmp_path: Path) -> None:
+    described = load(tmp_path, GOOD)
+    bare = Scene(camera=described.camera, domain=described.domain)
+    scene = completed(bare)
+    assert (scene.medium, scene.lights, scene.scattering) == (Medium(), (), "single")
+    assert scene.background == Background(color=(0.0, 0.0, 0.0))
+    assert completed(scene) == scene
+    other = described.views[0].camera
+    assert completed(replace(bare, camera=None), other) == completed(scene, other) == replace(scene, camera=other)
+    with pytest.raises(ValueError, match="no camera"):
+        completed(replace(bare, camera=None))
+    with pytest.raises(ValueError, match="no domain"):
+        completed(replace(bare, domain=None))
 
 
 def test_further_views_keep_step_with_another_range(tmp_path: Path) -> None:
@@ -36,7 +108,6 @@ def test_a_camera_that_does_not_see_the_domain_is_refused() -> None:
 
 
 def test_a_moving_camera_must_see_the_domain_once() -> None:
-    """One frame with the box in its picture is enough."""
     domain = Domain((-1, -1, 0), (1, 1, 3), (20, 20, 30))
     camera = moving_camera((50, -7, 1.5), (0, -7, 1.5))
     assert Scene(camera=camera, domain=domain).camera == camera

@@ -1,7 +1,5 @@
 """Shots that the tests of `setup` look at."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

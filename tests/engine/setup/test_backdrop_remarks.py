@@ -1,22 +1,17 @@
 """What is noticed of the background that was found, and of clips in which no smoke is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import ndimage
-from scipy.spatial.transform import Rotation
 
-from smokelift.checks import Doubt, Remark
+from smokelift.checks import Doubt
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
-from smokelift.footage.turning import moved
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_remarks import (
@@ -28,16 +23,20 @@ from smokelift.setup.backdrop_remarks import (
     smoke_in_plate,
     what_helps,
 )
-from smokelift.setup.geometry import clip_lenses
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
 from tests.engine.footage.films import coded, puff, wall
 
 
+def puff_at(row: int) -> np.ndarray:
+    """Opacity of a round puff."""
+    rows, columns = np.mgrid[:72, :56]
+    return 0.6 * np.clip(1.5 - np.hypot(rows - row, columns - 28) / 9, 0, 1)
+
+
 def before(floor: float, folder) -> Clip:
     """A clip of a puff that rises before black, above a floor of a brightness."""
-    rows, columns = np.mgrid[:72, :56]
     for n in range(12):
-        smoke = 0.6 * np.clip(1.5 - np.hypot(rows - 60 + 4 * n, columns - 28) / 9, 0, 1)
+        smoke = puff_at(60 - 4 * n)
         smoke[66:] = floor
         write_image(folder / f"frame_{n:02d}.png", smoke)
     return Clip.open(folder / "frame_##.png", fps=24)
@@ -45,7 +44,6 @@ def before(floor: float, folder) -> Clip:
 
 @pytest.mark.parametrize(("unknown_rows", "said"), [(0, False), (20, False), (60, True)])
 def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
-    """Where most of the smoke has no background that was ever seen."""
     unknown, covered = np.zeros((2, 100, 50), np.bool_)
     unknown[:unknown_rows] = True
     covered[10:80] = True
@@ -55,7 +53,6 @@ def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
-    """A flatter wall behind thinner smoke gives the same pictures."""
     random = np.random.default_rng(0)
     tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
     across = np.abs(np.arange(56) - 28)
@@ -72,12 +69,6 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
     assert remark.kind == "background partly seen"
 
 
-def test_one_colour_is_said(tmp_path) -> None:
-    """Behind a puff before black."""
-    found = find_backdrop(before(0.0, tmp_path), None, None)
-    assert backdrop_remarks(found) == (Remark("black background"),)
-
-
 @pytest.mark.parametrize(("quantiser", "said"), [(36, False), (46, True)])
 def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -> None:
     """Where the codec's smoke that stands still may be in the background, which is not so before black."""
@@ -90,53 +81,16 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -
 
 
 def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
-    """It may be a floor, or smoke that stands still."""
     remarks = backdrop_remarks(find_backdrop(before(0.3, tmp_path), None, None))
     assert [remark.kind for remark in remarks] == ["black background", "background with objects"]
 
 
-def panned(folder, lens: np.ndarray, pixels: float) -> Clip:
-    """Pictures of a wall, from a camera that pans over so many pixels."""
-    width, height = 160, 120
-    random = np.random.default_rng(0)
-    fine = sum(ndimage.gaussian_filter(random.standard_normal((2 * height, 2 * width)), s) * s for s in (1.0, 3.0))
-    y, x = np.mgrid[:height, :width] + 0.5
-    places = np.column_stack([x.ravel(), y.ravel()])
-    for n, along in enumerate(np.linspace(-0.5, 0.5, 8) * pixels / lens[0, 0]):
-        turn = Rotation.from_rotvec([0, along, 0.2 * along]).as_matrix()
-        seen = moved(places, lens @ turn @ np.linalg.inv(lens)) + np.array([width, height]) / 2 - 0.5
-        grey = ndimage.map_coordinates(0.25 + 0.08 * fine, seen.T[::-1].reshape(2, *y.shape), order=3)
-        write_image(folder / f"frame_{n:02d}.png", np.clip(grey, 0.01, 1).astype(np.float32))
-    return Clip.open(folder / "frame_##.png", fps=24)
-
-
-def test_pictures_of_a_panning_camera_tell_the_background(tmp_path) -> None:
-    """Of a sequence of pictures as of a video; its lens is 34 mm, and 50 mm are supposed."""
-    true = np.array([[150.0, 0, 80], [0, 150, 60], [0, 0, 1]])
-    clip = panned(tmp_path, true, 40)
-    found = find_backdrop(clip, None, None, clip_lenses(None, clip))
-    assert found.steadied is not None
-    assert found.steadied[0].turns.lens[0, 0] == pytest.approx(0.6 * 160 * 50 / 36, rel=0.01)
-    assert "turning camera" in [remark.kind for remark in backdrop_remarks(found)]
-    panorama, plate = found.steadied
-    still, _ = found.still(found.clip)
-    samples = sample_smoke(still, plate, panorama.corner)
-    assert not samples.smoky
-    assert samples.unknown.mean() < 0.001
-    never_clear = replace(plate, confidence=np.zeros_like(plate.confidence))
-    (doubt,) = smoke_in_plate(sample_smoke(still, never_clear, panorama.corner))
-    assert doubt.figures == {"share": 1}
-
-
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
-    """Counted in the file, and of a part of it that has one."""
     random = np.random.default_rng(0)
     for n in range(14):
         if n in (0, 7):
             wall = np.kron(random.uniform(0.05, 0.5, (9, 7)), np.ones((8, 8)))
-        smoke = 0.6 * np.clip(
-            1.5 - np.hypot(*(np.mgrid[:72, :56] - np.array([60 - 4 * n, 28])[:, None, None])) / 9, 0, 1
-        )
+        smoke = puff_at(60 - 4 * n)
         write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
         (doubt,) = cut_doubts(find_backdrop(clip, None, None))
@@ -147,7 +101,6 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
 
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
 def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> None:
-    """As the color that a scene file would give; the run says what counts as smoke."""
     rows, columns = np.mgrid[:120, :80]
     smoke = np.clip(1.5 - np.hypot(rows - 80, columns - 40) / 26, 0, 1)
     shown = linear_to_srgb((colour * (1 - smoke) + 0.6 * smoke)[..., None].repeat(3, -1).astype(np.float32))
@@ -166,11 +119,9 @@ def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> N
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
 def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) -> None:
-    """But not of a photograph, in which no smoke is found at all."""
     wall = np.kron(np.random.default_rng(0).uniform(0.05, 0.5, (9, 7)), np.ones((8, 8)))
-    rows, columns = np.mgrid[:72, :56]
     for n in range(count):
-        smoke = 0.6 * np.clip(1.5 - np.hypot(rows - 60 + 8 * n, columns - 28) / 9, 0, 1)
+        smoke = puff_at(60 - 8 * n)
         write_image(tmp_path / f"frame_{n}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_#.png") as clip:
         doubts = backdrop_doubts(find_backdrop(clip, None, None))
@@ -210,7 +161,6 @@ def grey(tmp_path):
 
 
 def test_how_many_frames_were_examined_is_said(grey) -> None:
-    """And what helps."""
     clip, plate = grey
     assert nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=()) == (
         Doubt("no smoke examined", {"frames": 4}),
@@ -218,35 +168,8 @@ def test_how_many_frames_were_examined_is_said(grey) -> None:
     )
 
 
-def test_nothing_is_said_of_smoke(grey) -> None:
-    """Where the plate is darker than the clip."""
-    clip, plate = grey
-    image = plate.image.copy()
-    image[6:18, 8:24] *= 0.5
-    dark = replace(plate, image=image)
-    assert nothing_seen(clip, dark, sample_smoke(clip, dark), given=False, cuts=()) == ()
-
-
-def test_the_background_that_is_given_is_doubted(grey) -> None:
-    assert what_helps(*grey, given=True) == Doubt("no smoke before the given background")
-
-
-def test_a_cut_is_said_before_all_else(grey) -> None:
-    """No background fits both of its sides."""
-    clip, plate = grey
-    said = nothing_seen(clip, plate, sample_smoke(clip, plate), given=True, cuts=(Doubt("cut"),))
-    assert said[1:] == (Doubt("cut"),)
-
-
-def test_one_frame_shows_no_background(grey) -> None:
-    """A photograph of smoke."""
-    clip, plate = grey
-    assert what_helps(clip.part(2, 2), plate, given=False) == Doubt("no smoke in one frame")
-
-
 @pytest.mark.parametrize(("codes", "moves"), [(5, False), (20, True)])
 def test_a_background_that_changes_may_be_that_of_a_camera_that_moves(grey, codes, moves) -> None:
-    """More than noise does."""
     clip, plate = grey
     doubt = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False)
     assert (doubt.kind == "no smoke before a changing background") is moves

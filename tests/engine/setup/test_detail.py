@@ -1,10 +1,7 @@
 """Resolution by measurement: detail asks for voxels; blur and noise do not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,15 +57,10 @@ def shot_of(scene: Scene, settings: Settings) -> Shot:
         return prepare_shot(clip, scene, settings)
 
 
-def longest(scene: Scene, settings: Settings) -> int:
-    return max(shot_of(scene, settings).scene.domain.resolution)
-
-
 AUTO = Settings.preset("draft", resolution="auto")
 
 
 def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
-    """A sharp one gets what the quality allows; in the box that was given, with its proportions."""
     sharp, soft, blurred = (shot_of(filmed(blur), AUTO) for blur in (0.0, 4.0, 12.0))
     sides = [max(shot.scene.domain.resolution) for shot in (sharp, soft, blurred)]
     assert sides[0] >= LIMITS["draft"].most - 3
@@ -100,7 +92,6 @@ def test_noise_is_no_detail() -> None:
 
 
 def test_a_given_resolution_wins(filmed) -> None:
-    """The scene's, where nothing else is said, and the settings' before it."""
     scene = filmed(12.0)
     assert shot_of(scene, Settings.preset("draft")).scene.domain == scene.domain
     by_hand = shot_of(scene, Settings.preset("draft", resolution=(20, 20, 30)))
@@ -110,7 +101,6 @@ def test_a_given_resolution_wins(filmed) -> None:
 
 @pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
 def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> None:
-    """The voxels that fill it may stand over by less than one, never below its floor."""
     box = Box((-size[0] / 2, -1, 0), (size[0] / 2, 1, size[2]))
     scene = replace(filmed(0.0), domain=box)
     shot = shot_of(scene, Settings.preset("draft"))
@@ -128,22 +118,6 @@ def test_a_box_without_a_resolution_holds_whatever_is_given_by_hand(filmed) -> N
         domain = shot_of(scene, Settings.preset(resolution=resolution)).scene.domain
         assert domain.resolution == resolution
         np.testing.assert_allclose([domain.min, domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9)
-
-
-def test_a_box_that_is_found_is_chosen_for_too(filmed) -> None:
-    """Nothing but the clip and a colour behind it."""
-    for blur, bound in ((0.0, 60), (12.0, 44)):
-        scene = filmed(blur)
-        bare = Scene(clip=scene.clip, background=scene.background)
-        found = longest(bare, Settings.preset("draft"))
-        assert found >= bound if blur == 0.0 else found <= bound
-
-
-def test_quality_is_the_limit(filmed) -> None:
-    """More than it is never chosen."""
-    scene = filmed(0.0, grain=0.8)
-    sides = [longest(scene, Settings.preset(quality, resolution="auto")) for quality in ("draft", "balanced")]
-    assert sides[0] <= LIMITS["draft"].most < sides[1] <= LIMITS["balanced"].most
 
 
 @pytest.mark.parametrize("box", [True, False])
@@ -164,17 +138,6 @@ def test_final_has_a_voxel_a_pixel(filmed, box) -> None:
         assert choice.figures["lost"] < 0.005
 
 
-def test_what_is_lost_is_measured_against_the_clip(filmed) -> None:
-    """A quality says what its own finest grid loses, and finer ones lose less."""
-    scene = filmed(0.0, grain=0.8)
-    lost = [
-        next(c for c in shot_of(scene, Settings.preset(quality, resolution="auto")).estimates if c.what == "resolution")
-        for quality in ("draft", "balanced", "final")
-    ]
-    assert lost[0].figures["lost"] > 0.05
-    assert lost[0].figures["lost"] > 1.2 * lost[1].figures["lost"] > 1.2 * lost[2].figures["lost"]
-
-
 def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     """A wave of six pixels is there with voxels of three and not with four; what there is not is not lost."""
     columns = np.indices((192, 192))[1]
@@ -187,10 +150,3 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     assert detail.lost(100, 192) < 0.01
     assert detail.lost(192 // 4, 192) == detail.lost(192 // 4)
     assert Detail(np.zeros(96), 64).lost(32) == 0
-
-
-def test_settings_know_auto(tmp_path: Path) -> None:
-    """And nothing else that is no three numbers."""
-    assert Settings.preset(resolution="auto").as_dict()["resolution"] == "auto"
-    with pytest.raises(ValueError, match="three whole numbers"):
-        Settings(resolution="64")  # type: ignore[arg-type]

@@ -1,7 +1,5 @@
 """Further views of a shot: in step with the input, before a background of their own, refused where they do not fit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +9,7 @@ import pytest
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
-from smokelift.scene import Background, ClipSource, Scene, SceneError, completed, look_at_matrix
+from smokelift.scene import Background, ClipSource, Scene, completed, look_at_matrix
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
@@ -36,20 +34,10 @@ def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
 
 @pytest.mark.parametrize(("asked", "first"), [((0, 4), 1), ((2, 3), 3)])
 def test_a_further_view_follows_the_clip_that_is_used(two_views, draft, asked, first) -> None:
-    """Also one that was opened at other frames than the scene's."""
     for scene in (two_views, two_views.with_frames(1, 3)):
         with Clip.open(two_views.clip, frames=asked) as clip:
             _, view = prepare_shot(clip, scene, draft).views
         assert (view.clip.first, len(view.clip)) == (first, asked[1] - asked[0] + 1)
-
-
-def test_a_further_view_has_the_same_numbers_if_nothing_is_said(two_views, draft) -> None:
-    """Without frames of its own; then the side, which began earlier, is used from its first."""
-    (view,) = two_views.views
-    scene = replace(two_views, views=(replace(view, clip=replace(view.clip, frames=None)),))
-    with Clip.open(scene.clip, frames=(2, 4)) as clip:
-        _, found = prepare_shot(clip, scene, draft).views
-    assert (found.clip.first, len(found.clip)) == (2, 3)
 
 
 def behind(shot: Shot, view: int, frame: int = 0) -> float:
@@ -77,7 +65,6 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
 
 @pytest.mark.parametrize("wrong", ["camera", "background"])
 def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
-    """A camera that stands elsewhere, or another background: nothing is refused, but it is said."""
     (view,) = two_views.views
     if wrong == "camera":
         lower = look_at_matrix((4, 0, 0.2), (0, 0, 0.2), (0, 0, 1))
@@ -120,14 +107,5 @@ def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
     ],
 )
 def test_a_further_view_that_does_not_belong_is_refused(two_views, draft, tmp_path, what, sentence) -> None:
-    """The sentence says what is wrong and what to do."""
     with pytest.raises(ValueError, match=sentence):
         shot_of(spoilt(two_views, what, tmp_path), draft)
-
-
-def test_a_further_view_beside_the_box_is_refused(two_views, draft) -> None:
-    """Where the scene is made, as for the input's camera."""
-    (view,) = two_views.views
-    away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
-    with pytest.raises(SceneError, match="does not see the domain"):
-        replace(two_views, views=(replace(view, camera=replace(view.camera, matrix=away)),))

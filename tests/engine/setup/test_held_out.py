@@ -1,7 +1,5 @@
 """The judge of lights: the other half of the pixels, in whatever light the smoke is shown."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +27,6 @@ def frame(plume) -> CoarseFrame:
 
 
 def test_the_right_light_and_model_leave_the_least(frame, draft) -> None:
-    """And ask for no other light, nor for another colour."""
     right = held_out([frame], "single", "single", draft.density)
     wrong = held_out([frame], "unshadowed", "single", draft.density)
     assert right.error < 0.05 < wrong.error
@@ -46,7 +43,6 @@ def test_a_light_of_another_colour_is_asked_to_change(frame, draft) -> None:
 
 
 def test_pictures_of_lights_add(frame, draft) -> None:
-    """Strengths are least squares because the light of two is the sum of theirs."""
     fit = fit_half([frame], draft.density)
     one, other = scene_optics(frame.scene).lights[0], DirectionalLight((1.0, 0.0, 0.0), (3.0, 3.0, 3.0))
     together, alone = fit.lit((one, other), "single"), [fit.lit((light,), "single") for light in (one, other)]

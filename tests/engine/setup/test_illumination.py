@@ -1,7 +1,5 @@
 """The light of a shot: what is given stays unless the clip contradicts it, and what is not is taken from the clip."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -25,7 +23,6 @@ from tests.engine.setup.shots import shot_of
 
 
 def test_brightening_smoke_has_a_bright_source(plume, draft) -> None:
-    """Thick smoke looks at least as bright as the brightest smoke in the clip."""
     shot = shot_of(replace(plume.scene, lights=()), draft)
     with Clip.open(plume.scene.clip) as clip:
         brightest = max(float(frame.max()) for frame in clip)
@@ -48,19 +45,6 @@ def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
     source = 0.3 / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
     assert source.max() <= 1.1 * darkest
     assert source.max() < 0.4
-
-
-def test_smoke_that_scatters_nothing_needs_no_light(plume, draft, tmp_path) -> None:
-    """Albedo 0 is soot: whatever the light, it only darkens, so none has to be assumed."""
-    black = replace(
-        plume.scene,
-        medium=Medium(extinction=8.0, albedo=0.0),
-        lights=(),
-        background=Background(color=(0.8, 0.8, 0.8)),
-    )
-    scene = plume.write(tmp_path / "clip", plume.densities, black)
-    shot = shot_of(scene, draft)
-    assert shot.scene.medium == black.medium
 
 
 # given lights
@@ -86,7 +70,6 @@ def test_a_light_that_the_clip_does_not_contradict_stays(thick, draft) -> None:
 
 
 def test_a_light_that_is_too_weak_becomes_stronger(thick, draft) -> None:
-    """Between once and twice what was taken away, since thicker smoke makes up for some of it."""
     (sun,) = thick.lights
     factor, said = strengths(replace(thick, lights=(sun.scaled(0.4),)), draft)
     assert 1.5 < factor < 3.2
@@ -107,23 +90,6 @@ def test_a_light_is_not_blamed_because_thinner_smoke_fits_better(thick, draft, m
     assert strengths(thick, draft) == (1.0, [])
     asked[1.0], asked[1.25] = 1.4, 1.1
     assert strengths(thick, draft)[0] == pytest.approx(1.5625)
-
-
-def test_single_scattering_by_hand_blames_no_light(thick, draft) -> None:
-    """It is darker than the clip because orders of scattering are missing."""
-    assert strengths(replace(thick, scattering="single"), draft) == (1.0, [])
-
-
-def test_a_light_is_not_blamed_where_a_stronger_one_leaves_as_much_dark(thick, draft, monkeypatch) -> None:
-    """Thin smoke before a wall, whose densities are wrong for other reasons: each step gains a little, and no light."""
-    (sun,) = thick.lights
-
-    def held_out(frames, *_) -> HeldOut:
-        factor = frames[0].scene.lights[0].irradiance[0] / sun.irradiance[0]
-        return HeldOut(0.21 + 0.001 / factor, 1.08 + 0.01 * factor)
-
-    monkeypatch.setattr(illumination, "held_out", held_out)
-    assert strengths(thick, draft) == (1.0, [])
 
 
 # light from everywhere with shadows
@@ -172,7 +138,6 @@ def leaves(monkeypatch):
 
 
 def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(lit, draft, leaves) -> None:
-    """The strength stays that of what is behind the smoke, and the direction undetermined."""
     tried = leaves(0.02)
     shot = shot_of(unlit(lit), draft)
     choice, lights = scattering_of(shot), shot.scene.lights
@@ -199,19 +164,9 @@ def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
 
 
 def test_a_light_that_is_given_stays(lit, draft, leaves) -> None:
-    """Only a light that nothing tells is replaced."""
     tried = leaves(1.0)
     assert shot_of(lit, draft).scene.lights == lit.lights
     assert not tried
-
-
-@pytest.mark.parametrize("light", [0.0, 0.4])
-def test_dark_smoke_before_something_bright_stays_dark(plume, draft, tmp_path, light) -> None:
-    """Black smoke, and smoke that is lit a little, would have to be very thick to be as dark in that light."""
-    faint = DirectionalLight((-0.7, 0.6, -0.5), (light,) * 3)
-    dark = replace(plume.scene, medium=Medium(6.0, 0.9), lights=(faint,), background=Background(color=(0.8, 0.9, 1.0)))
-    shot = shot_of(unlit(plume.write(tmp_path, plume.densities, dark)), draft)
-    assert shot.scene.scattering in ("absorption", "unshadowed")
 
 
 @pytest.mark.parametrize(
@@ -226,7 +181,6 @@ def test_dark_smoke_before_something_bright_stays_dark(plume, draft, tmp_path, l
     ids=["one colour", "well explained", "black", "noise", "a wall"],
 )
 def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(error, behind, noise, said) -> None:
-    """Elsewhere other things may be what is left."""
     shown = np.linspace(0.1, 0.5, 300).reshape(100, 3) if behind is None else np.tile(behind, (100, 1))
     samples = SimpleNamespace(behind=shown, smoky=(0,))
     choice = Estimate(
@@ -236,12 +190,3 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
     light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), unknown, unknown)
     _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255))
     assert doubts == [Doubt("likely wrong light", {"error": error})] * said
-
-
-def test_the_doubt_is_said_of_a_shot(lit, draft, leaves, monkeypatch) -> None:
-    """Once, beside the light that is taken, and never of one that is given."""
-    leaves(1.0)
-    monkeypatch.setattr("smokelift.setup.illumination.DOUBTFUL", 0.01)
-    for scene, doubts in ((unlit(lit), 1), (lit, 0)):
-        kinds = [remark.kind for remark in shot_of(scene, draft).remarks]
-        assert kinds.count("likely wrong light") == doubts

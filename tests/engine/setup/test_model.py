@@ -1,7 +1,5 @@
 """Choices by measurement: each clip gets what it needs and no more, and what is said by hand is not measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,34 +10,20 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
 from smokelift.footage.working_picture import working_picture
 from smokelift.output.images import write_image
-from smokelift.pipeline import Reconstruction, compose
 from smokelift.render import scene_optics
-from smokelift.scene import (
-    Background,
-    Domain,
-    EnvironmentLight,
-    Medium,
-    PointLight,
-    Scene,
-    SceneError,
-    completed,
-    look_at_matrix,
-)
+from smokelift.scene import Background, Domain, EnvironmentLight, Medium, Scene, SceneError, completed
 from smokelift.setup import illumination, scattering
 from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
-from smokelift.transport import Velocity
-from smokelift.velocity import CoarseToFine, VelocitySettings
+from smokelift.velocity import VelocitySettings
 from tests.engine.setup.shots import shot_of
 
 
@@ -89,7 +73,6 @@ def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
 
 
 def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
-    """Without shadows the richest model sees at once that the density is wrong."""
     shot = shot_of(plume.scene, draft)
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "single"
@@ -98,7 +81,6 @@ def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
 
 
 def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> None:
-    """Single scattering cannot be that bright; anisotropic smoke has no richer model."""
     shot = shot_of(white, draft)
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "multiple"
@@ -143,23 +125,7 @@ def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
     assert choice.figures["error_multiple"] == 0.01
 
 
-def test_no_model_is_measured_twice(plume, draft, monkeypatch) -> None:
-    """What is known of multiple scattering from the light's strength decides on it too."""
-    measured = []
-
-    def counted(frames, model, judge, settings) -> HeldOut:
-        measured.append((frames[0].scene.lights, model, judge))
-        return held_out(frames, model, judge, settings)
-
-    held_out = scattering.held_out
-    for module in (scattering, illumination):
-        monkeypatch.setattr(module, "held_out", counted)
-    shot_of(plume.scene, draft)
-    assert len(measured) == len(set(measured))
-
-
 def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
-    """It is lit, but casts none that are seen."""
     choice = chosen(shot_of(thin, draft), "scattering")
     assert choice.value == "unshadowed"
     assert {"error_absorption", "error_unshadowed", "error_single", "error_multiple"} < set(choice.figures)
@@ -167,7 +133,6 @@ def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
 
 @pytest.mark.parametrize("model", ["absorption", "unshadowed", "single", "multiple"])
 def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
-    """Whatever the clip shows; nothing is measured for it, and the run keeps it."""
     for scene in (plume.scene, thin):
         shot = shot_of(scene, with_scattering(draft, model))
         choice = chosen(shot, "scattering")
@@ -175,75 +140,21 @@ def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
 
 
 def test_shadows_need_a_light(silhouette, draft) -> None:
-    """A light that was made up has no direction to cast them in."""
     for model in ("single", "multiple"):
         with pytest.raises(ValueError, match=rf'"{model}" needs a light'):
             shot_of(silhouette, with_scattering(draft, model))
 
 
-def test_unknown_models_are_refused(draft) -> None:
-    """Where the settings are made."""
-    with pytest.raises(ValueError, match="one of auto, multiple, single, unshadowed, absorption, not 'many'"):
-        with_scattering(draft, "many")
-
-
-def test_smoke_that_scatters_nothing_absorbs(plume, draft) -> None:
-    """That is no question of measuring."""
-    dark = replace(plume.scene, medium=Medium(8.0, 0.0))
-    assert shot_of(dark, draft).scene.scattering == "absorption"
-
-
-def test_choices_are_the_same_again(plume, thin, draft) -> None:
-    """To the bit: what is gone on with is what was begun."""
-    for scene in (plume.scene, thin):
-        assert shot_of(scene, draft).estimates == shot_of(scene, draft).estimates
-
-
-def test_the_papers_method_chooses_nothing(plume) -> None:
-    """It is kept as it is."""
-    shot = shot_of(plume.scene, Settings.preset("draft", "paper"))
-    assert shot.scene.scattering == "single"
-    assert [choice.what for choice in shot.estimates] == ["resolution"]
-    assert shot.estimates[0].source == "given"
-
-
 def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
-    """The richest model stands by."""
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
     assert shot.scene.scattering == "single"
     assert [choice.what for choice in shot.estimates] == ["resolution"]
 
 
-def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draft, monkeypatch) -> None:
-    def blind(frame, plate):
-        judged = matte(frame, plate)
-        return replace(judged, share=np.zeros_like(judged.share))
-
-    monkeypatch.setattr("smokelift.setup.coarse.matte", blind)
-    shot = shot_of(plume.scene, draft)
-    assert shot.scene.scattering == "single"
-    assert not any(choice.what == "scattering" for choice in shot.estimates)
-
-
-def test_a_moving_camera_is_no_hindrance(plume, tracked, draft, tmp_path) -> None:
-    """Every frame is measured with its own; one that looks away is left out."""
-    assert chosen(shot_of(tracked, draft), "scattering").value == "single"
-    poses = tuple(
-        look_at_matrix((0, -4, 0.8), (0, -9 if away else 0, 0.8), (0, 0, 1))
-        for away in (False, True, True, True, False)
-    )
-    turning = replace(tracked, camera=replace(tracked.camera, matrix=poses[0], matrices=poses))
-    scene = plume.write(tmp_path, plume.densities, turning)
-    assert chosen(shot_of(scene, draft), "scattering").value == "single"
-
-
 # coarse boxes and pictures
 
 
-@given(
-    st.tuples(*[st.integers(8, 160)] * 3),
-    st.floats(0.3, 20),
-)
+@given(st.tuples(*[st.integers(8, 160)] * 3), st.floats(0.3, 20))
 @example((8, 8, 33), 0.3)  # a side of one coarse voxel
 @hypothesis_settings(deadline=None, max_examples=60, derandomize=True)
 def test_a_coarse_box_stays_in_the_box(resolution, pixels) -> None:
@@ -258,7 +169,6 @@ def test_a_coarse_box_stays_in_the_box(resolution, pixels) -> None:
 
 
 def test_a_usual_box_keeps_its_corners() -> None:
-    """Where whole numbers of voxels make one, nothing is cut off."""
     domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (64, 64, 96))
     assert coarse_domain(domain, 4.0) == replace(domain, resolution=(16, 16, 24))
 
@@ -290,12 +200,10 @@ def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
 
 @pytest.mark.parametrize(("motion", "levels"), [(0.0, 1), (0.8, 1), (0.9, 2), (2.4, 2), (2.5, 3), (9.0, 3), (500.0, 3)])
 def test_grids_reach_as_far_as_the_smoke_goes(motion, levels) -> None:
-    """1 and 3 voxels, a quarter more than was found, and no further than usual."""
     assert levels_for(motion) == levels
 
 
 def test_faster_smoke_gets_more_grids(plume) -> None:
-    """In voxels of the final grid, whatever the coarse one is."""
     scene, finer = plume.scene, replace(plume.scene, domain=replace(plume.scene.domain, resolution=(48, 48, 64)))
     slow, fast = ([plume.blob(scene, 0.6), plume.blob(scene, 0.6 + rise)] for rise in (0.03, 0.25))
     found = [
@@ -309,16 +217,6 @@ def test_faster_smoke_gets_more_grids(plume) -> None:
     assert [choice.value for choice in found] == [levels_for(motion) for motion in motions]
 
 
-def test_grids_by_hand_win(plume, draft) -> None:
-    """And are used; a single frame has no motion, and the usual number."""
-    by_hand = replace(draft, velocity=replace(draft.velocity, levels=1))
-    choice = chosen(shot_of(plume.scene, by_hand), "velocity levels")
-    assert (choice.value, choice.source) == (1, "given")
-    alone = replace(plume.scene, clip=replace(plume.scene.clip, frames=(0, 0)))
-    choice = chosen(shot_of(alone, draft), "velocity levels")
-    assert (choice.value, choice.figures) == (3, {})
-
-
 def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
     """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
     free = draft.velocity
@@ -328,13 +226,6 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     assert [choice.figures["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
     by_hand = choose_coarsening(plume.scene.domain, replace(free, coarsening=0), 30)
     assert (by_hand.value, by_hand.source) == (0, "given")
-
-
-def test_motion_is_measured_although_the_last_frame_has_the_most_smoke(plume, draft, tmp_path) -> None:
-    """Nothing follows the last frame, so the one before is followed."""
-    growing = [share * density for share, density in zip((0.02, 0.05, 0.15, 0.4, 1), plume.densities, strict=True)]
-    choice = chosen(shot_of(plume.write(tmp_path, growing), draft), "velocity levels")
-    assert choice.figures["voxels_a_frame"] > 0.5
 
 
 # environments
@@ -367,7 +258,6 @@ def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp
 
 
 def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
-    """They are in the scene file, and go through it."""
     light = environment(tmp_path, np.full((8, 16, 3), 0.5, np.float32), directions=6)
     scene = replace(plume.scene, lights=(light,))
     scene.save(tmp_path / "scene.toml")
@@ -382,58 +272,11 @@ def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
 # what is said and kept
 
 
-def test_every_estimate_has_its_figures(plume, draft) -> None:
-    shot = shot_of(plume.scene, draft)
-    assert [choice.what for choice in shot.estimates] == [
-        "resolution", "scattering", "domain", "iterations", "velocity grid coarsening", "velocity levels",
-        "axis depth",
-    ]  # fmt: skip
-    assert all(estimate.source == "given" or estimate.figures for estimate in shot.estimates)
-
-
-def test_iterations_by_hand_are_said(plume, draft) -> None:
-    """Those of the quality are not."""
-    by_hand = replace(draft, density=replace(draft.density, descent_iterations=1))
-    found = [chosen(shot_of(plume.scene, settings), "iterations") for settings in (draft, by_hand)]
-    assert [(choice.source, choice.value) for choice in found] == [("measured", 8), ("given", 5)]
-
-
-def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path) -> None:
-    """Nothing is rendered, predicted or carried where there is no smoke."""
-    nothing = np.zeros_like(plume.densities[0])
-    clip = [plume.densities[0], nothing, nothing, nothing, plume.densities[1]]
-    scene = plume.write(tmp_path, clip)
-    predicted: list[Velocity] = []
-
-    class Counted(CoarseToFine):
-        def predict(self, velocity: Velocity, dt: float) -> Velocity:
-            predicted.append(velocity)
-            return super().predict(velocity, dt)
-
-    with Clip.open(scene.clip) as opened:
-        shot = prepare_shot(opened, scene, draft)
-        method = replace(compose(shot.settings), velocity_estimator=Counted(shot.settings.velocity))
-        frames = list(Reconstruction(shot, method))
-    assert not predicted
-    assert [frame.figures["iterations"] > 0 for frame in frames] == [True, False, False, False, True]
-
-
-def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> None:
-    """The coarse box has to leave it outside."""
-    lamp = PointLight((0.61, 0.0, 0.8), (6.0, 6.0, 6.0))
-    domain = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.55), (24, 24, 31))
-    near = replace(plume.scene, domain=domain, lights=(lamp,))
-    densities = [density[:, :, :31] for density in plume.densities[:2]]
-    assert shot_of(plume.write(tmp_path, densities, near), draft).estimates
-
-
 def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
-    """What was chosen is given then, and chooses the same."""
     first = shot_of(plume.scene, draft)
     assert shot_of(plume.scene, first.settings).settings == first.settings
 
 
 def test_a_camera_is_alone_where_no_other_sees_the_smoke_and_it_stands_still(plume, tracked, two_views, draft) -> None:
-    """Its rays mix what moves."""
     shots = [shot_of(scene, draft) for scene in (plume.scene, two_views, tracked)]
     assert [shot.alone for shot in shots] == [True, False, False]

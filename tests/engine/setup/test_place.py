@@ -1,7 +1,5 @@
 """Where the smoke stands in depth, and how well that is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +30,6 @@ def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, depth: float, kind: str)
 
 
 def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
-    """By what is given, else by what it shows; unless the method does not ask."""
     blind = replace(plume.scene, inlets=())
     found = shot_of(blind, draft)
     assert found.place is not None and found.estimates[-1] == place_estimate(found.place)
@@ -68,7 +65,6 @@ def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings)
 
 
 def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(plume, draft: Settings) -> None:
-    """What travels does not: it sees the smoke from elsewhere."""
     blind = replace(plume.scene, inlets=())
     count = len(plume.densities)
     still = shot_of(blind, draft).place

@@ -1,7 +1,5 @@
 """Fire in a shot: it is distinguished from the smoke, and its colour is what the clip shows or the scene says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -13,7 +11,6 @@ from tests.engine.setup.shots import burning
 
 
 def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> None:
-    """Dark smoke with a flame in it, and the same without one."""
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
     scene = replace(plume.write(tmp_path, plume.densities, dim), lights=())
     with Clip.open(scene.clip) as clip:

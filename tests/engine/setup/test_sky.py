@@ -1,9 +1,5 @@
 """A sun that no scene gives: cameras all around tell where it stands, fewer do not."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import nnls
@@ -11,7 +7,7 @@ from scipy.optimize import nnls
 from smokelift.scene import DirectionalLight
 from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.shot import Shot
-from smokelift.setup.sky import SHADING, SPREAD, light_around, sphere, strengths
+from smokelift.setup.sky import SPREAD, light_around, sphere, strengths
 from tests.engine.setup.shots import AROUND, filmed_around, shot_of
 
 SUN = np.array((-0.5, -0.6, -0.4))
@@ -44,29 +40,13 @@ def test_light_from_everywhere_is_no_sun(plume, tmp_path, draft) -> None:
 
 
 def test_three_cameras_that_agree_are_enough(plume, tmp_path, draft) -> None:
-    """However close together: without one of them the sun stands where it did."""
     shot = shot_of(filmed_around(plume, tmp_path, (LIGHT,), AROUND[:3]), draft)
     found = direction(shot)
     assert found.spread < SPREAD
     assert found.value != UNDETERMINED
 
 
-def test_one_camera_is_not_asked(plume, tmp_path, draft) -> None:
-    found = direction(shot_of(filmed_around(plume, tmp_path, (LIGHT,), AROUND[:1]), draft))
-    assert found.value == UNDETERMINED
-    assert not found.figures
-
-
-def test_smoke_that_hardly_shades_itself_tells_no_sun(plume, tmp_path, draft) -> None:
-    thin = replace(plume, densities=tuple(0.02 * density for density in plume.densities))
-    bright = replace(LIGHT, irradiance=tuple(20 * value for value in LIGHT.irradiance))
-    found = direction(shot_of(filmed_around(thin, tmp_path, (bright,)), draft))
-    assert found.value == UNDETERMINED
-    assert found.figures["shading"] < SHADING
-
-
 def test_directions_are_spread_evenly() -> None:
-    """No two are close, and none is far from all others."""
     ways = sphere(48)
     np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1)
     between = np.degrees(np.arccos(np.clip(ways @ ways.T - 2 * np.eye(48), -1, 1))).min(1)
@@ -74,7 +54,6 @@ def test_directions_are_spread_evenly() -> None:
 
 
 def test_light_around_has_its_radiance_and_no_direction() -> None:
-    """Thin smoke that scatters all light is as bright as what is behind it."""
     lights = light_around(np.array([0.2, 0.3, 0.4]))
     assert np.allclose(np.sum([light.irradiance for light in lights], 0) / (4 * np.pi), (0.2, 0.3, 0.4))
     assert np.allclose(np.sum([light.direction for light in lights], 0), 0)
@@ -82,7 +61,6 @@ def test_light_around_has_its_radiance_and_no_direction() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_strengths_are_the_least_squares_of_lights_that_add(seed: int) -> None:
-    """Also where one of the two, or both, would take light away."""
     rng = np.random.default_rng(seed)
     lit, around = rng.uniform(0, 1, (6, 40)), rng.uniform(0, 1, 40)
     for seen in (0.5 * lit[0] + 0.2 * around, lit[1] - 0.3 * around, around - 0.5 * lit[2], -lit[0]):

@@ -39,7 +39,6 @@ def thickness(depth=1.0, texture=0.04, noise=0.003, frames=5, fade=1.0, confiden
 
 @pytest.mark.parametrize("depth", [0.3, 1.0, 3.0])
 def test_texture_tells_thick_smoke_from_thin(depth) -> None:
-    """The source is the same, however little of it the smoke shows."""
     source, choice = thickness(depth)
     assert source == pytest.approx(SOURCE, rel=0.15)
     assert choice.spread < 0.15
@@ -73,13 +72,11 @@ def test_texture_that_is_lost_without_smoke_tells_nothing() -> None:
 
 
 def test_a_background_that_may_be_smoke_tells_nothing_of_thin_smoke() -> None:
-    """What is unsure is held against what the smoke hides: thick smoke stands out from it."""
     assert thickness(depth=0.3, confidence=0.95)[0] is None
     assert thickness(depth=3.0, confidence=0.95)[0] is not None
 
 
 def test_thin_smoke_is_lit_as_strongly_as_it_hides() -> None:
-    """Without texture the brightest thin smoke is taken for thick smoke."""
     clear = transmittance(0.3, 0)
     smoky = clear[..., 0] < 0.95
     behind = backdrop(0.0)

@@ -1,7 +1,5 @@
 """Cameras of different exposure and white balance: what was done to one of them is found and undone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -43,7 +41,6 @@ def gains(shot):
 
 @pytest.mark.parametrize("gain", [(0.6, 0.6, 0.6), (1.4, 1.0, 0.8)], ids=["exposure", "white balance"])
 def test_another_exposure_is_found_and_undone(filmed, draft, gain) -> None:
-    """Of the smoke and of what is behind it; the choice says so and is kept."""
     shot = shot_of(filmed(gain), draft)
     (found,) = gains(shot)
     assert found.what == "gain of view 1"
@@ -67,8 +64,3 @@ def test_unknown_light_explains_more(filmed, draft) -> None:
     (found,) = gains(shot_of(scene, draft))
     assert float(found.value.split(",")[0]) == pytest.approx(1.28, rel=0.06)
     assert gains(shot_of(replace(scene, lights=()), draft)) == []
-
-
-def test_nothing_is_measured_where_the_settings_say_so(filmed, draft) -> None:
-    settings = replace(draft, selection=replace(draft.selection, measure=False))
-    assert gains(shot_of(filmed((0.6,) * 3), settings)) == []

@@ -1,7 +1,5 @@
 """Velocities on small boxes, and the ways to close their sides."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -10,8 +8,6 @@ from smokelift.scene import SIDES
 from smokelift.transport import Velocity
 
 SHAPE = (13, 10, 17)
-
-
 ALL_SIDES = list(itertools.product([False, True], repeat=6))
 
 

@@ -1,7 +1,5 @@
 """Staggered grids: what they hold, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,12 +1,8 @@
 """Structured smoke that moves or turns as a whole, and how near an estimate comes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 SHAPE = (32, 28, 40)
-
-
 DT, VOXEL = 1 / 24, 0.03
 
 

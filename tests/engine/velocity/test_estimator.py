@@ -1,7 +1,5 @@
 """What every estimator has in common."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -23,11 +21,7 @@ def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
 
 @pytest.mark.parametrize("shape", [(40, 36, 44), (41, 35, 43)])
 @pytest.mark.parametrize(
-    "box",
-    [
-        (slice(13, 20), slice(0, 9), slice(30, 31)),
-        (slice(0, 5), slice(11, 25), slice(14, 33)),
-    ],
+    "box", [(slice(13, 20), slice(0, 9), slice(30, 31)), (slice(0, 5), slice(11, 25), slice(14, 33))]
 )
 def test_part_of_a_finer_velocity_is_what_the_whole_has_there(shape, box):
     """Computed around the box alone, on a grid coarsened twice, with what is known of the estimate."""

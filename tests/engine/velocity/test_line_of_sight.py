@@ -1,7 +1,5 @@
 """The average along the line of sight: what it keeps, what it takes away."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -36,7 +34,6 @@ def test_the_average_has_no_divergence_and_goes_either_way(line) -> None:
 
 
 def test_only_what_changes_along_the_line_is_averaged() -> None:
-    """Waves of eight voxels in the upward flow: along y they go, along x they stay."""
     z = np.zeros(face_shapes(SHAPE)[2], np.float32)
     waves = np.sin(2 * np.pi * np.arange(SHAPE[0]) / 8).astype(np.float32)
     still = tuple(np.zeros(shape, np.float32) for shape in face_shapes(SHAPE)[:2])

@@ -1,7 +1,5 @@
 """A velocity of a coarser grid, where smoke is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -58,7 +56,6 @@ def test_velocity_is_right_where_smoke_can_arrive_and_zero_far_away() -> None:
 
 
 def test_slabs_of_a_large_box_are_as_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two puffs apart, so that slabs have other sides, and one is empty."""
     density, velocity = puff(), flow(1.0)
     density[30:34, 28:32, 40:44] = 0.5
     carried, near = carry(density, velocity, 1.0, 1.0), near_smoke(velocity, density > 0, 1.0, 1.0)

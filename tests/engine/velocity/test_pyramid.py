@@ -1,7 +1,5 @@
 """Grids that are half as fine."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ from smokelift.velocity.pyramid import coarsen_faces, prolonged
 
 @pytest.mark.parametrize("shape", [(8, 6, 10), (7, 9, 5)])
 def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
-    """What goes through a coarse face is what went through its four fine ones."""
     rng = np.random.default_rng(0)
     rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(shape)), 1.0)
     coarse = coarsen_faces(project(rough))
@@ -24,7 +21,6 @@ def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
 @pytest.mark.parametrize("closed", [(), ("z-",), ("x+", "y-", "z+")])
 @pytest.mark.parametrize("shape", [(12, 8, 10), (11, 9, 7)])
 def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed):
-    """Whatever the flow, and where an odd number of voxels cuts the last coarse ones in half."""
     rng = np.random.default_rng(1)
     coarse_shape = tuple((n + 1) // 2 for n in shape)
     rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(coarse_shape)), 2.0, closed)
@@ -37,8 +33,6 @@ def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed
 
 
 def test_twice_as_fine_a_turning_flow_turns_as_it_did():
-    """A flow that is linear in space has one value at a place, whatever the grid."""
-
     def turning(voxel: float, shape: tuple[int, int, int]) -> Velocity:
         x, y = (voxel * (np.arange(n) + 0.5) for n in shape[:2])
         faces = (y[None, :, None], -x[:, None, None], np.zeros((1, 1, 1)))

@@ -1,11 +1,10 @@
 """The solvers, on a grid so small that the matrix of the linear problem can be written out."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from smokelift import _core
 from smokelift.baselines.velocity import PaperVelocity
@@ -13,8 +12,6 @@ from smokelift.velocity import PrimalDual
 from tests.engine.velocity.known_motions import DT, VOXEL, translation
 
 OPEN = [False] * 6
-
-
 TINY = (5, 4, 6)
 
 
@@ -24,19 +21,19 @@ def tiny_faces(rng):
     return [rng.standard_normal(shape).astype(np.float32) for shape in shapes]
 
 
+def problem_of(shape, centre, **given):
+    """The linear problem of a centre alone, but for what is given."""
+    zero = np.zeros(shape, np.float32)
+    cells = {"direction": [zero] * 3, "offset": zero, "weight": zero, "irrotational": zero}
+    terms = {"first_order": 0.0, "second_order": 0.0, "kinetic": 0.0, "closed": OPEN}
+    return _core.LeastSquares(centre=centre, **cells | terms | given)
+
+
 def tiny_problem(rng, first_order=0.05, second_order=0.03, closed=OPEN):
     cells = [rng.standard_normal(TINY).astype(np.float32) for _ in range(4)]
-    return _core.LeastSquares(
-        direction=cells[:3],
-        offset=cells[3],
-        weight=rng.random(TINY).astype(np.float32),
-        irrotational=rng.random(TINY).astype(np.float32),
-        centre=tiny_faces(rng),
-        first_order=first_order,
-        second_order=second_order,
-        kinetic=0.01,
-        closed=closed,
-    )
+    weights = {name: rng.random(TINY).astype(np.float32) for name in ("weight", "irrotational")}
+    terms = {"first_order": first_order, "second_order": second_order, "kinetic": 0.01, "closed": closed}
+    return problem_of(TINY, tiny_faces(rng), direction=cells[:3], offset=cells[3], **weights, **terms)
 
 
 def flat(faces):
@@ -116,18 +113,7 @@ def test_the_preconditioner_knows_long_lines(closed):
     shape = (72, 66, 100)
     rng = np.random.default_rng(4)
     faces = [rng.standard_normal([n + (d == axis) for d, n in enumerate(shape)], np.float32) for axis in range(3)]
-    zero = np.zeros(shape, np.float32)
-    problem = _core.LeastSquares(
-        direction=[zero] * 3,
-        offset=zero,
-        weight=zero,
-        irrotational=zero,
-        centre=faces,
-        first_order=0.0,
-        second_order=0.0,
-        kinetic=0.5,
-        closed=closed,
-    )
+    problem = problem_of(shape, faces, kinetic=0.5, closed=closed)
     u, figures = problem.projected_cg([np.zeros_like(a) for a in faces], tolerance=1e-4, limit=20)
     assert figures["iterations"] < 10
     assert np.abs(_core.divergence(u)).max() < 1e-4
@@ -139,18 +125,7 @@ def test_the_preconditioner_knows_long_lines(closed):
 
 
 def test_a_uniform_flow_and_a_solid_turn_cost_no_second_order_smoothness():
-    zero = np.zeros(TINY, np.float32)
-    problem = _core.LeastSquares(
-        direction=[zero] * 3,
-        offset=zero,
-        weight=zero,
-        irrotational=zero,
-        centre=split(np.zeros(flat(tiny_faces(np.random.default_rng(0))).size)),
-        first_order=0.0,
-        second_order=1.0,
-        kinetic=0.0,
-        closed=OPEN,
-    )
+    problem = problem_of(TINY, [0 * component for component in tiny_faces(np.random.default_rng(0))], second_order=1.0)
     nx, ny, nz = TINY
     turn = [
         np.broadcast_to(np.arange(ny, dtype=np.float32)[None, :, None], (nx + 1, ny, nz)),
@@ -166,3 +141,11 @@ def test_steps_that_do_not_converge_are_refused(steps):
     estimator = PaperVelocity(solver=PrimalDual(**steps))
     with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = .*do not converge"):
         estimator.estimate(before, after, DT, VOXEL)
+
+
+@pytest.mark.parametrize(("width", "truncate"), [(0.5, 4.0), (1.0, 3.0), (2.0, 3.0)])
+@pytest.mark.parametrize("shape", [(9, 20, 13), (3, 2, 1)])
+def test_blur_is_a_gaussian(shape, width, truncate):
+    cells = np.random.default_rng(1).random(shape, np.float32)
+    expected = ndimage.gaussian_filter(cells, width, truncate=truncate)
+    np.testing.assert_allclose(_core.blur(cells, width, truncate), expected, rtol=1e-5)

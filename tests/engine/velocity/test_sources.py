@@ -1,14 +1,11 @@
 """Sources: what counts as smoke that enters, and what does not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from smokelift.velocity import SourceDetection
 
 DETECTION = SourceDetection()
-
 SHAPE = (24, 24, 32)
 INLET = (slice(8, 14), slice(8, 14), slice(4, 10))
 FRONT = (slice(4, 20), slice(4, 20), slice(24, 29))

@@ -4,13 +4,11 @@ Smooth, textured blobs without noise are not what the default's weights are for 
 benchmarks/velocity/accuracy.py), so the bounds here are those of a sound estimate, not of an exact one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from smokelift.scene import SIDES
-from smokelift.transport import Velocity, advect
+from smokelift.transport import Velocity
 from smokelift.velocity import estimate_velocity, predict_velocity
 from tests.engine.velocity.known_motions import positions, structured_density
 
@@ -55,12 +53,6 @@ def voxels_a_frame(velocity):
     return velocity.centres() * (DT / VOXEL)
 
 
-def test_densities_that_squares_of_overflow_are_refused():
-    before, after = moved((1, 0, 0))
-    with pytest.raises(ValueError, match=r"before holds densities up to .*; scale them to 1e\+12 at most"):
-        estimate_velocity(before * np.float32(1e38), after, DT, VOXEL)
-
-
 def mean_motion(velocity, density):
     """Voxels a frame of the smoke as a whole."""
     return np.average(voxels_a_frame(velocity).reshape(-1, 3), axis=0, weights=density.ravel())
@@ -83,7 +75,6 @@ def mean_speed(velocity, density):
 
 @pytest.mark.parametrize("speed", [0.1, 0.3, 1, 3, 10])
 def test_speeds_from_a_tenth_of_a_voxel_to_ten(speed):
-    """Neither collapse nor blow-up; the pyramid's reach is 14 voxels."""
     motion = speed * np.array((0.48, -0.6, 0.64))
     before, after = moved(motion, (48, 48, 56), radius=9.0)
     found = estimate_velocity(before, after, DT, VOXEL)
@@ -92,24 +83,7 @@ def test_speeds_from_a_tenth_of_a_voxel_to_ten(speed):
     assert np.linalg.norm(voxels_a_frame(found), axis=-1).max() < 3 * speed
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e3])
-def test_extreme_units_of_density_do_not_matter(factor):
-    before, after = moved((0.4, 0.2, 0.6))
-    reference = estimate_velocity(before, after, DT, VOXEL).centres()
-    scaled = estimate_velocity(factor * before, factor * after, DT, VOXEL).centres()
-    assert np.linalg.norm(scaled - reference) < 0.002 * np.linalg.norm(reference)
-
-
-@pytest.mark.parametrize(("space", "time"), [(1e3, 1.0), (1.0, 1e3), (1e-3, 1e-3)])
-def test_extreme_units_of_space_and_time_do_not_matter(space, time):
-    before, after = moved((0.4, 0.2, 0.6))
-    reference = estimate_velocity(before, after, DT, VOXEL).centres()
-    scaled = estimate_velocity(before, after, time * DT, space * VOXEL).centres() * (time / space)
-    assert np.linalg.norm(scaled - reference) < 1e-4 * np.linalg.norm(reference)
-
-
 def test_a_chain_of_frames_settles():
-    """Every estimate is the next one's prediction: neither dies out nor grows."""
     angle, prediction = 0.12, None
     errors, speeds = [], []
     for frame in range(8):
@@ -124,7 +98,6 @@ def test_a_chain_of_frames_settles():
 
 
 def test_the_velocity_is_found_in_a_box_of_walls():
-    """No pressure is singular, and nothing goes through any wall."""
     before, after = moved((0.5, -0.3, 0.6))
     found = estimate_velocity(before, after, DT, VOXEL, closed=SIDES)
     assert mean_motion(found, after) == pytest.approx((0.5, -0.3, 0.6), abs=0.2)
@@ -132,29 +105,11 @@ def test_the_velocity_is_found_in_a_box_of_walls():
         assert not component.take((0, -1), axis).any()
 
 
-# density explosions and mass drift
-
-
-def test_density_that_is_carried_on_and_on_does_not_explode():
-    """By its own estimates and predictions, with no picture to correct it."""
-    motion = np.array((0.3, -0.2, 0.5))
-    before, after = moved(motion)
-    velocity, density = estimate_velocity(before, after, DT, VOXEL), after.astype(np.float32)
-    for _ in range(12):
-        density = advect(density, velocity, DT, conserve=True)
-        velocity = predict_velocity(velocity, DT)
-    assert 0.99 < density.sum(dtype=float) / after.sum() < 1 + 1e-5
-    assert density.max() < 1.3 * after.max()
-    speed = np.linalg.norm(motion)
-    assert np.linalg.norm(voxels_a_frame(velocity), axis=-1).max() < 3 * speed
-
-
 # too little vorticity, too much of it
 
 
 @pytest.mark.parametrize("angle", [0.05, 0.1, 0.2])
 def test_a_turn_keeps_its_vorticity(angle):
-    """Smoothness must not eat it; mean over the smoke, along the true axis."""
     before, after = turned(0), turned(angle)
     found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL))
     inside = after > 0.1 * after.max()
@@ -183,7 +138,6 @@ def rising_column(speed, frame):
 @pytest.mark.parametrize("given", [False, True], ids=["found", "given"])
 @pytest.mark.parametrize("speed", [0.3, 1, 3])
 def test_smoke_rises_from_its_inlet(speed, given):
-    """Read as motion, new smoke turns the flow at the base around."""
     (before, _), (after, inlet) = rising_column(speed, 0), rising_column(speed, 1)
     found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL, inflow=inlet if given else None))[..., 2]
     for height in (6, 7, 8, 10, 14, 20, 30):
@@ -221,14 +175,6 @@ def test_flicker_is_no_motion(brighter):
     assert np.abs(voxels_a_frame(found)).max() < 0.05
 
 
-@pytest.mark.parametrize("brighter", [1.1, 0.9])
-def test_flicker_leaves_motion_as_it_is(brighter):
-    before, after = moved((0.5, 0, 1.5))
-    still, flickering = (estimate_velocity(before, factor * after, DT, VOXEL) for factor in (1, brighter))
-    difference = voxels_a_frame(flickering) - voxels_a_frame(still)
-    assert np.linalg.norm(difference) < 0.35 * np.linalg.norm(voxels_a_frame(still))
-
-
 @pytest.mark.parametrize("left", [0.5, 0.8, 0.95])
 def test_dissolving_smoke_at_rest_stays_at_rest(left):
     before, _ = moved((0, 0, 0))
@@ -245,37 +191,3 @@ def test_dissolving_smoke_moves_at_its_own_speed(left):
     assert mean_motion(found, after) == pytest.approx(motion, abs=0.25)
     assert error(found, after, motion) < error(steady, after, motion) + 0.15
     assert 0 < found.figures["dissipation"] < 1.2 * (1 - left)
-
-
-# compression
-
-
-def blocky(density, amount):
-    """Each view ray's smoke drawn towards the mean of its 8 x 8 block of the picture, as codecs do."""
-    rays = density.sum(1)
-    nx, nz = (n // 8 for n in rays.shape)
-    means = np.kron(rays.reshape(nx, 8, nz, 8).mean((1, 3)), np.ones((8, 8)))
-    factor = np.clip(1 - amount + amount * means / np.maximum(rays, 1e-9), 0.3, 3)
-    return density * factor[:, None, :]
-
-
-@pytest.mark.parametrize("amount", [0.1, 0.2])
-def test_blocks_that_stand_still_do_not_hold_the_smoke(amount):
-    motion = np.array((0.4, -0.2, 1.0))
-    before, after = moved(motion, (48, 32, 56), radius=8.0)
-    found = estimate_velocity(blocky(before, amount), blocky(after, amount), DT, VOXEL)
-    clean = estimate_velocity(before, after, DT, VOXEL)
-    assert mean_motion(found, after) == pytest.approx(motion, abs=0.2)
-    assert error(found, after, motion) < error(clean, after, motion) + 0.15
-
-
-@pytest.mark.parametrize("times", [20, 60])
-def test_a_prediction_that_ran_away_is_not_followed(times):
-    before, after = turned(0.0), turned(0.06)
-    alone = estimate_velocity(before, after, DT, VOXEL)
-    wild = Velocity(
-        (np.float32(times) * alone.faces[0], np.float32(times) * alone.faces[1], np.float32(times) * alone.faces[2]),
-        VOXEL,
-    )
-    found = estimate_velocity(before, after, DT, VOXEL, prediction=wild)
-    assert mean_speed(found, after) < 1.2 * mean_speed(alone, after)

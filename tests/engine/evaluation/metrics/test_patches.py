@@ -1,7 +1,5 @@
 """Distributions of patches: the same texture elsewhere is near, blur, rows and noise are far."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -58,14 +56,3 @@ def test_a_gradient_is_measured_in_the_picture_s_own_brightness():
     ramp = np.outer(np.ones(5), np.arange(1.0, 6))
     assert mean_gradient(ramp) == mean_gradient(7 * ramp) == pytest.approx(1 / 3)
     assert mean_gradient(np.zeros((4, 4))) == 0
-
-
-@pytest.mark.parametrize("function", [PatchStatistics.of, mean_gradient])
-def test_what_is_no_number_is_refused(function):
-    with pytest.raises(ValueError, match="finite"):
-        function(np.full((9, 9), np.nan))
-
-
-def test_a_picture_has_two_axes():
-    with pytest.raises(ValueError, match=r"\(rows, columns\), not one of shape \(9, 9, 3\)"):
-        PatchStatistics.of(np.ones((9, 9, 3)))

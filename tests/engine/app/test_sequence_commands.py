@@ -1,0 +1,144 @@
+"""The commands on a finished sequence: what they write, say and refuse."""
+
+import json
+import shutil
+
+import pytest
+from command_line import command, events, names, refused
+
+from smokelift.output.vdb import VdbUnavailable, vdb_module
+from smokelift.report import cost
+
+
+def test_a_whole_sequence_passes(finished, capsys) -> None:
+    assert command("check", finished, "--progress", "json") == 0
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (last["event"], last["frames"], last["empty"]) == ("done", 5, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "said"),
+    [
+        ("smoke_0003.npz", lambda content: content[:-1], "smoke_0003.npz"),
+        ("smoke_0002.npz", None, "the file of frame 2 is missing."),
+        ("sequence.json", lambda content: content.replace(b'"complete": true', b'"complete": false'), "complete run"),
+    ],
+    ids=["damaged", "missing", "unfinished"],
+)
+def test_what_is_damaged_or_missing_fails(finished, tmp_path, capsys, name, damage, said) -> None:
+    copy = shutil.copytree(finished, tmp_path / "smoke")
+    content = (copy / name).read_bytes()
+    for path in copy.glob(f"{name.split('.')[0]}.*"):
+        path.unlink()
+    if damage:
+        (copy / name).write_bytes(damage(content))
+    assert said in refused(capsys, "check", copy)
+
+
+def test_every_frame_gets_a_coarse_copy(finished, tmp_path, capsys) -> None:
+    there = shutil.copytree(finished, tmp_path / "there")
+    try:
+        vdb_module()
+    except VdbUnavailable:
+        assert "no OpenVDB module" in refused(capsys, "proxy", there)
+        pytest.skip("there is no OpenVDB module")
+    assert command("proxy", there, "--progress", "json") == 0
+    start, *frames, done = events(capsys.readouterr().out)
+    assert start["total"] == len(frames) == done["frames"]
+    new = set(names(there)) - set(names(finished))
+    assert new == {f"proxy_{frame['frame']:04d}.vdb" for frame in frames}
+    assert "no sequence" in refused(capsys, "proxy", tmp_path)
+
+
+def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
+    try:
+        vdb_module()
+    except VdbUnavailable:
+        assert "no OpenVDB module" in refused(capsys, "export", finished, "--out", tmp_path / "out")
+        pytest.skip("there is no OpenVDB module")
+    out = tmp_path / "out"
+    words = ("export", finished, "--out", out, "--precision", "quantised", "--proxy", 2, "--progress", "json")
+    assert command(*words, "--size") == 0
+    (sent,) = events(capsys.readouterr().out)
+    assert sent["event"] == "done" and sent["size"] > 0
+    assert not out.exists()
+    assert command(*words) == 0
+    note, start, *frames, done = events(capsys.readouterr().out)
+    assert "MB" in note["text"] and start["total"] == len(frames) == done["frames"]
+    assert done["size"] == pytest.approx(sent["size"], rel=0.2)
+    assert len(names(out)) == 2 * done["frames"] + 2
+    assert "sequence.json" in refused(capsys, "export", finished, "--out", finished)
+    assert "no sequence" in refused(capsys, "export", out, "--out", tmp_path / "again")
+    assert "proxy" in refused(capsys, "export", finished, "--out", out, "--proxy", 0)
+
+
+def test_retime_writes_slow_motion(finished, tmp_path, capsys) -> None:
+    out = tmp_path / "slow"
+    frames = len([name for name in names(finished) if name.endswith(".npz")])
+    assert command("retime", finished, "--out", out, "--speed", 0.5, "--npz", "--progress", "json") == 0
+    said = events(capsys.readouterr().out)
+    assert said[-1]["frames"] == 2 * frames - 1
+    assert "no longer those of the clip" in refused(capsys, "evaluate", out)
+    assert said[0] == {"event": "start", "total": 2 * frames - 1, "done": 0}
+
+
+def test_loop_writes_a_loop(finished, tmp_path, capsys) -> None:
+    out = tmp_path / "loop"
+    assert command("loop", finished, "--out", out, "--overlap", 1, "--npz", "--progress", "json") == 0
+    said = events(capsys.readouterr().out)
+    assert said[-1]["frames"] == len([name for name in names(out) if name.endswith(".npz")])
+
+
+def test_wrong_paces_and_loops_are_refused(finished, tmp_path, capsys) -> None:
+    out = ("--out", tmp_path / "out")
+    assert "--speed 0" in refused(capsys, "retime", finished, *out, "--speed", 0)
+    assert "--speed 1e+06" in refused(capsys, "retime", finished, *out, "--speed", 1, 1e6)
+    assert command("retime", finished, *out, "--speed", "slow") == 2
+    assert "slow: expected a number from" in capsys.readouterr().err
+    assert "holds no sequence" in refused(capsys, "retime", tmp_path, *out, "--speed", 1)
+    assert "not 1 to 99" in refused(capsys, "loop", finished, *out, "--frames", "1:99")
+    assert "overlap" in refused(capsys, "loop", finished, *out, "--overlap", 40)
+    assert not (tmp_path / "out").exists()
+
+
+def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
+    out = tmp_path / "out"
+    words = ("continue", finished, "--out", out, "--frames", 3, "--npz", "--fade", 1, "--wind", 0.2, -0.1, 0)
+    words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2, "--closed", "z-", "x+")
+    assert command(*words, "--progress", "json") == 0
+    said = events(capsys.readouterr().out)
+    assert said[-1]["event"] == "done"
+    assert said[-1]["frames"] == len([event for event in said if event["event"] == "frame"])
+    assert len([name for name in names(out) if name.endswith(".npz")]) == said[-1]["frames"]
+    assert command("render", out, "--frame", said[-1]["frames"], "--out", tmp_path / "last.png") == 0
+
+
+def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, monkeypatch) -> None:
+    def said(*words: object) -> list[str]:
+        start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
+        assert command(*start, *words, "--progress", "json") == 0
+        return [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
+
+    (sentence,) = said("--room", 1)
+    assert "dissolves" in sentence and "more room than 1" in sentence
+    shutil.rmtree(tmp_path / "out")
+    monkeypatch.setattr(cost, "memory_free", lambda: 0)
+    assert "grows to 1 times" in said()[0]
+    monkeypatch.undo()
+    assert said("--resume") == []
+
+
+def test_wrong_continuations_are_refused(finished, tmp_path, capsys) -> None:
+    start = ("continue", finished, "--out", tmp_path / "out", "--npz")
+    assert "--frames 0" in refused(capsys, *start, "--frames", 0)
+    assert "--fade 4" in refused(capsys, *start, "--frames", 3, "--fade", 4)
+    assert "radius" in refused(capsys, *start, "--frames", 3, "--ball", 0, 0, 1, -1)
+    assert "no voxel" in refused(capsys, *start, "--frames", 3, "--box", 50, 50, 50, 60, 60, 60)
+    assert "--room 0.5" in refused(capsys, *start, "--frames", 3, "--room", 0.5)
+    assert "--turbulence 1 0 0" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0, 0)
+    assert "--turbulence 1 1 0.5" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 1, 0.5)
+    assert "too small for voxels" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0.001, 0)
+    assert "cannot go on from frame 77" in refused(capsys, *start, "--frames", 3, "--start", 77)
+    assert "the sequence itself" in refused(capsys, "continue", finished, "--out", finished, "--frames", 3)
+    assert "holds no sequence" in refused(capsys, "continue", tmp_path, "--out", tmp_path / "out", "--frames", 3)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,36 @@
+"""What is said of a shot's box, and against a finished run."""
+
+from dataclasses import replace
+
+import pytest
+
+from smokelift.checks import Doubt, Remark
+from smokelift.report.facts import boundaries
+from smokelift.report.shortcomings import shortcomings
+from smokelift.scene import Inlet
+from smokelift.scene.complete import completed
+from smokelift.setup.settings import Settings
+
+
+def test_how_smoke_gets_in_and_out_is_said(plume, draft) -> None:
+    assert boundaries(completed(plume.scene), draft) == (Remark("inlets found later"), Remark("open box"))
+    marked = replace(plume.scene, inlets=(Inlet((0.01, 0.02, 0.21), 0.01),), closed=("x+", "z-"))
+    assert boundaries(completed(marked), draft) == (
+        Remark("inlets", {"inlets": 1, "voxels": 1}),
+        Remark("closed sides", {"sides": "x+, z-"}),
+    )
+    assert boundaries(completed(plume.scene), Settings.preset(method="paper"))[0] == Remark("no inlets")
+
+
+@pytest.mark.parametrize(
+    ("left", "kinds"), [(0.2, []), (0.4, ["not all is smoke"]), (0.8, ["hardly any smoke fitted"])]
+)
+def test_a_fit_that_explains_little_is_said(left: float, kinds: list[str]) -> None:
+    errors = ({"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {})
+    said = shortcomings([{"hull_share": 0.1, **figures} for figures in errors])
+    assert said == [Doubt(kind, {"error": left}) for kind in kinds]
+
+
+def test_empty_frames_are_counted() -> None:
+    said = shortcomings([{"hull_share": 0.0}, {"hull_share": None}, {}, {"hull_share": 0.2}])
+    assert said == [Doubt("empty frames", {"empty": 3, "frames": 4})]
