@@ -136,9 +136,6 @@ def test_the_artists_compositor_comes_first(filmed) -> None:
     assert output.inputs[0].links[0].from_node == group
 
 
-# ticks
-
-
 def state(scene: bpy.types.Scene) -> dict[str, object]:
     """What each tick changes."""
     return {

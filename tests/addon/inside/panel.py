@@ -1,7 +1,5 @@
 """The tab: what is in it, in Blender's words, at the width that Blender gives it."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

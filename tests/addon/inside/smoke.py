@@ -82,9 +82,6 @@ def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
     assert cube.hide_render == cube.hide_viewport == (change is None)
 
 
-# results
-
-
 def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
     smoke(scene).smokelift.output = str(folder)
     written = [smoke_takes.write_take(smoke(scene)) for _ in range(count)]

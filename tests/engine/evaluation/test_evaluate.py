@@ -151,9 +151,6 @@ def test_an_input_before_a_changing_background_is_left_out(plume, side, tmp_path
     assert "changes" in found["notes"][0]
 
 
-# refusals
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [

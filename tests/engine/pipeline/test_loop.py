@@ -178,7 +178,10 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
         shot = prepare_shot(clip, scene, draft)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
         frames: list[Frame] = []
+        again: list[Frame] = []
         Reconstruction(shot, method).write(tmp_path / "out", npz=True, on_frame=frames.append)
+        Reconstruction(shot, method).write(tmp_path / "out", npz=True, resume=True, on_frame=again.append)
+    assert again == []
     for frame in frames:
         assert not frame.velocity.faces[2][:, :, 0].any()
         assert frame.estimated.faces[2][:, :, -1].any()
@@ -187,7 +190,6 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
         np.testing.assert_array_equal(inflow, shot.scene.inflow())
     sequence = Sequence.open(tmp_path / "out")
     assert (sequence.scene.closed, sequence.scene.inlets) == (scene.closed, scene.inlets)
-    assert frames_written(scene, draft, tmp_path / "out", resume=True) == []
 
 
 BESIDE = np.s_[:, :8]
