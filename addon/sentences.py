@@ -11,16 +11,16 @@ SENTENCES = {
     "proxy": "The proxy of {frames} is made.",
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
-        "changes there. Choose Clean Plate, Scene Lights or Smoke Material; Report says what was taken."
+        "changes there. Choose Clean Plate, Scene Lights or Smoke Material. Report says what was assumed."
     ),
     "not all is smoke": (
-        "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by {error:.0%} of "
-        "what changes in it. What moves, light that changes and labels look like smoke, too; Report shows what was "
-        "taken. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
+        "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "
+        "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
+        "Report shows what counts as smoke. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
     ),
     "cut": (
-        "The picture changes at once between frames {before} and {after}, as at a cut, so that no background fits both "
-        "sides; choose Frames {first} to {before} or {after} to {last}."
+        "The picture changes at once between frames {before} and {after}, as at a cut, so no single background fits "
+        "both sides. Choose Frames {first} to {before} or {after} to {last}."
     ),
 }
 """Sentences by kind, with the figures that the engine gives."""

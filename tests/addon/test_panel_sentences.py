@@ -63,8 +63,8 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
         ),
         (
             {"text": "", "kind": "cut", "figures": {"before": 4, "after": 5, "first": 0, "last": 9}},
-            "The picture changes at once between frames 5 and 6, as at a cut, so that no background fits both sides; "
-            "choose Frames 1 to 5 or 6 to 10.",
+            "The picture changes at once between frames 5 and 6, as at a cut, so no single background fits both sides. "
+            "Choose Frames 1 to 5 or 6 to 10.",
         ),
     ],
 )

@@ -35,7 +35,7 @@ _TRANSIENT = {
 MAX_THREADS = 1024
 """Largest number of threads: no processor has more."""
 
-_HINT = " Finished frames stay, --resume goes on from them."
+_HINT = " Finished frames stay; --resume goes on from them."
 
 
 class _Parser(argparse.ArgumentParser):
@@ -48,7 +48,10 @@ class _Parser(argparse.ArgumentParser):
         """Parse, and refuse what is left over; a shell makes many words of ``frame_*.png``."""
         options, rest = self.parse_known_args(args, namespace)
         if rest and all(Path(word).suffix.lower() in READABLE for word in rest):
-            self.error(f"{len(rest) + 1} pictures are named; give those of a clip as one pattern, frame_####.png")
+            self.error(
+                f"{len(rest) + 1} pictures are named, but one clip is expected; give its pictures as one pattern, "
+                "frame_####.png"
+            )
         if rest:
             self.error(f"unrecognized arguments: {' '.join(rest)}")
         return options

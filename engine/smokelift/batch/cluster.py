@@ -94,7 +94,9 @@ def run_on_cluster(
         except (OSError, _SchedulerLostError) as error:
             now = time.monotonic()
             if lost_at is None and len(left) == len(shots) and not isinstance(error, _SchedulerLostError):
-                raise ClusterError(f"{address}: there is no Dask scheduler ({error}).") from error
+                raise ClusterError(
+                    f"{address}: no Dask scheduler answers ({error}); start it, or check its address."
+                ) from error
             if lost_at is None:
                 say(f"The scheduler at {address} went away; waiting for it to return.")
                 lost_at = now

@@ -177,7 +177,7 @@ class Clip:
         if 2 * len(damaged) > self._count > 1:
             raise ClipError(
                 f"{self.path}: {len(damaged)} of its {self._count} frames are missing or cannot be decoded; export "
-                "the clip anew, or choose sound frames"
+                "the clip again, or choose other frames"
             )
         return tuple(n - self.first for n in damaged)
 

@@ -131,14 +131,14 @@ def _numbered(path: Path) -> list[Path]:
         found = {int(match[1]): file for match, file in matches if match}
     start = min(found, default=0) if hashes else int(number)
     if start not in found:
-        raise ClipError(f"{path}: no such pictures")
+        raise ClipError(f"{path}: no such pictures; check the folder and the name")
     later = [n for n in found if n >= start]
     last = max(later)
     if last - start + 1 > 2 * len(later):
         missing = next(n for n in range(start, last) if n not in found)
         name = path.with_name(f"{prefix}{missing:0{len(number)}d}{suffix}")
         raise ClipError(
-            f"{name}: this picture is missing, as most are up to {found[last].name}; give the "
-            "first picture of those that belong together"
+            f"{name}: this picture is missing, as are most up to {found[last].name}; give the "
+            "first picture of a sequence without such gaps"
         )
     return [found.get(n) or path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}") for n in range(start, last + 1)]

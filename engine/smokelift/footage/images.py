@@ -158,7 +158,7 @@ def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Pict
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in READABLE:
-        raise ImageError(f"{path}: is none of {', '.join(READABLE)}")
+        raise ImageError(f"{path}: is none of {', '.join(READABLE)}; save it as one of these")
     if not path.is_file():
         raise ImageError(f"{path}: no such file")
     try:
@@ -182,7 +182,7 @@ def reduction(width: int, height: int) -> int:
 def _require_size(path: Path, width: int, height: int) -> None:
     """Refuse what a header says before memory is taken for it."""
     if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS):
-        raise ImageError(f"{path}: cannot be read: it says that it has {width} x {height} pixels")
+        raise ImageError(f"{path}: cannot be read: its header says {width} x {height} pixels; save it again")
 
 
 def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:

@@ -119,7 +119,7 @@ class Mask:
         self._needed = range(first, last + 1) if self.count else (first,)
         if not any((self._read(n) @ LUMINANCE.astype(np.float32) >= HALF).any() for n in self._needed):
             raise ClipError(
-                f"{path}: this mask is black everywhere (transparent counts as black), so that no smoke may be "
+                f"{path}: this mask is black everywhere (transparent counts as black), so no smoke could be "
                 "anywhere; paint white where smoke may be."
             )
 

@@ -114,7 +114,7 @@ class _Shown:
             return turns.rotations[n - clip.first]
         turn = turns.of(self._whole.stored(n).averaged(*proxy_size(*clip.size)))
         if turn is None:
-            raise ClipError(f"{clip.path}: frame {n} does not show what the clip does")
+            raise ClipError(f"{clip.path}: frame {n} does not show what the frames in use show; choose other frames")
         return turn
 
 

@@ -276,8 +276,8 @@ def find_turns(clip: Clip, *lenses: Doubles) -> Turns | None:
     if keys[0].textured.mean() < TEXTURE_EVERYWHERE or sum(lost) < max(MIN_LOST, len(lost) / 2):
         return None
     raise ValueError(
-        "The picture moves as before a camera that travels or zooms, which no turn steadies: track it in Blender, and "
-        "give its camera and a clean plate; if it stood still, give a clean plate, or a color, as background."
+        "The picture moves as if the camera travels or zooms, which cannot be steadied. Track it in Blender, and give "
+        "its camera and a clean plate. If it stood still, give a clean plate, or a color, as background."
     )
 
 

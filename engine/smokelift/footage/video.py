@@ -89,7 +89,7 @@ class Video:
         self._times, self._keys, broken = self._index()
         if not self._times:
             self.close()
-            raise ClipError(f"{path}: holds no frame that can be decoded")
+            raise ClipError(f"{path}: holds no frame that can be decoded; export it again")
         if broken:
             self._drop_undecodable_end()
             self.warning = Remark("truncated clip", {"path": str(path), "frames": len(self._times)})
@@ -113,7 +113,9 @@ class Video:
         self._stream = self._container.streams.video[0]
         if self._stream.codec_context is None:
             self._container.close()
-            raise ClipError(f"{self._path}: holds video of a kind that cannot be decoded")
+            raise ClipError(
+                f"{self._path}: holds video of a kind that cannot be decoded; convert it, for example to H.264"
+            )
         width, height = self._stream.width, self._stream.height
         if max(width, height) > LARGEST_PICTURE or not 0 < width * height <= MAX_PIXELS:
             self._container.close()
@@ -195,7 +197,7 @@ class Video:
                 return
             except ClipError:
                 self._times.pop()
-        raise ClipError(f"{self._path}: holds no frame that can be decoded")
+        raise ClipError(f"{self._path}: holds no frame that can be decoded; export it again")
 
     def _steady(self) -> tuple[float, list[int]]:
         """Return the frame rate and, for each frame of the clip, the decoded frame that it shows."""
@@ -301,7 +303,9 @@ class Video:
         if not self._keys:
             return self._decode_by_count(index)
         if index in self._lost:
-            raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
+            raise DamagedFrameError(
+                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
+            )
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
         key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
@@ -316,7 +320,9 @@ class Video:
         if frame is None:
             self._rewind()
             self._lost.add(index)
-            raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
+            raise DamagedFrameError(
+                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
+            )
         self._next = index + 1
         return frame
 
@@ -334,7 +340,7 @@ class Video:
             if self._next == index + 1:
                 return frame
         self._rewind()
-        raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
+        raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again")
 
     def _pixel_shape(self) -> Fraction:
         """Return how many times as wide as high a pixel is, as stored."""
@@ -376,7 +382,8 @@ class Video:
         size = (self._stream.width, self._stream.height)
         if (frame.width, frame.height) != size:
             raise ClipError(
-                f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}"
+                f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}; "
+                "export it in one size"
             )
         width, height = self._size()
         interlaced = bool(frame.interlaced_frame)
@@ -467,7 +474,7 @@ def _unreadable(path: Path, error: Exception | None) -> ClipError:
             "repair it"
         )
     if error is None:
-        return ClipError(f"{path}: holds no video stream")
+        return ClipError(f"{path}: holds no video stream; choose another file")
     return ClipError(f"{path}: is not a video, or is damaged: {_reason(error)}")
 
 

@@ -27,25 +27,38 @@ MIN_DEPTH = 0.005
 
 SENTENCES: Mapping[str, str] = {
     # how the clips are read
-    "truncated clip": "{path}: is truncated; {frames:frame} of it can be used.",
-    "damaged frames": "{path}: {frames} missing or damaged; the last sound frame stands in.",
-    "pictures without a frame rate": "{path}: pictures carry no frame rate; {fps:g} frames a second are taken.",
-    "varying frame rate": "The frame rate varies: the clip is read at its mean, {fps:.4g} frames a second.",
-    "interlaced clip": "The clip is interlaced: one field of each frame is used, so its lines are half as fine.",
-    "high dynamic range": "Transfer {transfer}: diffuse white is brought to 1, highlights exceed it.",
-    "other primaries": "Primaries {primaries} are brought to BT.709.",
-    "scaled pictures": "Pictures of {size} pixels are scaled to {scaled} square ones.",
+    "truncated clip": (
+        "{path}: is truncated; only {frames:frame} of it can be used. Copy or export it again for the rest."
+    ),
+    "damaged frames": (
+        "{path}: {frames} missing or damaged; the last good frame before stands in, so the smoke stands still there. "
+        "Export the clip again to mend that."
+    ),
+    "pictures without a frame rate": (
+        "{path}: pictures carry no frame rate; {fps:g} frames a second are assumed. Give the frame rate if it is "
+        "another."
+    ),
+    "varying frame rate": (
+        "The frame rate varies: the clip is read at its mean, {fps:.4g} frames a second. Export it at a constant rate "
+        "for even motion."
+    ),
+    "interlaced clip": "The clip is interlaced: one field of each frame is used, so the picture has half its lines.",
+    "high dynamic range": (
+        "The clip has a high dynamic range ({transfer}): diffuse white becomes 1, and highlights are brighter."
+    ),
+    "other primaries": "The clip's primaries, {primaries}, are converted to BT.709.",
+    "scaled pictures": "The clip's pixels are not square: its pictures of {size} pixels are scaled to {scaled}.",
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
     "disagreeing views": (
-        "The views agree on {agreed:.0%} of the smoke that they show: check where their cameras stand, which frames "
-        "belong together and what stands behind the smoke."
+        "The views agree on only {agreed:.0%} of the smoke that they show. Check where their cameras stand, which "
+        "frames belong together, and what is behind the smoke."
     ),
     "cut": (
-        "The picture changes at once between frames {before} and {after}, as at a cut, so that no background fits both "
-        "sides; use frames {first} to {before} or {after} to {last}."
+        "The picture changes at once between frames {before} and {after}, as at a cut, so no single background fits "
+        "both sides. Use frames {first} to {before} or {after} to {last}."
     ),
     # what is behind the smoke, and where it is
-    "alpha channel": "The clip has an alpha channel, which is the matte: the smoke is shown before {behind}.",
+    "alpha channel": "The clip has an alpha channel, which says where smoke is: the smoke is shown before {behind}.",
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
     "background of one colour": "Background not given: it is of one color, {color:.2g} (linear).",
@@ -55,41 +68,41 @@ SENTENCES: Mapping[str, str] = {
     ),
     "background seen": "Background estimated from the clip, which shows every part of it free of smoke.",
     "background partly seen": (
-        "Background estimated from the clip; {unknown:.0%} of the picture is hardly ever free of smoke, and what is "
-        "behind it there is continued from around it, so how thick the smoke is there is undetermined. A clean plate "
-        "as background would show it."
+        "Background estimated from the clip; {unknown:.0%} of the picture is hardly ever free of smoke. The background "
+        "there is filled in from around it, so how thick the smoke is there is undetermined. Give a clean plate as "
+        "background to show it."
     ),
     "turning camera": (
-        "The camera moves, by up to {pixels:.0f} pixels: it is steadied against the background, as a camera that turns "
+        "The camera moves, by up to {pixels:.0f} pixels. It is steadied against the background, as a camera that turns "
         "in its place, and has a matrix for every frame."
     ),
-    "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",
+    "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is matched to the background.",
     "background of one frame": (
-        "One frame alone does not show what moves: the color around it counts as background, and all that has another "
-        "as smoke. If that is wrong, hide what is no smoke by a mask, or give a clean plate or a color as background."
+        "One frame alone does not show what moves: the color around it counts as background, and every other color as "
+        "smoke. If that is wrong, hide what is no smoke by a mask, or give a clean plate or a color as background."
     ),
     "background never seen": (
-        "Next to nothing of the picture is ever free of smoke, so what is behind it is taken to be black. Give a clean "
-        "plate or a color as background."
+        "Almost no part of the picture is ever free of smoke, so black is assumed behind it. Give a clean plate or a "
+        "color as background."
     ),
     "background of few frames": (
-        "Only {frames} frames show what is behind the smoke: what is the same in all that there are counts as "
-        "background, smoke too. Give a clean plate or a color as background."
+        "Only {frames} frames show what is behind the smoke. What is the same in all of them counts as background, "
+        "even smoke. Give a clean plate or a color as background."
     ),
     "strong compression": (
-        "The clip is strongly compressed (quantiser {quantiser:.0f} of 51): faint smoke may be missing from the "
-        "result, because the codec lets it stand still as the background does. Use a copy that is compressed less, or "
-        "give a clean plate as background."
+        "The clip is strongly compressed (level {quantiser:.0f} of 51), so faint smoke may be missing from the result: "
+        "compression makes it stand still as the background does. Use a copy that is compressed less, or give a clean "
+        "plate as background."
     ),
     "smoke in the background": (
-        "The background may hold most of the smoke: {share:.0%} of where smoke is or may be is never free of it, so "
-        "what stays there all the time is missing from the result. Give a clean plate or a color as background."
+        "The background may hold most of the smoke: {share:.0%} of the area where smoke may be is never free of it. "
+        "Smoke that stays there all the time is missing from the result. Give a clean plate or a color as background."
     ),
     "bars": (
-        "Only bars beside the picture never change, so all between them is taken for smoke: crop them off, or give a "
-        "clean plate as background."
+        "Only bars beside the picture never change, so everything between them counts as smoke. Crop the bars off, or "
+        "give a clean plate as background."
     ),
-    "no smoke examined": "No smoke found in {frames:examined frame}, so that nothing of it could be measured.",
+    "no smoke examined": "No smoke found in {frames:examined frame}, so nothing about it could be measured.",
     "no smoke before the given background": (
         "The background that is given may hold the smoke, or belong to another clip: check it."
     ),
@@ -97,28 +110,28 @@ SENTENCES: Mapping[str, str] = {
         "One frame alone does not show what is behind its smoke: give a clean plate or a color as background."
     ),
     "no smoke before a changing background": (
-        "The background changes by {codes:.0f} of 255 from frame to frame, and fainter smoke is not seen: if the "
-        "camera moves, track it in Blender, and give the camera and a clean plate; if it stands still, give a clean "
-        "plate or a color as background."
+        "The background changes by {codes:.0f} of 255 from frame to frame, so fainter smoke is not seen. If the camera "
+        "moves, track it in Blender, and give the camera and a clean plate. If it stands still, give a clean plate or "
+        "a color as background."
     ),
     "no smoke before an estimated background": (
         "Smoke that never moves counts as background: give a clean plate or a color as background."
     ),
     "smoke of several colours": (
-        "The smoke has more than one color: its light is {degrees:.0f} degrees from the nearest single one on the "
-        "mean, but one is taken for all of it, so colors are wrong and the thickness may be. Use frames with smoke "
+        "The smoke has more than one color, but one is assumed for all of it: on average its light is {degrees:.0f} "
+        "degrees from the nearest single color. Its colors are wrong, and its thickness may be. Use frames with smoke "
         "of one color, crop the clip to it, or give a mask."
     ),
     # where the camera stands, and where the smoke is
     "assumed camera": (
-        "Camera not given: a level {lens:.0f} mm lens on {film:g} mm film, the picture taken to be {height:.3g} m high "
-        "where the smoke is."
+        "Camera not given: a level {lens:.0f} mm lens on {film:g} mm film is assumed, and a picture {height:.3g} m "
+        "high where the smoke is."
     ),
     "assumed camera with the file's lens": (
-        "Camera not given: level, {lens:g} mm as the file says, the picture taken to be {height:.3g} m high where the "
-        "smoke is."
+        "Camera not given: a level camera with the file's {lens:g} mm lens is assumed, and a picture {height:.3g} m "
+        "high where the smoke is."
     ),
-    "assumed scale": "Box not given: the picture taken to be {height:.3g} m high where the smoke is.",
+    "assumed scale": "Box not given: the picture is assumed to be {height:.3g} m high where the smoke is.",
     "box around the smoke": "Domain around the smoke: {size:.2f x} m, {resolution} voxels.",
     "box over the picture": "Domain over all of the picture: {size:.2f x} m, {resolution} voxels.",
     "grown box": "The box grows to {size:.4g x} m, a whole number of cubic voxels along every side.",
@@ -127,7 +140,7 @@ SENTENCES: Mapping[str, str] = {
         "the smoke's contrast in the clip."
     ),
     "resolution without smoke": "Resolution: {value} voxels, since no smoke is seen.",
-    "inlets": "Smoke enters at {inlets:marked inlet} ({voxels:voxel}); others are not looked for.",
+    "inlets": "Smoke enters at {inlets:marked inlet} ({voxels:voxel}); no others are searched for.",
     "inlets found later": "No inlet marked: where smoke enters is found from the densities.",
     "no inlets": "No inlet marked: none is assumed.",
     "open box": "All sides of the box are open.",
@@ -154,94 +167,94 @@ SENTENCES: Mapping[str, str] = {
         "color and the smoke is grey, give grey as the smoke's color."
     ),
     "smoke colour unseen": (
-        "Smoke color: undetermined, grey is taken: no smoke is thick, bright and free of clipped pixels enough to show "
-        "a color."
+        "Smoke color: undetermined, so grey is assumed: no smoke is thick, bright and free of clipped pixels enough to "
+        "show a color. Give the color if you know it."
     ),
     "smoke colour near the light's": (
-        "Smoke color: undetermined, grey is taken: it may be {degrees:.0f} degrees from grey smoke or what is behind "
-        "it, less than the {tolerance:g} of colored light."
+        "Smoke color: undetermined, so grey is assumed: its color may be {degrees:.0f} degrees from that of grey smoke "
+        "or of what is behind it, and colored light alone can make {tolerance:g}. Give the color if you know it."
     ),
     "fire": (
         "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
-        "{red:g}, {green:g}, {blue:g}; the smoke beside it is continued over it."
+        "{red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
     ),
     "light as behind the smoke": (
-        "Light not given: as much from everywhere as comes from behind the smoke, irradiance {irradiance:.2f}, with "
-        "shadows."
+        "Light not given: light from everywhere is assumed, as strong as what comes from behind the smoke (irradiance "
+        "{irradiance:.2f}, with shadows)."
     ),
     "light as the smoke hides": (
-        "Light not given: as much from everywhere as the smoke adds for what it hides, irradiance {irradiance:.2f}, "
-        "without shadows."
+        "Light not given: light from everywhere is assumed, as strong as what the smoke adds for what it hides "
+        "(irradiance {irradiance:.2f}, without shadows)."
     ),
     "light as the thickest smoke": (
-        "Light not given: as much from everywhere as the thickest smoke shows, irradiance {irradiance:.2f}, without "
-        "shadows."
+        "Light not given: light from everywhere is assumed, as strong as the thickest smoke shows (irradiance "
+        "{irradiance:.2f}, without shadows)."
     ),
     "light without smoke": (
-        "Light not given: as much from everywhere as makes thick smoke white, irradiance {irradiance:.2f}, without "
-        "shadows."
+        "Light not given: light from everywhere is assumed, so strong that thick smoke is white (irradiance "
+        "{irradiance:.2f}, without shadows)."
     ),
     "likely wrong light": (
-        "The light that is taken is likely wrong, and the smoke too thick or too thin by half and more: it leaves "
-        "{error:.0%} of what the smoke changes unexplained. Give the lights."
+        "The assumed light is likely wrong, and the smoke too thick or too thin by half or more: {error:.0%} of what "
+        "the smoke changes in the clip is unexplained. Give the lights."
     ),
     "light strength": (
-        "Light: {factor:.2f} times as strong as given, since the smoke is brighter than the given light can make it: "
-        "the densities that come nearest ask for {asked_for_as_given:.2f} times as much, and now for {asked_for:.2f}."
+        "Light: {factor:.2f} times as strong as given, because the smoke is brighter than the given light can make it. "
+        "The nearest densities asked for {asked_for_as_given:.2f} times as much, and now ask for {asked_for:.2f}. "
+        "Check the strength of the lights."
     ),
     "smoke thickness": (
-        "Smoke thickness: by the texture behind it the smoke hides {hidden:.0%} of what it covers, right to "
-        "{spread:.0%}; its light is as strong as that asks for."
+        "Smoke thickness: the texture behind the smoke shows that it hides {hidden:.0%} of what it covers, right to "
+        "{spread:.0%}. The light is as strong as that asks for."
     ),
     "smoke thickness without texture": (
-        "Smoke thickness: undetermined, too little texture shows through it; thinner smoke in stronger light looks the "
-        "same. Give the lights if you know them."
+        "Smoke thickness: undetermined, because too little texture shows through it. Thinner smoke in stronger light "
+        "looks the same. Give the lights if you know them."
     ),
     "uncertain smoke thickness": (
-        "Smoke thickness: undetermined, the texture behind it shows it no better than that (error {spread:.0%}, "
-        "{tolerance:.0%} at most would do); thinner smoke in stronger light looks the same. Give the lights if you "
-        "know them."
+        "Smoke thickness: undetermined, because the texture behind it shows it only to {spread:.0%} ({tolerance:.0%} "
+        "or less is needed). Thinner smoke in stronger light looks the same. Give the lights if you know them."
     ),
     "light direction": (
-        "Light direction: {value}, give or take 20 degrees, as the {views} views show together; "
-        "{ambient_share:.0%} of the light comes from everywhere."
+        "Light direction: {value}, give or take 20 degrees, as the {views} views show together. {ambient_share:.0%} of "
+        "the light comes from everywhere."
     ),
     "light direction undetermined by one view": (
-        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere; suns "
-        "from many sides explain one view alike. Give the lights if you know them."
+        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. In one "
+        "view suns from many sides look the same. Give the lights if you know them."
     ),
     "light direction undetermined by several views": (
-        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. With "
-        "{ambient_share:.0%} of the light from everywhere the {views} views are explained best; that alone leaves "
-        "{shading:.0%} of the smoke's light, a sun explains {explained:.0%} of the rest, and its direction is right to "
-        "{spread:.0f} degrees. Give the lights if you know them."
+        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. "
+        "{ambient_share:.0%} of the light from everywhere explains the {views} views best, but leaves {shading:.0%} of "
+        "the smoke's light. A sun explains {explained:.0%} of that rest, and its direction is right to {spread:.0f} "
+        "degrees. Give the lights if you know them."
     ),
     "scattering": "Scattering: {value}.",
     "compared scattering": (
-        "Scattering: {value}; held-out pixels differ by {error:.1%} of the smoke's contrast, with {other} by "
-        "{other_error:.1%}."
+        "Scattering: {value}; pixels that the fit leaves out differ by {error:.1%} of the smoke's contrast, with "
+        "{other} by {other_error:.1%}."
     ),
     "scattering in light from everywhere": (
-        "Scattering: {value}, in light from everywhere, for want of a known one; held-out pixels differ by {error:.1%} "
-        "of the smoke's contrast, with {other} by {other_error:.1%}."
+        "Scattering: {value}, in light from everywhere, because no light is given; pixels that the fit leaves out "
+        "differ by {error:.1%} of the smoke's contrast, with {other} by {other_error:.1%}."
     ),
     "environment directions": (
-        "Environment: {value} directions; the last doubling changed the picture by {change:.1%}."
+        "Environment: {value} directions; doubling them last changed the picture by {change:.1%}."
     ),
     "gain of a view": (
-        "It shows the smoke {value} times (red, green, blue) as bright as the input, which is evened out; the pictures "
-        "differ by {error:.1%} of the smoke's contrast instead of {error_as_it_is:.1%}. If the cameras are exposed "
-        "alike, light is missing: give the lights."
+        "It shows the smoke {value} times (red, green, blue) as bright as the input. This is evened out: the pictures "
+        "differ by {error:.1%} of the smoke's contrast instead of {error_as_it_is:.1%}. If the cameras have the same "
+        "exposure, light is missing: give the lights."
     ),
     # what a run needs besides
     "given": "{what} by hand: {value}.",
     "domain": (
-        "Domain: only voxels that the picture allows to hold smoke are worked on, {hull_share:.0%} of the box; frames "
+        "Domain: only voxels in which the picture allows smoke are computed, {hull_share:.0%} of the box. Frames "
         "without smoke cost nothing."
     ),
     "iterations": (
-        "Iterations: until one lowers the error by less than {tolerance:.0%} or noise is all that is left, "
-        "{iterations:.0f} on the coarse frames, {value} at most."
+        "Iterations: {value} at most, {iterations:.0f} on the coarse frames. They stop when one lowers the error by "
+        "less than {tolerance:.0%}, or when only noise is left."
     ),
     "velocity grid coarsening": (
         "Velocity grid: {voxels:.0f} voxels along the longest side, because the depth of the smoke is uncertain."
@@ -249,13 +262,13 @@ SENTENCES: Mapping[str, str] = {
     "velocity levels": "Velocity grids: {value}, because the fastest smoke goes {voxels_a_frame:.1f} voxels a frame.",
     "velocity levels without motion": "Velocity grids: {value}, since there is no motion to measure.",
     # where the parts of a result come from
-    "replaced pictures": "Those of {frames} missing or damaged; the last sound one stands in.",
+    "replaced pictures": "Those of {frames} missing or damaged; the last good one before stands in.",
     "pictures that are fitted": (
         "The density renders to the pictures of {cameras:camera} in the scene's light and medium; psnr in the figures "
         "of a frame says how closely."
     ),
     "velocity between frames": (
-        "It carries the density of one frame to that of the next, and is known along the rays no better than they."
+        "It carries the density of one frame to that of the next. Along the rays it is no more certain than they are."
     ),
     "depth by the smoke's width in one view": (
         "One camera does not show it: the smoke is taken to be as deep as it is wide."
@@ -264,10 +277,10 @@ SENTENCES: Mapping[str, str] = {
         "One camera does not show it: its picture is taken to be the view from 90 degrees as well."
     ),
     "depth by the smoke's width in several views": (
-        "{cameras:camera} limit it and do not determine it: the rest follows from the smoke's width in each picture."
+        "{cameras:camera} limit it but do not determine it: the rest follows from the smoke's width in each picture."
     ),
     "depth by thin fog in several views": (
-        "{cameras:camera} limit it and do not determine it: the rest follows from the thin fog that the fit starts "
+        "{cameras:camera} limit it but do not determine it: the rest follows from the thin fog that the fit starts "
         "from."
     ),
     "emission along the rays": (
@@ -275,8 +288,8 @@ SENTENCES: Mapping[str, str] = {
         "deep as it is wide, in the middle of the smoke, of one color."
     ),
     "texture of the clip": (
-        "From sides that no camera is near to the smoke has the texture of the clip's own pictures. Another seed makes "
-        "it differently, detail 0 not at all."
+        "Seen from sides that no camera is near, the smoke has the texture of the clip's own pictures. Another seed "
+        "makes another texture; detail 0 makes none."
     ),
     # what is said of a result
     "reconstructed": (
@@ -286,21 +299,24 @@ SENTENCES: Mapping[str, str] = {
     "continued": "{frames:frame} in {directory}, {simulated} of them simulated ({seconds:.0f} s).",
     "looped": "{frames:frame} in {directory}, which repeat frames {first} to {last} ({seconds:.0f} s).",
     "proxy": "A proxy of {frames:frame} in {directory}.",
-    "empty frames": "No smoke is seen in {empty} of {frames} frames; such frames are empty.",
+    "empty frames": (
+        "No smoke is seen in {empty} of {frames} frames, so these are empty. If you see smoke in them, give a clean "
+        "plate as background."
+    ),
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
-        "changes there, and its psnr is as high as it is because the smoke is faint. Give the background, the light or "
-        "the medium of the clip, or a mask around its smoke; `smokelift inspect` says what was taken."
+        "changes there. Its psnr is high only because the smoke is faint. Give the background, the light or the medium "
+        "of the clip, or a mask around its smoke. `smokelift inspect` says what was assumed."
     ),
     "not all is smoke": (
-        "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by {error:.0%} of "
-        "what changes in it. What moves, light that changes and labels look like smoke, too; `smokelift inspect` shows "
-        "what was taken. Hide what is no smoke by a mask, crop the clip, cut its frames out of a longer file in which "
-        "the light changes, or give a clean plate as background."
+        "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "
+        "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
+        "`smokelift inspect` shows what counts as smoke. Hide what is no smoke by a mask, crop the clip, use frames in "
+        "which the light is steady, or give a clean plate as background."
     ),
     "dissolving smoke": (
-        "From frame {frame} on the smoke dissolves before it reaches the end of its box, which cannot grow any more: "
-        "give it more room than {room:g}, or move a camera or a lamp that is in its way."
+        "From frame {frame} on the smoke dissolves before it reaches the end of its box, because the box cannot grow "
+        "any more. Give it more room than {room:g}, or move the camera or lamp in its way."
     ),
 }
 """All sentences."""

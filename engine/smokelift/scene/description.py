@@ -128,7 +128,7 @@ class Scene:
             If the scene has no clip, or the range of a clip does not exist.
         """
         if self.clip is None:
-            raise SceneError("a scene without a clip has no frames", table="clip")
+            raise SceneError("a scene without a clip has no frames; give one", table="clip")
         first, last = integer(first, "first"), integer(last, "last")
         skipped = first - self.clip.first
         views = []

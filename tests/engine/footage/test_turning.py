@@ -45,7 +45,7 @@ def test_smoke_before_one_colour_is_no_camera() -> None:
 
 def test_a_camera_that_travels_is_refused() -> None:
     with pytest.raises(
-        ValueError, match=r"^The picture moves as .* travels .*: track it in Blender, .* as background\.$"
+        ValueError, match=r"^The picture moves as .* travels .*\. Track it in Blender, .* as background\.$"
     ):
         find_turns(clip_of(over_a_plain(30)), LENS)
 

@@ -61,14 +61,14 @@ def estimate(kind: str, value: str | int | tuple[int, int, int], **figures: floa
     ("remark", "said"),
     [
         (Remark("black background", {"view": 2}), "View 2: Background not given: it is black."),
-        (Doubt("no smoke examined", {"frames": 1}), "No smoke found in 1 examined frame, so that"),
-        (Doubt("no smoke examined", {"frames": 4}), "No smoke found in 4 examined frames, so that"),
+        (Doubt("no smoke examined", {"frames": 1}), "No smoke found in 1 examined frame, so nothing"),
+        (Doubt("no smoke examined", {"frames": 4}), "No smoke found in 4 examined frames, so nothing"),
         (Remark("background of one colour", {"color": (0.1, 0.25, 1.0)}), "it is of one color, 0.1, 0.25, 1 (linear)."),
         (given("resolution", (60, 60, 90)), "Resolution by hand: 60 x 60 x 90."),
         (
             estimate("compared scattering", "absorption", error=0.02, other="single", other_error=0.0149),
-            "Scattering: absorption only; held-out pixels differ by 2.0% of the smoke's contrast, with single "
-            "scattering with shadows by 1.5%.",
+            "Scattering: absorption only; pixels that the fit leaves out differ by 2.0% of the smoke's contrast, with "
+            "single scattering with shadows by 1.5%.",
         ),
     ],
 )

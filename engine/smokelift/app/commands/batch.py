@@ -107,7 +107,8 @@ def _run_remaining(
     if missing:
         share = f"{len(missing)} of {counted(len(final), 'shot')}"
         raise ValueError(
-            f"{share} did not come to the end ({', '.join(missing)}); {page} says why. The same command goes on."
+            f"{share} did not come to the end ({', '.join(missing)}); {page} says why. "
+            "Give the same command again to go on."
         )
     say.finish(
         f"Finished: {counted(len(final), 'shot')}; {page} shows the result.",

@@ -30,14 +30,16 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     sequence = Sequence.open(options.directory)
     if not sequence.complete:
         there = counted(len(sequence.frames), "finished frame")
-        raise ValueError(f"{options.directory}: has {there} and is no complete run; resume it.")
+        raise ValueError(f"{options.directory}: has only {there} and is not a complete run; resume it.")
     for number in sequence.frames:
         if not sequence.files(number):
-            raise ValueError(f"{options.directory}: the file of frame {number} is missing.")
+            raise ValueError(
+                f"{options.directory}: the file of frame {number} is missing. Copy or make the sequence again."
+            )
     figures = [sequence.figures(number) for number in sequence.frames]
     empty = count_empty(figures)
     if empty == len(figures):
-        raise ValueError(f"{options.directory}: no frame shows smoke.")
+        raise ValueError(f"{options.directory}: no frame shows smoke. Make it again with another background.")
     for note in shortcomings(figures):
         say.note(note)
     count = len(sequence.frames)

@@ -159,7 +159,7 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
 def _continuation(options: argparse.Namespace) -> Continuation:
     """What the options say."""
     if options.frames < 1:
-        raise ValueError(f"--frames {options.frames}: there has to be 1 at least.")
+        raise ValueError(f"--frames {options.frames}: expected 1 or more.")
     if not 0 <= options.fade <= options.frames:
         raise ValueError(f"--fade {options.fade}: expected 0 to {options.frames}, as many frames as are added.")
     if options.room < 1:

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     for path in (options.json, options.picture):
         require_folder(path)
     if options.picture is not None and options.picture.suffix.lower() != ".png":
-        raise ValueError(f"{options.picture}: the picture is written as .png.")
+        raise ValueError(f"{options.picture}: the picture is written as .png; give a name that ends with it.")
     if options.truth is not None and options.truth.suffix.lower() != ".npz":
         raise ValueError(
             f"{options.truth}: --truth takes known volumes (truth.npz); the clip of another camera goes with --view."

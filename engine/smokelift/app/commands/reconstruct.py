@@ -73,7 +73,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
         raise ValueError(
-            f"No smoke found: nothing differs from the background by more than the clip's noise makes, so all frames "
+            f"No smoke found: nothing differs from the background by more than the clip's noise does, so all frames "
             f"in {options.out} are empty. "
             f"{sentence(what_helps(shot.clip, shot.views[0].plates, scene.background is not None))}"
         )
