@@ -142,16 +142,16 @@ def command_parser() -> argparse.ArgumentParser:
         "--device",
         choices=("auto", "cpu", "gpu"),
         default="auto",
-        help="what renders; auto (default): a GPU if there is one that Taichi can use well, else the processor",
+        help="device that renders; auto (default): a GPU if there is one that Taichi can use well, else the processor",
     )
     common.add_argument(
         "--progress",
         choices=("text", "json"),
         default="text",
-        help="text (default): a progress bar; json: one JSON object a line",
+        help="how progress is shown; text (default): a bar; json: one JSON object a line",
     )
     common.add_argument(
-        "--threads", type=_threads, default=0, metavar="N", help="processor threads at most; 0 (default): all"
+        "--threads", type=_threads, default=0, metavar="N", help="use N processor threads at most; 0 (default): all"
     )
     for add_parser in COMMANDS:
         add_parser(commands, common)

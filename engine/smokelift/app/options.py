@@ -31,7 +31,7 @@ def named_path(text: str) -> Path:
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the clip or scene file, and all that decides how it is reconstructed."""
-    parser.add_argument("input", type=named_path, help="scene.toml, or a video, or frame_####.png")
+    parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
     parser.add_argument(
         "--quality",
         choices=QUALITIES,
@@ -74,7 +74,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "--distance",
         type=float,
         metavar="METRES",
-        help="level distance from the camera, straight ahead, to where the smoke stands, its lower end; sets the scale "
+        help="level distance in metres from the camera, straight ahead, to the lower end of the smoke; sets the scale "
         "where no box is given (default: estimated)",
     )
     parser.add_argument(
@@ -85,13 +85,17 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "measuring) to 1 (default; with --method paper 0)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="which of the plausible smokes is made, from 0 (default)"
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="which of the plausible smokes to make, a whole number from 0 (default)",
     )
 
 
 def add_directed_options(parser: argparse.ArgumentParser) -> None:
     """Add a sequence, and where what becomes of it is written to."""
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--out", type=named_path, required=True, help="directory for the new sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
     parser.add_argument("--resume", action="store_true", help="go on after the frames that are finished")

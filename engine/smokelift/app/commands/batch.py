@@ -40,11 +40,13 @@ MEMORY_SHARE = 0.9
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("batch", parents=[common], help="a list of shots, as many at a time as memory allows")
-    parser.add_argument("list", type=named_path, help="shots.toml")
-    parser.add_argument("--plan", action="store_true", help="only say what is left and how long it will take")
+    parser = commands.add_parser(
+        "batch", parents=[common], help="reconstruct a list of shots, as many at a time as memory allows"
+    )
+    parser.add_argument("list", type=named_path, help="list of shots, such as shots.toml")
+    parser.add_argument("--plan", action="store_true", help="say only what is left and how long it will take")
     parser.add_argument(
-        "--workers", type=_count, metavar="N", help="shots at a time, at most (default: one a processor core)"
+        "--workers", type=_count, metavar="N", help="run N shots at a time at most (default: one a processor core)"
     )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, as tcp://host:8786 (needs the extra [cluster])"

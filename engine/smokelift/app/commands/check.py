@@ -14,8 +14,8 @@ from smokelift.report.shortcomings import count_empty, shortcomings
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("check", parents=[common], help="whether a sequence is complete and undamaged")
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser = commands.add_parser("check", parents=[common], help="check that a sequence is complete and undamaged")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.set_defaults(run=run)
 
 

@@ -40,10 +40,10 @@ NOTICED = 1e-3
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "continue", parents=[common], help="what the smoke does after its clip, or in wind and around obstacles"
+        "continue", parents=[common], help="make what the smoke does after its clip, or in wind and around obstacles"
     )
     add_directed_options(parser)
-    parser.add_argument("--frames", type=int, required=True, metavar="N", help="frames to add")
+    parser.add_argument("--frames", type=int, required=True, metavar="N", help="number of frames to add")
     parser.add_argument(
         "--start", type=int, metavar="FRAME", help="the last frame that stays as it is (default: the sequence's last)"
     )
@@ -96,7 +96,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         type=finite_number,
         default=ROOM,
         metavar="TIMES",
-        help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it",
+        help="let the box grow with the smoke to at most so many times the clip's size; 1 keeps it",
     )
     parser.set_defaults(run=run)
 

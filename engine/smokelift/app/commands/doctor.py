@@ -21,7 +21,7 @@ LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("doctor", parents=[common], help="versions, devices and what is missing")
+    parser = commands.add_parser("doctor", parents=[common], help="list versions, devices and what is missing")
     parser.set_defaults(run=run)
 
 

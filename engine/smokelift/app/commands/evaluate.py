@@ -21,7 +21,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         parents=[common],
         help="compare the smoke from all around with its front or with known volumes, and with other cameras",
     )
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
     parser.add_argument(
         "--view",

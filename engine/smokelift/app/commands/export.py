@@ -23,8 +23,8 @@ from smokelift.output.sequence import Sequence
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("export", parents=[common], help="small OpenVDB files, a proxy and a USD file")
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser = commands.add_parser("export", parents=[common], help="write small OpenVDB files, a proxy and a USD file")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--out", type=named_path, required=True, help="folder for the export")
     parser.add_argument(
         "--precision",

@@ -32,7 +32,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser(
         "inspect",
         parents=[common],
-        help="what a run would assume and choose, and what it would cost, without running it",
+        help="say what a run would assume and choose, and what it would cost, without running it",
     )
     add_run_options(parser)
     parser.add_argument(

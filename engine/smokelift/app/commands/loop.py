@@ -14,7 +14,7 @@ from smokelift.direct import loop_length, loop_sequence, open_source, steady_par
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("loop", parents=[common], help="a part of a sequence that repeats without a seam")
+    parser = commands.add_parser("loop", parents=[common], help="make a part of a sequence repeat without a seam")
     add_directed_options(parser)
     parser.add_argument(
         "--frames",

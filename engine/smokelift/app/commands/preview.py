@@ -19,9 +19,9 @@ from smokelift.render import device
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "preview", parents=[common], help="three pictures and a video that show the smoke from all sides"
+        "preview", parents=[common], help="make three pictures and a video that show the smoke from all sides"
     )
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--out", type=named_path, help="directory for these files (default: the sequence's own)")
     parser.set_defaults(run=run)
 

@@ -19,10 +19,10 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser(
         "proxy",
         parents=[common],
-        help=text,
+        help=f"write {text}",
         description=f"Write {text}. A run writes them itself from {MIN_PROXY_VOXELS:,} voxels on.",
     )
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.set_defaults(run=run)
 
 

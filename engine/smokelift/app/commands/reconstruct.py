@@ -32,7 +32,7 @@ from smokelift.setup.shot import Shot
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("reconstruct", parents=[common], help="a clip or scene file to a VDB sequence")
+    parser = commands.add_parser("reconstruct", parents=[common], help="turn a clip or scene file into a VDB sequence")
     add_run_options(parser)
     parser.add_argument("--out", type=named_path, required=True, help="directory for the sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
@@ -108,7 +108,9 @@ def _check_outputs(options: argparse.Namespace) -> None:
     check_directory(out, resume=options.resume)
     require_folder(thumbnail)
     if thumbnail is not None and out.resolve() in thumbnail.resolve().parents:
-        raise ValueError(f"{thumbnail}: the thumbnail cannot lie in {out}, which is for the sequence alone.")
+        raise ValueError(
+            f"{thumbnail}: the thumbnail cannot lie in {out}, which is for the sequence alone; choose another folder."
+        )
 
 
 def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:

@@ -21,20 +21,22 @@ SIDE_YAW = 90.0
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
-    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser = commands.add_parser("render", parents=[common], help="make an image or video of a sequence")
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument(
         "--frame",
         type=int,
         metavar="N",
-        help="the number of one frame (default: the first for an image, all for a video)",
+        help="number of the only frame to render (default: the first for an image, all for a video)",
     )
     parser.add_argument(
         "--camera",
         default="front",
-        help="front (default), side, YAW,PITCH in degrees from the front to the right and upwards, or camera.toml",
+        help="view: front (default), side, YAW,PITCH in degrees to the right of the front and upwards, or camera.toml",
     )
-    parser.add_argument("--out", type=named_path, required=True, help="image.exr, image.png or video.mp4")
+    parser.add_argument(
+        "--out", type=named_path, required=True, help="file to write: image.exr, image.png or video.mp4"
+    )
     parser.set_defaults(run=run)
 
 

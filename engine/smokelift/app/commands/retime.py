@@ -17,7 +17,9 @@ SPEEDS = 0.01, 100.0
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("retime", parents=[common], help="slow motion, fast motion and ramps of a sequence")
+    parser = commands.add_parser(
+        "retime", parents=[common], help="make slow motion, fast motion and ramps of a sequence"
+    )
     add_directed_options(parser)
     parser.add_argument(
         "--speed",
@@ -25,7 +27,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         nargs="+",
         required=True,
         metavar="S",
-        help="0.5 for half the speed; several speeds are spread evenly over the clip, with ramps in between",
+        help="speed: 0.5 for half; several speeds are spread evenly over the clip, with ramps in between",
     )
     parser.set_defaults(run=run)
 
