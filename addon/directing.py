@@ -63,7 +63,9 @@ def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]
 def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[str], list[bytes]]:
     settings, scene = smoke.smokelift.directing, scene_of(smoke)
     if settings.fade > settings.frames:
-        raise ShotError(f"The smoke fades in {settings.fade} frames, more than are added ({settings.frames}).")
+        raise ShotError(
+            f"The smoke fades in {settings.fade} frames, more than are added ({settings.frames}): shorten the fade."
+        )
     options = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
     options += ["--room", _number_text(settings.room)]
     last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
@@ -139,7 +141,8 @@ def _obstacles(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, later: l
         content = current_stl()
         if len(content) != len(files[0]):
             raise ShotError(
-                f"The obstacles change their number of triangles in frame {frame}: a mesh that moves has to keep them."
+                f"The obstacles change their number of triangles in frame {frame}, and a moving mesh has to keep it: "
+                "switch off the modifiers that change it."
             )
         files.append(content)
     while len(files) > 1 and files[-1] == files[-2]:

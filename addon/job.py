@@ -252,7 +252,10 @@ class Job:
 
     def _failure_reason(self, status: int) -> str:
         if status < 0 or status == 137:
-            return f"The engine was ended from outside (signal {abs(status) % 128}), perhaps for lack of memory."
+            return (
+                f"The engine was ended from outside (signal {abs(status) % 128}), perhaps for lack of memory: choose a "
+                "lower quality."
+            )
         try:
             lines = self._log_path.read_bytes()[-4096:].decode("utf-8", "replace").split("\n")
         except OSError:

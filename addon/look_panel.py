@@ -91,7 +91,7 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.active = not may_choose or cycles.volume_biased
     row.prop(smoke.data.render, "step_size", text="Render Step")
     if may_choose and not cycles.volume_biased:
-        text = "Marching has less noise in less time. Without it Cycles makes no error of steps."
+        text = "Marching has less noise in less time, but its steps make an error."
         draw_text(column, context, text, "INFO")
 
 

@@ -78,7 +78,12 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     row.prop(settings, "last", text="")
     if is_distorted(clip):
         column = layout.column(align=True)
-        draw_text(column, context, "The clip's lens bends lines; smoke is made for one that does not.", "INFO")
+        draw_text(
+            column,
+            context,
+            "The clip's lens bends lines, and smoke is made for one that does not: undistort it.",
+            "INFO",
+        )
         column.operator("smokelift.undistort")
     size = (scene.render.resolution_x, scene.render.resolution_y)
     other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01

@@ -132,7 +132,7 @@ def test_progress(engine, log) -> None:
         pytest.param(
             f"import os; os.kill(os.getpid(), {int(getattr(signal, 'SIGKILL', 9))})",
             -9,
-            "The engine was ended from outside (signal 9), perhaps for lack of memory.",
+            "The engine was ended from outside (signal 9), perhaps for lack of memory: choose a lower quality.",
             marks=pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals"),
         ),
     ],

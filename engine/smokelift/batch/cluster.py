@@ -103,7 +103,7 @@ def run_on_cluster(
             if now - lost_at > returns:
                 raise ClusterError(
                     f"{address}: the scheduler has not returned in {returns:.0f} s; not finished: "
-                    f"{', '.join(left)}. The same command goes on with them."
+                    f"{', '.join(left)}. Give the same command again to go on with them."
                 ) from error
             time.sleep(pause)
 

@@ -40,8 +40,8 @@ class MovingMesh:
         counts = {len(place.triangles) for place in self.places}
         if len(counts) != 1:
             raise ValueError(
-                f"a mesh that moves has {min(counts, default=0)} to {max(counts, default=0)} triangles; it has to keep "
-                "them: leave out what changes their number, or export it at one moment."
+                f"a mesh that moves has {min(counts, default=0)} to {max(counts, default=0)} triangles, but has to "
+                "keep their number; leave out what changes it, or export it at one moment."
             )
 
     @staticmethod
@@ -55,7 +55,7 @@ class MovingMesh:
         """
         named = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
         if named is None or not path.parent.is_dir():
-            raise ValueError(f"{path}: is no file, and no pattern crate_####.stl of numbered files.")
+            raise ValueError(f"{path}: is no file, and no pattern crate_####.stl of numbered files; give one of them.")
         prefix, hashes, suffix = named.groups()
         pattern = re.compile(re.escape(prefix) + rf"(\d{{{len(hashes)},}})" + re.escape(suffix))
         matches = ((pattern.fullmatch(file.name), file) for file in path.parent.iterdir())

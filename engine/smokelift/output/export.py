@@ -184,7 +184,9 @@ def require_space(out: Path, size: int) -> None:
     there = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
     free = shutil.disk_usage(there).free
     if free < size:
-        raise SequenceError(f"{out}: the export takes {size / 1e6:.0f} MB, and {free / 1e6:.0f} MB are free.")
+        raise SequenceError(
+            f"{out}: the export takes {size / 1e6:.0f} MB, but only {free / 1e6:.0f} MB are free; choose another disk."
+        )
 
 
 def _peak(sequence: Sequence, numbers: Iterable[int], settings: ExportSettings) -> float:

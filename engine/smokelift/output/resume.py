@@ -70,7 +70,9 @@ class ResumeState:
         if number.dtype.kind != "i" or number < 0 or density.min() < 0:
             raise OSError(f"{path}: cannot be read: number or density is negative")
         if (x.shape, y.shape, z.shape) not in _grids(shape):
-            raise OSError(f"{path}: cannot be read: its velocity is on no grid that the density's is halved to")
+            raise OSError(
+                f"{path}: cannot be read: the grid of its velocity does not fit its density; choose another directory"
+            )
         return ResumeState(int(number), density, (x, y, z), extra)
 
 

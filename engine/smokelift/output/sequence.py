@@ -235,7 +235,9 @@ class Sequence:
     def _check_sum(self, path: Path) -> None:
         written = self._checksums.get(path.name)
         if written is not None and checksum([path]) != written:
-            raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
+            raise SequenceError(
+                f"{path}: is not the file that was written: it is damaged, or was changed since; copy or make it again"
+            )
 
     def _read(self, number: int, *names: str) -> Mapping[str, Array]:
         """The arrays of these names from a NumPy twin, or else from OpenVDB; emission where it is there."""

@@ -116,7 +116,9 @@ class SequenceWriter:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             if not self._lock.acquire():
-                raise DirectoryBusyError(f"{self.directory}: another run is writing into this directory")
+                raise DirectoryBusyError(
+                    f"{self.directory}: another run is writing into this directory; wait for its end, or choose another"
+                )
         except OSError as error:
             raise SequenceError(f"{self.directory}: cannot be written to: {error.strerror}") from error
         try:

@@ -154,5 +154,8 @@ def _checked(density: Volume, renderer: Renderer) -> Volume:
         raise ValueError("The density holds negative values.")
     depth = float(density.max(initial=0.0)) * renderer.medium.extinction * renderer.domain.voxel_size
     if depth > LARGEST_DEPTH:
-        raise ValueError(f"The densest voxel has an optical depth of {depth:g}; {LARGEST_DEPTH:g} at most.")
+        raise ValueError(
+            f"The densest voxel has an optical depth of {depth:g}; {LARGEST_DEPTH:g} at most. Lower the density "
+            "or the extinction."
+        )
     return density

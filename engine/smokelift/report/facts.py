@@ -78,7 +78,7 @@ def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
 
 def _cost(shot: Shot, cost: Cost) -> Fact:
     spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
-    free = f"Right to a factor of one and a half; {cost.memory_free / 2**30:.1f} GiB of memory are free."
+    free = f"Right to a factor of 1.5; {cost.memory_free / 2**30:.1f} GiB of memory are free."
     return Fact("cost", f"{counted(shot.length, 'frame')}: {spent}", "estimated", free)
 
 
@@ -114,23 +114,25 @@ def _mask(shot: Shot) -> tuple[Fact, ...]:
     seen = shot.clip.seen(0, *shot.clip.size)
     if seen is None:
         return ()
-    how = "No smoke is made there, and nothing is learned from it."
+    how = "No smoke is made there, and the fit ignores it."
     return (Fact("mask", f"hides {1 - seen.mean():.0%} of the first frame", "given", how),)
 
 
 def _exposure(shot: Shot, plate: Plate) -> Fact:
     if not shows_exposure(small(plate.image)):
-        how = "The background is too dark or too bright to show it: what flickers is taken for smoke."
+        how = "The background is too dark or too bright to show it, so what flickers is taken for smoke."
         return Fact("exposure", "taken to be steady", UNDETERMINED, how)
     value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
-    return Fact("exposure", value, "measured", "Of what does not move, against the background.")
+    return Fact("exposure", value, "measured", "Measured on what does not move, against the background.")
 
 
 def _noise(plate: Plate) -> Fact:
     codes = 255 * float(plate.noise.total.max())
     kind = "clean" if codes <= CLEAN_NOISE else "noisy: thin smoke is lost in it" if codes >= HEAVY_NOISE else "usual"
     lasting = 255 * float(plate.noise.lasting.max())
-    return Fact("noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighbours.")
+    return Fact(
+        "noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighboring pixels."
+    )
 
 
 def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:

@@ -62,7 +62,7 @@ class Camera:
         set_fields(self, matrices=tuple(_rigid(matrix, "matrices") for matrix in self.matrices))
         set_fields(self, matrix=_rigid(self.matrix), size=picture_size(self.size))
         if self.matrices and self.matrix != self.matrices[0]:
-            raise SceneError("matrix must be the first of matrices", key="matrices")
+            raise SceneError("matrix must be the first of matrices; give matrices alone", key="matrices")
         for key in ("fx", "fy"):
             set_fields(self, **{key: positive(getattr(self, key), key)})
         set_fields(self, cx=number(self.cx, "cx"), cy=number(self.cy, "cy"))
@@ -145,7 +145,9 @@ class Camera:
         if not self.moves:
             return self
         if not 0 <= frame < len(self.matrices):
-            raise SceneError(f"matrices are given for frames 0 to {len(self.matrices) - 1}, not for {frame}")
+            raise SceneError(
+                f"matrices are given for frames 0 to {len(self.matrices) - 1}, not for {frame}; give one a frame"
+            )
         return replace(self, matrix=self.matrices[frame], matrices=())
 
     def resized(self, width: int, height: int) -> Camera:
@@ -210,7 +212,7 @@ def _rigid(value: Any, key: str = "matrix") -> Matrix:
             f"{name} must be rigid: its upper left 3x3 part must be a rotation without scale or shear", key=key
         )
     if np.linalg.det(rotation) < 0.0:
-        raise SceneError(f"{name} must be rigid: its upper left 3x3 part mirrors", key=key)
+        raise SceneError(f"{name} must be rigid: its upper left 3x3 part mirrors; flip one of its axes", key=key)
     return as_matrix(np.array(rows))
 
 

@@ -117,7 +117,9 @@ class Scene:
             cameras = {"camera": self.camera, **cameras}
         for table, camera in cameras.items():
             if not any(sees(camera.at(frame), domain) for frame in range(len(camera.matrices) or 1)):
-                raise SceneError("does not see the domain: no part of the box is in its picture", table=table)
+                raise SceneError(
+                    "does not see the domain: no part of the box is in its picture; turn or move it", table=table
+                )
 
     def with_frames(self, first: int, last: int) -> Scene:
         """Return the scene with another range of its clip's frames; the ranges of further views move with it.

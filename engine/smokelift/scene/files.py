@@ -22,10 +22,10 @@ def read_text(path: Path) -> str:
         raise OSError(f"{path}: cannot be read: it is a folder, a pipe or a device, not a file")
     try:
         if path.stat().st_size > LARGEST_TEXT:
-            raise OSError(f"{path}: cannot be read: it holds more than {LARGEST_TEXT >> 20} MiB")
+            raise OSError(f"{path}: cannot be read: it holds more than {LARGEST_TEXT >> 20} MiB; give a smaller file")
         return path.read_text(encoding="utf-8-sig")  # some editors on Windows begin a file with a byte order mark
     except UnicodeDecodeError as error:
-        raise OSError(f"{path}: is not a text file in UTF-8") from error
+        raise OSError(f"{path}: is not a text file in UTF-8; save it as one") from error
     except OSError as error:
         if error.strerror is None:
             raise

@@ -85,7 +85,7 @@ def advect(
     require_same_shape("the field", field.shape, velocity.shape)
     if isinstance(field, Velocity):
         if conserve:
-            raise ValueError("mass can be kept of a density, not of a velocity.")
+            raise ValueError("mass can be kept for a density, not for a velocity; leave it out.")
         x, y, z = _core.advect_faces(field.faces, displacement.faces, corrected)
         return Velocity((x, y, z), field.voxel_size, field.closed)
     if not finite(field):
@@ -94,7 +94,7 @@ def advect(
         return _moved(field, displacement, corrected)
     moved = _core.advect_cells(field, displacement.faces, corrected)
     if field.min() < 0:
-        raise ValueError("mass can be kept of a density, not of negative values.")
+        raise ValueError("mass can be kept for a density, not for negative values; leave it out.")
     other = _core.advect_cells(field, displacement.faces, not corrected)
     mass = float(np.sum(field * _share_inside(displacement), dtype=np.float64))
     return _with_mass(moved, np.abs(moved - other), mass)

@@ -159,7 +159,9 @@ class Velocity(StaggeredGrid):
         with np.errstate(over="ignore", invalid="ignore"):
             x, y, z = (component * np.float32(dt / self.voxel_size) for component in self.faces)
         if not all(component.min() >= -LARGEST and component.max() <= LARGEST for component in (x, y, z)):
-            raise ValueError(f"the velocity moves smoke by more than {LARGEST:g} voxels in {dt:g} s.")
+            raise ValueError(
+                f"the velocity moves smoke by more than {LARGEST:g} voxels in {dt:g} s; take a shorter step."
+            )
         return StaggeredGrid((x, y, z), 1.0, self.closed)
 
 

@@ -379,7 +379,7 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
         assert clip.remarks()[0].figures["frames"] == "frames 2 and 4 are"
     (tmp_path / "frame_0005.png").unlink()
     pictures(tmp_path, [400])
-    with pytest.raises(ClipError, match=r"frame_0003\.png: this picture is missing, as most .* frame_0400\.png"):
+    with pytest.raises(ClipError, match=r"frame_0003\.png: this picture is missing, as .* most .* frame_0400\.png"):
         Clip.open(tmp_path / "frame_####.png")
     (tmp_path / "frame_0400.png").unlink()
     with pytest.raises(ClipError, match=r"other_####\.png: no such pictures"):

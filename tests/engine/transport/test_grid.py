@@ -28,9 +28,9 @@ def test_bad_input_is_refused():
         advect(density, velocity, 1.0, scheme="cubic")
     with pytest.raises(ValueError, match="not finite"):
         advect(density + np.nan, velocity, 1.0)
-    with pytest.raises(ValueError, match="not of negative values"):
+    with pytest.raises(ValueError, match="not for negative values"):
         advect(density - 1, velocity, 1.0, conserve=True)
-    with pytest.raises(ValueError, match="not of a velocity"):
+    with pytest.raises(ValueError, match="not for a velocity"):
         advect(velocity, velocity, 1.0, conserve=True)
     with pytest.raises(ValueError, match="unknown side 'up'"):
         project(velocity, ("up",))

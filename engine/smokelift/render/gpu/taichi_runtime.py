@@ -51,7 +51,7 @@ def start(backend: str) -> str:
     global _running
     if _running is not None:
         if _running != backend:
-            raise RuntimeError(f"Taichi already runs on {_running} in this process.")
+            raise RuntimeError(f"Taichi already runs on {_running} in this process; start a new one.")
         return ""
     chip = _initialise(GPU_BACKENDS.get(backend, ti.cpu))
     _running = backend
