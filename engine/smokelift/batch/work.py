@@ -120,7 +120,7 @@ def _try(shot: Shot, stop: threading.Event, engine: Sequence[str]) -> tuple[Reco
     shot.folder.mkdir(parents=True, exist_ok=True)
     lock = Lock(shot.folder / f".{shot.name}.lock")
     if not lock.acquire():
-        sentence = f"{shot.directory}: another batch is at work on this shot; wait for its end."
+        sentence = f"{shot.directory}: another batch is at work on this shot."
         return replace(read_record(shot), status="stuck", sentence=sentence), True
     try:
         before = read_record(shot)

@@ -182,7 +182,10 @@ def reduction(width: int, height: int) -> int:
 def _require_size(path: Path, width: int, height: int) -> None:
     """Refuse what a header says before memory is taken for it."""
     if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS):
-        raise ImageError(f"{path}: cannot be read: its header says {width} x {height} pixels; save it again")
+        raise ImageError(
+            f"{path}: cannot be read: its header says {width} x {height} pixels; a picture has "
+            f"{LARGEST_PICTURE} a side and {MAX_PIXELS} in all at most"
+        )
 
 
 def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:

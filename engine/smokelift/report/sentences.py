@@ -31,7 +31,7 @@ SENTENCES: Mapping[str, str] = {
         "{path}: is truncated; only {frames:frame} of it can be used. Copy or export it again for the rest."
     ),
     "damaged frames": (
-        "{path}: {frames} missing or damaged; the last good frame before stands in, so the smoke stands still there. "
+        "{path}: {frames} missing or damaged; a neighboring good frame stands in, so the smoke stands still there. "
         "Export the clip again to mend that."
     ),
     "pictures without a frame rate": (
@@ -47,7 +47,7 @@ SENTENCES: Mapping[str, str] = {
         "The clip has a high dynamic range ({transfer}): diffuse white becomes 1, and highlights are brighter."
     ),
     "other primaries": "The clip's primaries, {primaries}, are converted to BT.709.",
-    "scaled pictures": "The clip's pixels are not square: its pictures of {size} pixels are scaled to {scaled}.",
+    "scaled pictures": "Pictures of {size} pixels are scaled to {scaled}: they are large, or their pixels not square.",
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
     "disagreeing views": (
         "The views agree on only {agreed:.0%} of the smoke that they show. Check where their cameras stand, which "
@@ -262,7 +262,7 @@ SENTENCES: Mapping[str, str] = {
     "velocity levels": "Velocity grids: {value}, because the fastest smoke goes {voxels_a_frame:.1f} voxels a frame.",
     "velocity levels without motion": "Velocity grids: {value}, since there is no motion to measure.",
     # where the parts of a result come from
-    "replaced pictures": "Those of {frames} missing or damaged; the last good one before stands in.",
+    "replaced pictures": "Those of {frames} missing or damaged; a neighboring good one stands in.",
     "pictures that are fitted": (
         "The density renders to the pictures of {cameras:camera} in the scene's light and medium; psnr in the figures "
         "of a frame says how closely."
