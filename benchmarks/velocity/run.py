@@ -24,7 +24,7 @@ from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
-from smokelift.velocity import CoarseToFine, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings
+from smokelift.velocity import CoarseToFine, DensityPair, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings
 
 Shape = tuple[int, int, int]
 Made = TypeVar("Made")
@@ -225,7 +225,8 @@ def _estimator(setting: str, value: Any) -> VelocityEstimator:
 
 def _against_truth(pair: Pair, estimator: VelocityEstimator, clock: _Clock) -> tuple[float, float, float]:
     """Return error, seconds and solves."""
-    seconds, solves, found = clock.time(lambda: estimator.estimate(pair.before, pair.after, 1.0, 1.0))
+    densities = DensityPair(pair.before, pair.after, 1.0, 1.0)
+    seconds, solves, found = clock.time(lambda: estimator.estimate(densities))
     return relative_error(found.centres(), pair.motion, pair.counted), seconds, solves
 
 

@@ -32,6 +32,7 @@ from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine
 from smokelift.velocity.estimator import VelocityEstimator, predict_velocity, refined_to
+from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
 from smokelift.velocity.sources import SourceDetection
@@ -99,15 +100,15 @@ def estimate_velocity(
     1.0
     """
     require_kind(settings, VelocitySettings | None, "settings", "VelocitySettings (settings.velocity of a run's)")
-    found = CoarseToFine(settings or VelocitySettings()).estimate(
-        before, after, dt, voxel_size, closed=closed, inflow=inflow, prediction=prediction
-    )
+    pair = DensityPair(before, after, dt, voxel_size, closed, inflow)
+    found = CoarseToFine(settings or VelocitySettings()).estimate(pair, prediction)
     x, y, z = np.shape(before)
     return refined_to(found, (x, y, z))
 
 
 __all__ = [
     "CoarseToFine",
+    "DensityPair",
     "PrimalDual",
     "ProjectedCG",
     "Solver",

@@ -30,7 +30,7 @@ from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity
-from smokelift.velocity import CoarseToFine
+from smokelift.velocity import CoarseToFine, DensityPair
 from tests.engine.conftest import Plume
 from tests.engine.setup.shots import burning
 
@@ -169,9 +169,9 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
     inflows = []
 
     class Watched(CoarseToFine):
-        def estimate(self, *arguments: Any, inflow: Any, **options: Any) -> Velocity:
-            inflows.append(inflow)
-            return super().estimate(*arguments, inflow=inflow, **options)
+        def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
+            inflows.append(pair.inflow)
+            return super().estimate(pair, prediction)
 
     scene = replace(plume.scene.with_frames(0, 2), closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
     with Clip.open(scene.clip) as clip:
@@ -331,9 +331,8 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
 
     def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
         dt = 1 / plume.scene.clip.fps
-        found = estimator.estimate(
-            before, after, dt, domain.voxel_size, closed=shot.scene.closed, inflow=shot.scene.inflow(), prediction=None
-        )
+        pair = DensityPair(before, after, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
+        found = estimator.estimate(pair)
         return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
 
     np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())
