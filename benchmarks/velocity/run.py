@@ -81,7 +81,7 @@ MANY_VOXELS = 1 << 20
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Variant:
     """One way to estimate, without a prediction.
 
     Attributes
@@ -132,7 +132,7 @@ def run(
     -------
     dict
         ``date``, ``machine``, ``versions`` and ``sizes``: each with ``size``, ``scene`` (names, or "built-in"),
-        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms`` and ``estimates`` (of `Estimate`). Ready for
+        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms`` and ``estimates`` (of `Variant`). Ready for
         JSON.
 
     Raises
@@ -196,7 +196,7 @@ class _Clock:
         return self.units[-1]
 
 
-def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Estimate]:
+def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Variant]:
     ways = [{"iterations": count} for count in plan.iterations]
     ways += [{"primal_dual_iterations": count} for count in plan.primal_dual_iterations]
     estimates = []
@@ -207,7 +207,7 @@ def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> li
         errors = tuple(error for error, _, _ in found)
         seconds, solves = (float(np.median(column)) for column in list(zip(*found, strict=True))[1:])
         default = estimator == CoarseToFine()
-        estimates.append(Estimate(setting, value, default, float(np.mean(errors)), errors, seconds, solves))
+        estimates.append(Variant(setting, value, default, float(np.mean(errors)), errors, seconds, solves))
         say(f"  {setting} {value}: error {estimates[-1].error:.3f}, {solves:.0f} solves")
     return estimates
 

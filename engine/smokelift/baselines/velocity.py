@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import Estimate, checked, motion_weight, predict_velocity
+from smokelift.velocity.estimator import VelocityEstimate, checked, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Regularisation, least_squares, linearise
 from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.preparation import without_noise
@@ -59,7 +59,7 @@ class PaperVelocity:
         u, figures = self.solver.solve(least_squares(linear, rest, terms), rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
         nothing = np.zeros_like(second)
-        return Estimate(u, measures, nothing + 1, nothing, None).velocity(pair.dt, pair.voxel_size)
+        return VelocityEstimate(u, measures, nothing + 1, nothing, None).velocity(pair.dt, pair.voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""

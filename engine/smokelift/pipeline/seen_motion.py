@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
-from smokelift.density import View
+from smokelift.density import ObservedView
 from smokelift.footage.images import Picture
 from smokelift.render import Volume
 from smokelift.scene import Camera, Domain
@@ -43,7 +43,7 @@ ANYWHERE = 1e-3
 """Share of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
 
 
-def followed_picture(view: View) -> Picture:
+def followed_picture(view: ObservedView) -> Picture:
     """What is followed of a camera's picture (rows, columns)."""
     return np.sqrt(view.optical_depth)
 

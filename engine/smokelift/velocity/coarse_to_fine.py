@@ -20,7 +20,7 @@ from smokelift.transport import (
     advect_cells,
     sides_in_order,
 )
-from smokelift.velocity.estimator import Estimate, checked, coarsened, motion_weight, predict_velocity
+from smokelift.velocity.estimator import VelocityEstimate, checked, coarsened, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.momentum import Centre, Prediction, fit_centre
 from smokelift.velocity.pair import DensityPair
@@ -147,7 +147,7 @@ class _Estimation:
         self._effort: Counter[str] = Counter(iterations=0, products=0, projections=0)
         self._figures: dict[str, float] = {}
 
-    def result(self) -> Estimate | None:
+    def result(self) -> VelocityEstimate | None:
         """The estimate; None where there is no structure to follow."""
         settings = self._settings
         while self._levels:  # a grid is not kept after its turn
@@ -169,7 +169,7 @@ class _Estimation:
                 del solved  # the next linearisation needs the memory
                 if last:
                     break
-        return Estimate(self._u, {**self._effort, **self._figures}, confidence, source, residual)
+        return VelocityEstimate(self._u, {**self._effort, **self._figures}, confidence, source, residual)
 
     def _linearisations(self, level: Level) -> int:
         """How many times the change is linearised on a grid, at most."""

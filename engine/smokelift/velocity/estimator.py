@@ -129,7 +129,7 @@ def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) ->
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class VelocityEstimate:
     """A velocity in voxels a frame, and what is known about it.
 
     Attributes
