@@ -27,7 +27,7 @@ from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.preparation import PreparedPair, prepare
 from smokelift.velocity.pyramid import Level, coarsen, pyramid, refine, smoothed
 from smokelift.velocity.settings import VelocitySettings
-from smokelift.velocity.sources import SourceDetection
+from smokelift.velocity.source_detection import SourceDetection
 
 ONE_VIEW_SMOOTHNESS = 10.0
 """Factor on `smoothness` for densities of one view: what moves is mixed along its rays, and a depth that is assumed
