@@ -13,8 +13,8 @@ from smokelift.density import (
     GradientFit,
     NothingCarried,
     ObservedClip,
+    ObservedView,
     RoundDepth,
-    View,
     ViewSet,
 )
 from smokelift.density.screen import view_frame
@@ -104,7 +104,7 @@ def smear(views: ViewSet, fit: GradientFit) -> Volume:
     return fit.fit(views, RoundDepth().estimate(views), start).density
 
 
-def thickness(view: View, domain: Domain) -> float:
+def thickness(view: ObservedView, domain: Domain) -> float:
     """Return how deep the domain is along a view (m)."""
     _, depth, _ = view_frame(view.camera)
     return float((np.array(domain.max) - domain.min) @ np.abs(depth))

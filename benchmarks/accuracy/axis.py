@@ -39,7 +39,7 @@ NAMES = ("the domain's axis", "upright at the lower end", "estimated", "estimate
 
 
 @dataclass(frozen=True)
-class Shot:
+class AxisCase:
     """A scene from one of the cameras.
 
     Attributes
@@ -58,7 +58,7 @@ class Shot:
     depths: Doubles
 
 
-def shots(truth: Truth) -> Iterator[Shot]:
+def shots(truth: Truth) -> Iterator[AxisCase]:
     """Yield the scene from all cameras."""
     h = truth.voxel_size
     across, heights = ((np.arange(n) + 0.5) * h for n in truth.shape[1:])
@@ -73,7 +73,7 @@ def shots(truth: Truth) -> Iterator[Shot]:
         observed = np.unique(np.linspace(0, FRAMES - 1, OBSERVED).round().astype(int))
         amounts = [-np.log(np.maximum(renderer.image(densities[frame])[..., 0], 1e-9)) for frame in observed]
         seen = [np.where(amount > 0.01, amount, 0).astype(np.float32) for amount in amounts]
-        yield Shot(camera, seen, heights, mass, side * mean)
+        yield AxisCase(camera, seen, heights, mass, side * mean)
 
 
 def errors(path: Path) -> Doubles:
@@ -93,14 +93,14 @@ def errors(path: Path) -> Doubles:
     return np.reshape(table, (-1, len(LOWERED), len(NAMES)))
 
 
-def lower_end(shot: Shot) -> float:
+def lower_end(shot: AxisCase) -> float:
     """Return the mean depth (m) of the smoke's lower end."""
     low = np.cumsum(shot.mass) <= LOWER_END * shot.mass.sum()
     low[np.argmax(shot.mass > 0)] = True
     return float(np.average(shot.depths[low], weights=shot.mass[low]))
 
 
-def error(shot: Shot, domain: Domain, found: SmokeAxis) -> float:
+def error(shot: AxisCase, domain: Domain, found: SmokeAxis) -> float:
     """Return the error of an axis (m), weighted by the smoke's mass."""
     heights = shot.heights - domain.centre[2]
     difference = found.at(heights, np.zeros_like(heights)) - shot.depths

@@ -14,7 +14,7 @@ from smokelift.density.screen import view_frame
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import Picture, area_average
 from smokelift.render import Image
-from smokelift.scene.projection import project, ray_through_pixels
+from smokelift.scene.projection import project_points, ray_through_pixels
 
 VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
 """Cameras of a baked scene by their angle about the vertical (degrees), and the names of their files."""
@@ -193,7 +193,8 @@ def picture_on_screen(picture: Image, source: Camera, view: Camera, centre: npt.
     facing = np.cross(across(view), [0.0, 0.0, 1.0])
     points = origin + direction * (((centre - origin) @ facing) / (direction @ facing))[..., None]
     lateral, height = (points - centre) @ across(view), points[..., 2] - centre[2]
-    pixels, _ = project(source, centre + lateral[..., None] * across(source) + height[..., None] * [0.0, 0.0, 1.0])
+    places = centre + lateral[..., None] * across(source) + height[..., None] * [0.0, 0.0, 1.0]
+    pixels, _ = project_points(source, places)
     columns, rows = (np.rint(pixels[..., axis] - 0.5).astype(int) for axis in (0, 1))
     inside = (rows >= 0) & (rows < picture.shape[0]) & (columns >= 0) & (columns < picture.shape[1])
     shown = np.zeros((*inside.shape, 3), np.float32)

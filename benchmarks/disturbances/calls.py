@@ -22,6 +22,7 @@ from smokelift.render import scene_renderer
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import MethodName
 from smokelift.transport import Velocity, advect, project
+from smokelift.velocity import DensityPair
 
 
 def motion(known: Known, voxels: float, method: MethodName) -> Figures:
@@ -32,7 +33,8 @@ def motion(known: Known, voxels: float, method: MethodName) -> Figures:
     way = np.linalg.norm(flow.centres()[smoke], axis=-1).mean() / (known.fps * flow.voxel_size)
     flow = flow.with_faces(np.float32(voxels / way) * component for component in flow.faces)
     after = advect(density, flow, 1 / known.fps)
-    found = compose(_settings(method)).velocity_estimator.estimate(density, after, 1 / known.fps, flow.voxel_size)
+    pair = DensityPair(density, after, 1 / known.fps, flow.voxel_size)
+    found = compose(_settings(method)).velocity_estimator.estimate(pair)
     counted = after > SMOKE_SHARE * after.max()
     return {"velocity_error": velocity_error(found.centres(), flow.centres(), counted)[0]}
 
@@ -48,7 +50,7 @@ def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
     if isinstance(estimator, PaperVelocity):
         smoothness, kinetic = (weight / factor**2 for weight in (estimator.smoothness, estimator.kinetic))
         estimator = replace(estimator, smoothness=smoothness, kinetic=kinetic)
-    found = estimator.estimate(before, after, 1 / known.fps, known.domain.voxel_size)
+    found = estimator.estimate(DensityPair(before, after, 1 / known.fps, known.domain.voxel_size))
     counted = (after > SMOKE_SHARE * after.max()) & ~known.inlets[FIRST + 1]
     return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], counted)[0]}
 

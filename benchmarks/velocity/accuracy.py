@@ -27,7 +27,7 @@ from smokelift.checks.array_types import Array
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import Side
 from smokelift.transport import advect
-from smokelift.velocity import CoarseToFine, Velocity, VelocityEstimator
+from smokelift.velocity import CoarseToFine, DensityPair, Velocity, VelocityEstimator
 
 PAIRS = range(6, 38, 4)
 CHAIN = range(6, 22)
@@ -98,7 +98,7 @@ def pairs(
         before, after = (change(truth.density(f)) for f in (frame, frame + step))
         start = time.perf_counter()
         inflow = truth.inflow(frame + step) if known_inlet else None
-        found = estimator.estimate(before, after, step * truth.dt, truth.voxel_size, inflow=inflow)
+        found = estimator.estimate(DensityPair(before, after, step * truth.dt, truth.voxel_size, inflow=inflow))
         yield score(truth, frame, found, (time.perf_counter() - start) / unit, step)
 
 
@@ -113,9 +113,9 @@ def estimates(truth: Truth, closed: tuple[Side, ...] = ()) -> Iterator[tuple[flo
     """Yield the estimates of a chain of frames with their times (s)."""
     estimator, prediction = CoarseToFine(), None
     for frame in CHAIN:
-        densities = truth.density(frame), truth.density(frame + 1)
+        pair = DensityPair(truth.density(frame), truth.density(frame + 1), truth.dt, truth.voxel_size, closed)
         start = time.perf_counter()
-        found = estimator.estimate(*densities, truth.dt, truth.voxel_size, closed=closed, prediction=prediction)
+        found = estimator.estimate(pair, prediction)
         prediction = estimator.predict(found, truth.dt)
         yield time.perf_counter() - start, found
 

@@ -24,7 +24,7 @@ from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
-from smokelift.velocity import CoarseToFine, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings
+from smokelift.velocity import CoarseToFine, DensityPair, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings
 
 Shape = tuple[int, int, int]
 Made = TypeVar("Made")
@@ -81,7 +81,7 @@ MANY_VOXELS = 1 << 20
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Variant:
     """One way to estimate, without a prediction.
 
     Attributes
@@ -132,7 +132,7 @@ def run(
     -------
     dict
         ``date``, ``machine``, ``versions`` and ``sizes``: each with ``size``, ``scene`` (names, or "built-in"),
-        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms`` and ``estimates`` (of `Estimate`). Ready for
+        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms`` and ``estimates`` (of `Variant`). Ready for
         JSON.
 
     Raises
@@ -196,7 +196,7 @@ class _Clock:
         return self.units[-1]
 
 
-def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Estimate]:
+def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Variant]:
     ways = [{"iterations": count} for count in plan.iterations]
     ways += [{"primal_dual_iterations": count} for count in plan.primal_dual_iterations]
     estimates = []
@@ -207,7 +207,7 @@ def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> li
         errors = tuple(error for error, _, _ in found)
         seconds, solves = (float(np.median(column)) for column in list(zip(*found, strict=True))[1:])
         default = estimator == CoarseToFine()
-        estimates.append(Estimate(setting, value, default, float(np.mean(errors)), errors, seconds, solves))
+        estimates.append(Variant(setting, value, default, float(np.mean(errors)), errors, seconds, solves))
         say(f"  {setting} {value}: error {estimates[-1].error:.3f}, {solves:.0f} solves")
     return estimates
 
@@ -225,7 +225,8 @@ def _estimator(setting: str, value: Any) -> VelocityEstimator:
 
 def _against_truth(pair: Pair, estimator: VelocityEstimator, clock: _Clock) -> tuple[float, float, float]:
     """Return error, seconds and solves."""
-    seconds, solves, found = clock.time(lambda: estimator.estimate(pair.before, pair.after, 1.0, 1.0))
+    densities = DensityPair(pair.before, pair.after, 1.0, 1.0)
+    seconds, solves, found = clock.time(lambda: estimator.estimate(densities))
     return relative_error(found.centres(), pair.motion, pair.counted), seconds, solves
 
 

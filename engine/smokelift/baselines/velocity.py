@@ -13,11 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
-from smokelift.scene import Side
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import Density, Estimate, checked, motion_weight, predict_velocity
+from smokelift.velocity.estimator import VelocityEstimate, checked, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Regularisation, least_squares, linearise
+from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.preparation import without_noise
 from smokelift.velocity.pyramid import Level
 from smokelift.velocity.solver import PrimalDual, Solver
@@ -47,30 +46,20 @@ class PaperVelocity:
     smoke_threshold: float = 0.01
     solver: Solver = field(default_factory=PrimalDual)
 
-    def estimate(
-        self,
-        before: Density,
-        after: Density,
-        dt: float,
-        voxel_size: float,
-        *,
-        closed: tuple[Side, ...] = (),
-        inflow: Mask | None = None,
-        prediction: Velocity | None = None,
-    ) -> Velocity:
+    def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """See `smokelift.velocity.estimate_velocity`. The paper's estimate knows of no prediction."""
-        first, second = checked(before, after, dt, voxel_size, inflow, prediction)
+        first, second = checked(pair, prediction)
         (first, second, _), _ = without_noise(first, second, ((self.blur, np.inf),), self.smoke_threshold)
-        rest = StaggeredGrid.zero(first.shape, 1.0, closed)
-        level = Level(first, second, motion_weight(first.shape, inflow))
+        rest = StaggeredGrid.zero(first.shape, 1.0, pair.closed)
+        level = Level(first, second, motion_weight(first.shape, pair.inflow))
         linear = linearise(level, rest, self.smoke_threshold, None)
         if linear is None:
-            return Velocity.zero(first.shape, voxel_size, closed)
+            return Velocity.zero(first.shape, pair.voxel_size, pair.closed)
         terms = Regularisation(first_order=self.smoothness, kinetic=self.kinetic)
         u, figures = self.solver.solve(least_squares(linear, rest, terms), rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
         nothing = np.zeros_like(second)
-        return Estimate(u, measures, nothing + 1, nothing, None).velocity(dt, voxel_size)
+        return VelocityEstimate(u, measures, nothing + 1, nothing, None).velocity(pair.dt, pair.voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""

@@ -8,15 +8,15 @@ from smokelift.batch.local import Room, run_here
 from smokelift.batch.record import Frames, Record, ShotState, finished_frames, read_record, read_state
 from smokelift.batch.report import write_report
 from smokelift.batch.schedule import Remaining, duration, remaining_work
-from smokelift.batch.shots import Shot, read_shots
+from smokelift.batch.shots import BatchShot, read_shots
 from smokelift.batch.work import finish_shot, look_at_shot
 
 __all__ = [
+    "BatchShot",
     "Frames",
     "Record",
     "Remaining",
     "Room",
-    "Shot",
     "ShotState",
     "duration",
     "finish_shot",

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from smokelift.batch.local import RETRIES
 from smokelift.batch.record import Record, read_record
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 
 if TYPE_CHECKING:
     from smokelift.batch.worker import Task
@@ -44,14 +44,14 @@ class _SchedulerLostError(Exception):
 
 
 def run_on_cluster(
-    shots: Sequence[tuple[Shot, Record]],
+    shots: Sequence[tuple[BatchShot, Record]],
     task: Task,
     address: str,
     say: Callable[[str], None],
     *,
     returns: float = RETURN_SECONDS,
     pause: float = PAUSE_SECONDS,
-) -> Iterator[tuple[Shot, Record]]:
+) -> Iterator[tuple[BatchShot, Record]]:
     """Run shots on the workers of a cluster and yield each when it has ended.
 
     Leaving early ends them; finished frames stay.
@@ -109,8 +109,8 @@ def run_on_cluster(
 
 
 def _submitted(
-    client: Any, shots: Sequence[tuple[Shot, Record]], task: Task, batch: str
-) -> Iterator[tuple[Shot, Record]]:
+    client: Any, shots: Sequence[tuple[BatchShot, Record]], task: Task, batch: str
+) -> Iterator[tuple[BatchShot, Record]]:
     """Give shots to a scheduler and yield each when it has ended; `_SchedulerLostError` if it forgets them."""
     from distributed import KilledWorker, as_completed
 
@@ -118,7 +118,7 @@ def _submitted(
 
     client.register_plugin(worker.EndShots())
     by_memory = bool(client.run_on_scheduler(_workers_have_memory))
-    of: dict[Any, Shot] = {}
+    of: dict[Any, BatchShot] = {}
     try:
         for place, (shot, record) in enumerate(shots):
             needed = {MEMORY: record.forecast.memory} if by_memory and record.forecast is not None else None

@@ -8,9 +8,9 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 from smokelift.batch.record import Record
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 
-Work = Callable[[Shot], Record]
+Work = Callable[[BatchShot], Record]
 
 RETRIES = 2
 """New tries after a crash of the engine."""
@@ -28,8 +28,8 @@ class Room:
 
 
 def run_here(
-    shots: Sequence[tuple[Shot, Record]], work: Work, room: Room, stop: threading.Event
-) -> Iterator[tuple[Shot, Record]]:
+    shots: Sequence[tuple[BatchShot, Record]], work: Work, room: Room, stop: threading.Event
+) -> Iterator[tuple[BatchShot, Record]]:
     """Run shots side by side and yield each when it has ended.
 
     A shot starts as soon as its memory is left, in the order of the list; a small one may overtake a large one. What
@@ -47,7 +47,7 @@ def run_here(
         Set when the caller leaves early: the work ends, and is waited for.
     """
     waiting = list(shots)
-    running: dict[Future[Record], tuple[Shot, int]] = {}
+    running: dict[Future[Record], tuple[BatchShot, int]] = {}
     with ThreadPoolExecutor(max_workers=room.shots) as pool:
         try:
             while waiting or running:
@@ -66,7 +66,7 @@ def run_here(
             stop.set()
 
 
-def _with_retries(work: Work, shot: Shot) -> Record:
+def _with_retries(work: Work, shot: BatchShot) -> Record:
     for _ in range(RETRIES):
         record = work(shot)
         if record.status != "crashed":

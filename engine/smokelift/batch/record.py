@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 from smokelift.output.atomic import atomic_path
 from smokelift.output.index import Index, SequenceError
 
@@ -68,7 +68,7 @@ class Record:
     machine: str = ""
     forecast: Forecast | None = None
 
-    def write(self, shot: Shot) -> None:
+    def write(self, shot: BatchShot) -> None:
         """Write the file; OSError if that fails."""
         with atomic_path(_path(shot)) as aside:
             aside.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
@@ -99,7 +99,7 @@ class Frames:
 class ShotState(NamedTuple):
     """A shot with its record and its finished frames, as they are on the storage."""
 
-    shot: Shot
+    shot: BatchShot
     record: Record
     frames: Frames
 
@@ -109,12 +109,12 @@ class ShotState(NamedTuple):
         return self.record.status == "done" and self.frames.complete
 
 
-def read_state(shot: Shot) -> ShotState:
+def read_state(shot: BatchShot) -> ShotState:
     """Read what the storage has of a shot as it is now listed."""
     return ShotState(shot, read_record(shot), finished_frames(shot))
 
 
-def read_record(shot: Shot) -> Record:
+def read_record(shot: BatchShot) -> Record:
     """Return the record of a shot as it is now listed; a new one if its options or its input have changed."""
     fresh = Record(of=_identity(shot))
     with suppress(OSError, ValueError, TypeError, AttributeError):  # a damaged record is none
@@ -126,7 +126,7 @@ def read_record(shot: Shot) -> Record:
     return fresh
 
 
-def finished_frames(shot: Shot) -> Frames:
+def finished_frames(shot: BatchShot) -> Frames:
     """Return what the shot's sequence says of its frames; none if there is no sequence."""
     try:
         index = Index.read(shot.directory)
@@ -138,11 +138,11 @@ def finished_frames(shot: Shot) -> Frames:
     return Frames(len(figures), index.complete, seconds, psnr)
 
 
-def _path(shot: Shot) -> Path:
+def _path(shot: BatchShot) -> Path:
     return shot.folder / f"{shot.name}.json"
 
 
-def _identity(shot: Shot) -> dict[str, Any]:
+def _identity(shot: BatchShot) -> dict[str, Any]:
     """What a shot is a reconstruction of, as JSON holds it."""
     identity: dict[str, Any] = {"options": list(shot.options), "input": None}
     files = [("input", shot.input)]

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from smokelift.batch.record import Frames, Record, ShotState
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 from smokelift.checks import counted
 from smokelift.output.atomic import atomic_path
 
@@ -51,7 +51,7 @@ def write_report(folder: Path, title: str, states: Sequence[ShotState]) -> Path:
     return path
 
 
-def _row(shot: Shot, record: Record, frames: Frames) -> str:
+def _row(shot: BatchShot, record: Record, frames: Frames) -> str:
     total = f" of {record.forecast.frames}" if record.forecast is not None and not frames.complete else ""
     numbers = (
         f"{frames.count}{total}",

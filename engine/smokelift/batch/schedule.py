@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from smokelift.batch.record import ShotState
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 
 Basis = Literal["measured", "scaled", "foretold"]
 
@@ -33,7 +33,7 @@ class Remaining:
         batch took over what was foretold of them; ``"foretold"`` where nothing was measured yet.
     """
 
-    shot: Shot
+    shot: BatchShot
     frames: int
     seconds: float
     memory: int

@@ -50,7 +50,7 @@ Check = Callable[[Sequence[str]], None]
 
 
 @dataclass(frozen=True)
-class Shot:
+class BatchShot:
     """A clip that is reconstructed.
 
     Attributes
@@ -86,7 +86,7 @@ class Shot:
         return self.folder / f"{self.name}.log"
 
 
-def read_shots(path: Path, check: Check) -> tuple[Shot, ...]:
+def read_shots(path: Path, check: Check) -> tuple[BatchShot, ...]:
     """Read a list of shots.
 
     Parameters
@@ -116,7 +116,7 @@ class _Reader:
     path: Path
     lines: Mapping[Place, int]
 
-    def shots(self, data: Mapping[str, Any], check: Check) -> tuple[Shot, ...]:
+    def shots(self, data: Mapping[str, Any], check: Check) -> tuple[BatchShot, ...]:
         self._known((), data, ("out", "defaults", "shots"))
         folder = self.path.absolute().parent / self._text((), data, "out", "results")
         tables, defaults = data.get("shots"), data.get("defaults", {})
@@ -134,7 +134,7 @@ class _Reader:
 
     def _shot(
         self, place: Place, table: Mapping[str, Any], defaults: Mapping[str, Any], folder: Path, check: Check
-    ) -> Shot:
+    ) -> BatchShot:
         self._known(place, table, ("name", "input", *OPTIONS))
         given = Path(self._text(place, table, "input"))
         name = self._text(place, table, "name", given.stem.rstrip("#_-. ") or "shot")
@@ -147,7 +147,7 @@ class _Reader:
             check([str(source), "--out", str(folder / name), *options])
         except ValueError as error:
             raise self._error(place, str(error)) from error
-        return Shot(name, source, tuple(options), folder)
+        return BatchShot(name, source, tuple(options), folder)
 
     def _words(self, place: Place, key: str, value: Any) -> list[str]:
         """The words of the command line that say an option."""

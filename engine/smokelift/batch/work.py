@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from smokelift.batch.engine import ENGINE, EngineResult, run_engine
 from smokelift.batch.record import Forecast, Record, Status, finished_frames, read_record, read_state
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 from smokelift.output.lock import Lock
 from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
@@ -40,7 +40,7 @@ class Patience:
 PATIENCE = Patience()
 
 
-def look_at_shot(shot: Shot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
+def look_at_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
     """Ask the engine what a shot will take, unless that is known.
 
     Returns
@@ -68,7 +68,7 @@ def look_at_shot(shot: Shot, stop: threading.Event, engine: Sequence[str] = ENGI
 
 
 def finish_shot(
-    shot: Shot,
+    shot: BatchShot,
     stop: threading.Event,
     say: Callable[[str], None] = lambda _text: None,
     patience: Patience = PATIENCE,
@@ -115,7 +115,7 @@ def finish_shot(
         waited, pause = waited + pause, min(2 * pause, patience.longest_pause)
 
 
-def _try(shot: Shot, stop: threading.Event, engine: Sequence[str]) -> tuple[Record, bool]:
+def _try(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> tuple[Record, bool]:
     """Run the engine once, if nobody else does; return what came of it and whether to try again later."""
     shot.folder.mkdir(parents=True, exist_ok=True)
     lock = Lock(shot.folder / f".{shot.name}.lock")
@@ -149,7 +149,7 @@ WRITE_PAUSES = (0.5, 2.0, 8.0)
 """Seconds between tries to write a record. A shot without one is prepared once more, and keeps its frames."""
 
 
-def _write_with_retries(record: Record, shot: Shot, stop: threading.Event) -> None:
+def _write_with_retries(record: Record, shot: BatchShot, stop: threading.Event) -> None:
     """Write a record; OSError if that fails after all pauses."""
     for pause in WRITE_PAUSES:
         try:

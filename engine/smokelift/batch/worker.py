@@ -11,9 +11,9 @@ from typing import Any
 from distributed import Reschedule, WorkerPlugin
 
 from smokelift.batch.record import Record, read_record
-from smokelift.batch.shots import Shot
+from smokelift.batch.shots import BatchShot
 
-Task = Callable[[Shot, threading.Event], Record]
+Task = Callable[[BatchShot, threading.Event], Record]
 """Work that a worker can import: it gets the shot and what ends it."""
 
 _STOPS: dict[str, threading.Event] = {}
@@ -44,7 +44,7 @@ class EndShots(WorkerPlugin):  # type: ignore[misc]  # Dask is not followed
             stop.set()
 
 
-def work(shot: Shot, task: Task, batch: str) -> Record:
+def work(shot: BatchShot, task: Task, batch: str) -> Record:
     """Work on a shot.
 
     Raises

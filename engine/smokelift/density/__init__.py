@@ -1,6 +1,7 @@
 """Density from pictures: views, what is assumed of their depth, and the fit.
 
-Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior) -> FittedDensity (fit)
+Observation -> ObservedView (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior)
+-> FittedDensity (fit)
 
 The default estimate (detailed_depth) is round, smooth smoke with detail: from every side it shows the distribution of
 patches that the clip shows from the front. The fit has the last word.
@@ -18,7 +19,7 @@ from smokelift.density.fit import (
     empty_density,
     reconstruct_density,
 )
-from smokelift.density.observation import Observation, ObservedClip, View, ViewSet
+from smokelift.density.observation import Observation, ObservedClip, ObservedView, ViewSet
 from smokelift.density.temporal_prior import (
     BlendCarried,
     GuidedSimulation,
@@ -43,11 +44,11 @@ __all__ = [
     "NothingCarried",
     "Observation",
     "ObservedClip",
+    "ObservedView",
     "RoundDepth",
     "Smoke",
     "Start",
     "TemporalPrior",
-    "View",
     "ViewSet",
     "clip_axis",
     "empty_density",

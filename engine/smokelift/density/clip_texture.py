@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.density.exemplar import SIZE, Exemplar, Picture
-from smokelift.density.observation import ObservedClip, View
+from smokelift.density.observation import ObservedClip, ObservedView
 from smokelift.density.stretched_noise import roughness
 from smokelift.density.turntable import Turntable
 from smokelift.scene import Camera, Domain
@@ -96,7 +96,7 @@ class _Shown(NamedTuple):
 
 def _seen(clip: ObservedClip, number: int) -> list[tuple[Camera, NDArray[np.float32]]]:
     """Cameras and the optical depths (rows, columns) that they saw in a frame, the input's first."""
-    views = [View.of(observation, clip.optics) for observation in clip.observe(number)]
+    views = [ObservedView.of(observation, clip.optics) for observation in clip.observe(number)]
     return [(view.camera, view.optical_depth) for view in views]
 
 

@@ -21,7 +21,7 @@ from smokelift.density.axis import SmokeAxis
 from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
 from smokelift.density.hull import Places, centres_of, project_voxels
 from smokelift.density.objective import Term
-from smokelift.density.observation import ObservedClip, View, ViewSet, shadowed_optical_depth
+from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.screen import view_frame
 from smokelift.density.wander import Wander
@@ -227,7 +227,7 @@ def _common(
     return np.asarray(values * (wanted / np.maximum(there, 1e-30))[layer])
 
 
-def _common_axis(view: View, views: ViewSet) -> SmokeAxis:
+def _common_axis(view: ObservedView, views: ViewSet) -> SmokeAxis:
     """How far behind the domain's centre all pictures together put the middle of the smoke, by height in one view."""
     domain, hull = views.optics.domain, views.hull
     _, depth, height = view_frame(view.camera)

@@ -24,7 +24,7 @@ from smokelift.density.clip_texture import ClipTexture
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.exemplar import Exemplar, enlarged, reduced
 from smokelift.density.isotropic import isotropic
-from smokelift.density.moment_levels import Level
+from smokelift.density.moment_levels import MomentLevel
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
@@ -120,7 +120,7 @@ class DetailedDepth:
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """The smooth answer, the same with noise, and what gives it the clip's texture."""
         estimate = self.smooth.estimate(views)
-        level = Level(estimate.views, estimate.inside)
+        level = MomentLevel(estimate.views, estimate.inside)
         if self.texture is None or not level.views.hull.any():
             return estimate
         if not unseen_sides(self.texture.turntable, [view.camera for view in views.views]):
@@ -132,7 +132,7 @@ class DetailedDepth:
             detail=EveryView(self.texture, level, smooth, self.detail),
         )
 
-    def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
+    def _noisy(self, smooth: Volume, level: MomentLevel, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
         moved = texture.turntable.height * texture.drift * level.views.frame
         strengths = tuple(self.detail * each for each in texture.roughness)
@@ -145,7 +145,7 @@ class DetailedDepth:
         return noisy
 
 
-def _smooth_answer(level: Level, density: Volume) -> Volume:
+def _smooth_answer(level: MomentLevel, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show; those of a large grid are found on the coarsest."""
     coarser = level.coarser
     if coarser is None:
@@ -182,7 +182,7 @@ class EveryView:
     """
 
     texture: ClipTexture
-    level: Level
+    level: MomentLevel
     smooth: Volume
     strength: float
 

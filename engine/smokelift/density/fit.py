@@ -76,7 +76,7 @@ class FittedDensity:
         Voxels that the pictures allow to hold smoke and in which the depth prior expects any.
     figures
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
-        picture as its `View` has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
+        picture as its view has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
         ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``relative_error``, the
         root mean square of the input's differences over that of what the smoke changes there: 1 if nothing is fitted,
         however faint the smoke; ``iterations``; ``hull_share``, the hull's share of the voxels.

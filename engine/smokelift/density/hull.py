@@ -69,11 +69,6 @@ class Projection:
         return self.places(voxels).read(picture)
 
 
-def voxel_centres(domain: Domain) -> NDArray[np.float64]:
-    """World positions (nx, ny, nz, 3) of the voxel centres."""
-    return np.stack(np.meshgrid(*voxel_axes(domain), indexing="ij"), -1)
-
-
 def centres_of(voxels: NDArray[np.bool_], domain: Domain) -> NDArray[np.float64]:
     """World positions (n, 3) of the centres of the marked voxels."""
     places = [axis[index] for axis, index in zip(voxel_axes(domain), _core.marked(voxels), strict=True)]

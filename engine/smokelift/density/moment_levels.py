@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import smokelift._core as _core
 from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two
 from smokelift.density.objective import Term, camera_terms
-from smokelift.density.observation import Observation, View, ViewSet
+from smokelift.density.observation import Observation, ObservedView, ViewSet
 from smokelift.density.temporal_prior import TINY
 from smokelift.footage.images import area_average
 from smokelift.render import Image, Volume
@@ -31,7 +31,7 @@ BLUR_REACH = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class MomentLevel:
     """A moment on one grid.
 
     Attributes
@@ -49,26 +49,26 @@ class Level:
     coarseness: int = 1
 
     @cached_property
-    def coarser(self) -> Level | None:
+    def coarser(self) -> MomentLevel | None:
         """Return the level of a grid half as fine; None where the smoke has few voxels."""
         views = self.views
         if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
             return None
         optics = replace(views.optics, domain=views.optics.domain.halved())
-        seen = tuple(View.of(_shrunk(view, optics.domain), optics) for view in views.views)
+        seen = tuple(ObservedView.of(_shrunk(view, optics.domain), optics) for view in views.views)
         inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
-        return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
+        return MomentLevel(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
     def terms(self) -> list[Term]:
         """Terms of the cameras' pictures; see `camera_terms`."""
         return camera_terms(self.views, self.inside)
 
-    def finer(self, values: Volume, of: Level) -> NDArray[np.float32]:
+    def finer(self, values: Volume, of: MomentLevel) -> NDArray[np.float32]:
         """Values of this grid at the voxels (n,) that may hold smoke on the next finer one, linear between middles."""
         fine, box = self._boxes(of)
         return _core.prolong_values(values[box], of.views.hull[fine])
 
-    def changed(self, density: Volume, of: Level, change: Callable[[Volume], Volume]) -> Volume:
+    def changed(self, density: Volume, of: MomentLevel, change: Callable[[Volume], Volume]) -> Volume:
         """A density of the next finer grid, changed as its means on this grid are by `change`."""
         fine, box = self._boxes(of)
         means = self.means(density, of)
@@ -77,7 +77,7 @@ class Level:
         _core.scale_alike(density[fine], of.views.hull[fine], means[box], after[box], float(TINY), result[fine])
         return result
 
-    def means(self, density: Volume, of: Level) -> Volume:
+    def means(self, density: Volume, of: MomentLevel) -> Volume:
         """Means of a density of the next finer grid on this one."""
         fine, box = self._boxes(of)
         means = np.zeros(self.views.hull.shape, np.float32)
@@ -99,7 +99,7 @@ class Level:
         """The box around the smoke."""
         return box_around(self.views.hull, 0)
 
-    def _boxes(self, of: Level) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    def _boxes(self, of: MomentLevel) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """The box around the smoke on the finer grid and on this one."""
         shape = of.views.hull.shape
         fine = tuple(
@@ -108,7 +108,7 @@ class Level:
         return fine, self._box
 
 
-def _shrunk(view: View, domain: Domain) -> Observation:
+def _shrunk(view: ObservedView, domain: Domain) -> Observation:
     """What a view's camera saw, at a pixel a voxel of a domain if its pixels are finer."""
     shrink = max(1.0, voxel_width(view.camera, domain))
     columns, rows = (max(1, round(side / shrink)) for side in view.camera.size)

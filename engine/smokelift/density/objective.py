@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.observation import View, ViewSet
+from smokelift.density.observation import ObservedView, ViewSet
 from smokelift.render import Image, Renderer, Volume
 
 MIN_SHARE = 0.3
@@ -44,7 +44,7 @@ class Term:
         How much each pixel counts, at least 0; at most 1 for a camera's.
     """
 
-    view: View
+    view: ObservedView
     renderer: Renderer
     weight: NDArray[np.float32]
 

@@ -117,7 +117,7 @@ class ObservedClip(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class ObservedView:
     """An observation against the grid.
 
     Attributes
@@ -150,7 +150,7 @@ class View:
     colours: ColourWeight | None = None
 
     @staticmethod
-    def of(observation: Observation, optics: Optics) -> View:
+    def of(observation: Observation, optics: Optics) -> ObservedView:
         """Set an observation against the grid of `optics.domain`."""
         camera, image, plate = observation.camera, observation.image, observation.plate
         if plate is BLACK:
@@ -165,7 +165,7 @@ class View:
             for _ in range(ROUNDS):
                 depth = apparent_optical_depth(image, plate, mask, optics, colours)
                 colours = ColourWeight.of(image, plate, depth)
-        return View(camera, image, plate, mask, depth, projection, reached(mask, projection), colours)
+        return ObservedView(camera, image, plate, mask, depth, projection, reached(mask, projection), colours)
 
     def weighted(self, colours: Image) -> Image:
         """Colours (rows, columns, 3) as much as they count."""
@@ -197,7 +197,7 @@ class ViewSet:
         Number of the moment in its clip, from 0; a depth prior that has seen the clip knows the others.
     """
 
-    views: tuple[View, ...]
+    views: tuple[ObservedView, ...]
     hull: NDArray[np.bool_]
     optics: Optics
     frame: int = 0
@@ -229,7 +229,7 @@ class ViewSet:
         """
         for observation in observations:
             _check(observation, optics.domain)
-        views = tuple(View.of(observation, optics) for observation in observations)
+        views = tuple(ObservedView.of(observation, optics) for observation in observations)
         hull = common_hull([view.mask for view in views], [view.projection for view in views])
         return ViewSet(views, hull, optics, frame)
 
@@ -257,7 +257,7 @@ def apparent_optical_depth(
 
 
 def shadowed_optical_depth(
-    view: View, image: Image, transmittance: NDArray[np.float32], optics: Optics
+    view: ObservedView, image: Image, transmittance: NDArray[np.float32], optics: Optics
 ) -> NDArray[np.float32]:
     """Optical depth (rows, columns) that explains a view's picture in an estimate's shadows: SHADED_DEPTH ln(1 + r).
 
@@ -268,7 +268,7 @@ def shadowed_optical_depth(
     Parameters
     ----------
     view
-        Whose `View.optical_depth` the estimate has.
+        Whose `ObservedView.optical_depth` the estimate has.
     image : (rows, columns, 3)
         The estimate as the view's camera sees it before the view's plate.
     transmittance : (rows, columns)

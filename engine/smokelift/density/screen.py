@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 
 def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -104,7 +104,7 @@ def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, 
 
 def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
     """Return what a picture (rows, columns) shows at points (..., 3), in metres; zero outside and behind the camera."""
-    pixels, distance = project(camera, points)
+    pixels, distance = project_points(camera, points)
     at = pixels[..., 1] - 0.5, pixels[..., 0] - 0.5
     values = ndimage.map_coordinates(picture.astype(np.float64), at, order=1, mode="constant")
     return np.where(distance > 0, values, 0.0)

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.density.exemplar import Picture, reduced
-from smokelift.density.moment_levels import Level
+from smokelift.density.moment_levels import MomentLevel
 
 MAX_NODE_DISTANCE = 2.0
 """Distance between nodes of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large."""
@@ -112,11 +112,11 @@ class StretchedNoise:
     strengths: tuple[float, ...]
     seed: int
 
-    def at(self, level: Level) -> NDArray[np.float32]:
+    def at(self, level: MomentLevel) -> NDArray[np.float32]:
         """Noise (n,) at the voxels that may hold smoke."""
         return self._sum(level, np.random.default_rng(self.seed)).noise
 
-    def _sum(self, level: Level, random: np.random.Generator) -> _Octaves:
+    def _sum(self, level: MomentLevel, random: np.random.Generator) -> _Octaves:
         """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
         places = size * _core.marked(hull).astype(np.float32)
@@ -147,7 +147,7 @@ class _Octaves(NamedTuple):
     number: int
 
 
-def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:
+def _finer(values: NDArray[np.float32], coarser: MomentLevel, level: MomentLevel) -> NDArray[np.float32]:
     """Values at the voxels that may hold smoke on one grid, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
     field.ravel()[coarser.views.where] = values

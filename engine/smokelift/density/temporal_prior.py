@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.density.depth_prior import DepthEstimate
-from smokelift.density.observation import View, ViewSet
+from smokelift.density.observation import ObservedView, ViewSet
 from smokelift.render import Image, Volume
 
 TINY = np.finfo(np.float32).tiny
@@ -206,7 +206,7 @@ def _skill(loss: float, reference: float) -> float:
 
 
 def _with_optical_depth(
-    density: Volume, view: View, have: NDArray[np.float32], want: NDArray[np.float32], share: float
+    density: Volume, view: ObservedView, have: NDArray[np.float32], want: NDArray[np.float32], share: float
 ) -> Volume:
     """A density, its rays changed from the optical depths (rows, columns) that they have towards others.
 

@@ -7,7 +7,7 @@ from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
 from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.direct.new_sequence import open_source
-from smokelift.direct.obstacles import Ball, Box
+from smokelift.direct.obstacles import Ball, BoxObstacle
 from smokelift.direct.retiming import playback, retime_sequence
 from smokelift.direct.simulation import Simulation
 from smokelift.direct.surroundings import Fan
@@ -17,7 +17,7 @@ __all__ = [
     "DISSOLVED",
     "ROOM",
     "Ball",
-    "Box",
+    "BoxObstacle",
     "Continuation",
     "Fan",
     "Mesh",

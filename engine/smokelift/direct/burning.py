@@ -24,7 +24,7 @@ from smokelift.transport import Array, advect
 
 
 @dataclass(frozen=True, eq=False)
-class Fire:
+class Combustion:
     """How fire goes on.
 
     Attributes
@@ -44,7 +44,7 @@ class Fire:
         return emission if solid is None else np.where(solid, np.float32(0), emission)
 
 
-def fit_fire(moments: Sequence[Moment], dt: float) -> Fire | None:
+def fit_fire(moments: Sequence[Moment], dt: float) -> Combustion | None:
     """Fit the fire of consecutive moments of a clip, `dt` seconds apart; None where they show none."""
     burning = [(moment.flame, moment.velocity) for moment in moments if moment.flame is not None]
     if len(burning) < len(moments):
@@ -62,4 +62,4 @@ def fit_fire(moments: Sequence[Moment], dt: float) -> Fire | None:
     # The feed is clipped at zero. Scaled to the sum before the clipping it does not make the fire grow.
     net = found.sum(dtype=np.float64) - remaining * advected.sum(dtype=np.float64)
     scale = net / max(feed.sum(dtype=np.float64), 1e-30)
-    return Fire(remaining, feed * np.float32(scale / (len(moments) - 1)))
+    return Combustion(remaining, feed * np.float32(scale / (len(moments) - 1)))

@@ -24,14 +24,13 @@ from smokelift.direct.growth import (
 )
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, simulated_figures, write_copy
-from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, require_place
+from smokelift.direct.obstacles import Ball, BoxObstacle, Obstacle, Obstacles, require_place
 from smokelift.direct.surroundings import Fan, Surroundings
 from smokelift.direct.turbulence import Turbulence
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import SIDES, CompleteScene, Domain, Side
-from smokelift.scene import Box as Space
+from smokelift.scene import SIDES, Box, CompleteScene, Domain, Side
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity
 
@@ -230,7 +229,7 @@ def _start_box(continuation: Continuation, growth: Growth) -> Domain:
     """The box in which the simulation begins: the clip's, and the fans."""
     box = growth.clip
     for fan in continuation.fans:
-        box = growth.around(box, Space(*fan.place.bounds()))
+        box = growth.around(box, Box(*fan.place.bounds()))
     return box
 
 
@@ -249,4 +248,4 @@ def _surroundings(continuation: Continuation, domain: Domain, clip: Domain) -> S
 
 def _as_settings(obstacle: Obstacle) -> dict[str, Any]:
     """What identifies an obstacle in the settings of the new sequence."""
-    return vars(obstacle) if isinstance(obstacle, Ball | Box) else obstacle.fingerprint()
+    return vars(obstacle) if isinstance(obstacle, Ball | BoxObstacle) else obstacle.fingerprint()

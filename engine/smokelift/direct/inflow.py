@@ -15,7 +15,7 @@ from smokelift.direct.constraint import FaceMasks, faces_of
 from smokelift.direct.moment import Moment
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, ResidualMeans, advect, faces_in
-from smokelift.velocity.sources import SourceDetection
+from smokelift.velocity.source_detection import SourceDetection
 
 MOTION = 0.5
 """Share of its change that may be motion in a voxel of an inlet, at most."""

@@ -12,8 +12,7 @@ from smokelift.checks.array_types import Mask
 from smokelift.direct.constraint import faces_between, faces_of, project_with_given_faces
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moving_mesh import MovingMesh
-from smokelift.scene import Box as Space
-from smokelift.scene import Domain
+from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
 from smokelift.transport import Faces, Velocity, divergence, face_shapes, outflow
 
@@ -46,7 +45,7 @@ class Ball:
 
 
 @dataclass(frozen=True)
-class Box:
+class BoxObstacle:
     """A box as obstacle.
 
     Attributes
@@ -70,7 +69,7 @@ class Box:
         return self.low, self.high
 
 
-Obstacle = Ball | Box | Mesh | MovingMesh
+Obstacle = Ball | BoxObstacle | Mesh | MovingMesh
 
 
 class Solid(NamedTuple):
@@ -160,7 +159,7 @@ def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
     return Solid(solid.voxels | voxels, (x, y, z))
 
 
-def require_place(what: str, thing: Obstacle, domain: Domain, reach: Space) -> None:
+def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> None:
     """Refuse a thing that no smoke can meet.
 
     Parameters

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.direct.burning import Fire
+from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.obstacles import Solid
@@ -56,7 +56,7 @@ class Simulation:
     inflow: Inflow
     surroundings: Surroundings
     dt: float
-    fire: Fire | None = None
+    fire: Combustion | None = None
 
     def next(self, moment: Moment, step: int) -> Moment:
         """Return the moment one step later; step 1 starts from the clip's last moment."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project, voxel_width
+from smokelift.scene.projection import project_points, voxel_width
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
         If no part of the domain is in the picture.
     """
     corners = domain.corners()
-    pixels, depth = project(camera, corners)
+    pixels, depth = project_points(camera, corners)
     width, height = camera.size
     low, high = np.zeros(2), np.array([width, height], np.float64)
     if (depth > 0).all():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Camera, Domain, orbit
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 VISIBLE = 0.01
 """Optical depth from which smoke is seen: it changes what is behind it by as much, which is a step or two of 8 bits."""
@@ -72,7 +72,7 @@ def frame_smoke(sequence: Sequence) -> Framing:
         pixels
         for matrix in range(len(scene.camera.matrices) or 1)
         for yaw in range(0, 360, TURN_STEP)
-        for pixels, depth in [project(orbit(scene.camera.at(matrix), box, yaw), rim)]
+        for pixels, depth in [project_points(orbit(scene.camera.at(matrix), box, yaw), rim)]
         if (depth > 0).all()
     ]
     width, height = scene.camera.size

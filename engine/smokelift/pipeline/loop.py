@@ -29,6 +29,7 @@ from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
 from smokelift.velocity.near_smoke import carry, near_smoke
+from smokelift.velocity.pair import DensityPair
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +139,8 @@ def _frame(index: int, before: Carried | None, shot: Shot, method: Method, *, fo
         velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     else:
         measured = _measured(before, fitted)
-        estimated = method.velocity_estimator.estimate(
-            *measured,
-            dt,
-            domain.voxel_size,
-            closed=shot.scene.closed,
-            inflow=shot.scene.inflow(),
-            prediction=predicted,
-        )
+        pair = DensityPair(*measured, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
+        estimated = method.velocity_estimator.estimate(pair, predicted)
         if views is not None and before.followed is not None and followed is not None:
             camera = views.views[0].camera
             estimated = with_seen_motion(estimated, before.followed, followed, camera, domain, measured[1], dt)

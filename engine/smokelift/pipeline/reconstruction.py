@@ -14,7 +14,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.loop import Carried, Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
-from smokelift.pipeline.sources import sources
+from smokelift.pipeline.source_files import sources
 from smokelift.report.provenance import provenance, record
 from smokelift.scene import Scene
 from smokelift.scene.checks import file_path

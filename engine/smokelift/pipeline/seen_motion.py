@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
-from smokelift.density import View
+from smokelift.density import ObservedView
 from smokelift.footage.images import Picture
 from smokelift.render import Volume
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 from smokelift.transport import Velocity, on_faces
 from smokelift.velocity.line_of_sight import averaged_along
 from smokelift.velocity.pyramid import coarsen
@@ -43,7 +43,7 @@ ANYWHERE = 1e-3
 """Share of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
 
 
-def followed_picture(view: View) -> Picture:
+def followed_picture(view: ObservedView) -> Picture:
     """What is followed of a camera's picture (rows, columns)."""
     return np.sqrt(view.optical_depth)
 
@@ -132,9 +132,11 @@ class _Screen:
     def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> _Screen:
         """The cells for a grid from the domain's low corner on, its voxels so many metres wide."""
         centres = np.array(domain.min) + (np.indices(shape).reshape(3, -1).T + 0.5) * voxel_size
-        at, _ = project(camera, centres)
+        at, _ = project_points(camera, centres)
         halves = 0.5 * voxel_size * np.eye(3)
-        steps = [project(camera, centres + half)[0] - project(camera, centres - half)[0] for half in halves]
+        steps = [
+            project_points(camera, centres + half)[0] - project_points(camera, centres - half)[0] for half in halves
+        ]
         moved = np.stack(steps, -1)
         width, height = camera.size
         wide = float(np.median(np.linalg.norm(moved, axis=(1, 2)) / np.sqrt(2)))

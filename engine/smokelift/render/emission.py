@@ -21,7 +21,7 @@ from smokelift.render.optics import Optics
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import box_around
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 
 def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:
@@ -133,7 +133,7 @@ def _shows(flame: Volume, camera: Camera, optics: Optics) -> Mask:
         for low, side in zip(domain.min, box_around(flame > 0, 0), strict=True)
     ]
     corners = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
-    seen, depth = project(camera, corners)
+    seen, depth = project_points(camera, corners)
     if (depth <= 0).any():
         return np.ones((height, width), np.bool_)
     low, high = seen.min(0), seen.max(0)

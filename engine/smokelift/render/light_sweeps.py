@@ -18,7 +18,8 @@ from smokelift.render.camera_rays import LATERAL
 from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 from smokelift.scene.checks import Vector
 
-Box = tuple[int, int, int]
+Voxel = tuple[int, int, int]
+Shape = tuple[int, int, int]
 
 DARKEST = 1e-18
 """Energy of a light, at least: squares of less vanish in 32 bits."""
@@ -131,8 +132,8 @@ class Lighting:
 def lighting(
     lights: Sequence[FiniteLight],
     domain: Domain,
-    corner: Box,
-    shape: Box,
+    corner: Voxel,
+    shape: Shape,
     scattered: Vector = (1.0, 1.0, 1.0),
     split: bool = False,
 ) -> Lighting:
@@ -179,7 +180,7 @@ def _channels(colours: Doubles) -> tuple[Doubles, Doubles]:
     return np.eye(3), colours
 
 
-def _parallel(light: DirectionalLight, energy: Doubles, domain: Domain, corner: Box) -> ParallelSweep:
+def _parallel(light: DirectionalLight, energy: Doubles, domain: Domain, corner: Voxel) -> ParallelSweep:
     direction = np.array(light.direction, np.float64)
     direction /= np.linalg.norm(direction)
     axis = int(np.argmax(np.abs(direction)))
@@ -196,7 +197,7 @@ def _parallel(light: DirectionalLight, energy: Doubles, domain: Domain, corner: 
     )
 
 
-def _point(light: PointLight, energy: Doubles, domain: Domain, corner: Box, shape: Box) -> PointSweep:
+def _point(light: PointLight, energy: Doubles, domain: Domain, corner: Voxel, shape: Shape) -> PointSweep:
     light.require_place(domain)
     h = domain.voxel_size
     position = (np.array(light.position) - np.array(domain.min)) / h - 0.5 - np.array(corner)
@@ -210,7 +211,7 @@ def _point(light: PointLight, energy: Doubles, domain: Domain, corner: Box, shap
     return PointSweep(position, energy / h**2, h, tuple(faces))
 
 
-def _face(light: Doubles, shape: Box, axis: int, travel: int, far: float) -> Face | None:
+def _face(light: Doubles, shape: Shape, axis: int, travel: int, far: float) -> Face | None:
     at = float(light[axis])
     if travel > 0:
         first, last = max(0, math.ceil(at + CLOSEST)), shape[axis] - 1

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render.camera_rays import Rays, camera_rays
-from smokelift.render.light_sweeps import Box, Lighting, lighting
+from smokelift.render.light_sweeps import Lighting, Shape, Voxel, lighting
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Scattering
 from smokelift.scene.domain import box_around
 
@@ -45,7 +45,7 @@ class RenderPlan:
     """
 
     domain: Domain
-    corner: Box
+    corner: Voxel
     marked: NDArray[np.uint8]
     medium: Medium
     rays: Rays
@@ -55,7 +55,7 @@ class RenderPlan:
     diffuse: bool
 
     @property
-    def shape(self) -> Box:
+    def shape(self) -> Shape:
         """Voxels of the box."""
         x, y, z = self.marked.shape
         return x, y, z

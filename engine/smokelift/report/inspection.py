@@ -17,7 +17,7 @@ from smokelift.output.images import eight_bit
 from smokelift.report.page import TILE, Fact, Page, Panel, fitted
 from smokelift.report.sentences import sentence
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import unknown_part
 
@@ -121,7 +121,7 @@ def _line(
     head: bool = False,
 ) -> None:
     """A line through points of the world (n, 3), if all are before the camera; an arrow if asked for."""
-    pixels, depth = project(camera, points)
+    pixels, depth = project_points(camera, points)
     if (depth <= 0).any():
         return
     draw.line([(float(x), float(y)) for x, y in pixels], fill=colour, width=3 if head else 1)
@@ -173,7 +173,7 @@ def _path(shot: Shot, camera: Camera, picture: NDArray[np.float32]) -> Tile | No
         return None
     shown = Image.fromarray(eight_bit(0.3 * picture))
     middle = np.array([shot.scene.domain.centre])
-    places = [project(shot.scene.camera.at(n).resized(*camera.size), middle) for n in range(shot.length)]
+    places = [project_points(shot.scene.camera.at(n).resized(*camera.size), middle) for n in range(shot.length)]
     points = [(float(pixels[0, 0]), float(pixels[0, 1])) for pixels, depth in places if depth[0] > 0]
     if len(points) > 1:
         ImageDraw.Draw(shown).line(points, fill=PATH, width=2)

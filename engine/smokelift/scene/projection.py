@@ -22,7 +22,7 @@ def world_to_pixel(camera: Camera) -> Doubles:
     return np.asarray(rows)
 
 
-def project(camera: Camera, points: Doubles) -> tuple[Doubles, Doubles]:
+def project_points(camera: Camera, points: Doubles) -> tuple[Doubles, Doubles]:
     """Project world points (..., 3) to pixels.
 
     Returns
@@ -59,7 +59,7 @@ def ray_through_pixels(camera: Camera) -> tuple[Doubles, Doubles]:
 
 def voxel_width(camera: Camera, domain: Domain) -> float:
     """Return the width in pixels of a voxel at the domain's centre."""
-    _, depth = project(camera, np.array(domain.centre))
+    _, depth = project_points(camera, np.array(domain.centre))
     near = domain.voxel_size if camera.type == "perspective" else 1.0
     return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
 

@@ -37,7 +37,7 @@ RINGS = 6 * RINGS_AN_OCTAVE
 
 
 @dataclass(frozen=True, eq=False)
-class Detail:
+class DetailSpectrum:
     """The energy of the smoke's picture beyond the noise, by spatial frequency.
 
     Attributes
@@ -67,7 +67,7 @@ class Detail:
         return round(float(np.clip(RINGS + RINGS_AN_OCTAVE * np.log2(longest / self.pixels), 0, RINGS)))
 
 
-def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail:
+def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> DetailSpectrum:
     """Measure the detail in some frames.
 
     Parameters
@@ -82,7 +82,7 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail
         change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
         noise = _noise(change, _still(picture, plate), float(plate.noise.total.mean()))
         energy += _beyond_noise(change, noise)
-    return Detail(energy, pixels)
+    return DetailSpectrum(energy, pixels)
 
 
 def _still(picture: Image, plate: Plate) -> NDArray[np.bool_]:

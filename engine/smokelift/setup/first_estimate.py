@@ -23,7 +23,7 @@ from smokelift.setup.backdrop_remarks import (
     nothing_seen,
     smoke_in_plate,
 )
-from smokelift.setup.fire import Fire, find_fire
+from smokelift.setup.fire_estimate import Fire, find_fire
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
 from smokelift.setup.source import several_colours
 

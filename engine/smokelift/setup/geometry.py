@@ -19,7 +19,7 @@ from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.detail import Detail, smoke_detail
+from smokelift.setup.detail import DetailSpectrum, smoke_detail
 from smokelift.setup.estimate import Estimate, Grid, given, measured
 from smokelift.setup.settings import LIMITS, LOST_DETAIL, QUALITIES, Quality, Settings
 from smokelift.setup.smoke import SmokeSamples
@@ -379,7 +379,7 @@ def _resolved(
     return domain, estimate, by_quality
 
 
-def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:
+def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> DetailSpectrum:
     """The detail of the smoke in some frames, at the clip's own pixels."""
     frames = []
     for number in smoky[:DETAIL_FRAMES]:

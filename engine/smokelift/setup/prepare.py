@@ -21,7 +21,7 @@ from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import Geometry, clip_lenses, find_geometry
 from smokelift.setup.illumination import Illumination, first_light, light_remarks, measured_light, sunlight
-from smokelift.setup.medium import find_medium
+from smokelift.setup.medium_estimate import find_medium
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings

@@ -10,7 +10,7 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     r = (after(x) - before(x - u_k(x))) / s       what the estimate so far, u_k, leaves unexplained
     g = grad (after(x) + before(x - u_k(x))) / 2s
     s = root mean square of |grad| inside the smoke
-    W = 0 where smoke enters (`sources`), else 1
+    W = 0 where smoke enters (`source_detection`), else 1
     u_p = t prediction + P(momentum)              both fitted with a few numbers (`momentum`)
     R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)
 
@@ -32,9 +32,10 @@ from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine
 from smokelift.velocity.estimator import VelocityEstimator, predict_velocity, refined_to
+from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
-from smokelift.velocity.sources import SourceDetection
+from smokelift.velocity.source_detection import SourceDetection
 
 
 def estimate_velocity(
@@ -99,15 +100,15 @@ def estimate_velocity(
     1.0
     """
     require_kind(settings, VelocitySettings | None, "settings", "VelocitySettings (settings.velocity of a run's)")
-    found = CoarseToFine(settings or VelocitySettings()).estimate(
-        before, after, dt, voxel_size, closed=closed, inflow=inflow, prediction=prediction
-    )
+    pair = DensityPair(before, after, dt, voxel_size, closed, inflow)
+    found = CoarseToFine(settings or VelocitySettings()).estimate(pair, prediction)
     x, y, z = np.shape(before)
     return refined_to(found, (x, y, z))
 
 
 __all__ = [
     "CoarseToFine",
+    "DensityPair",
     "PrimalDual",
     "ProjectedCG",
     "Solver",

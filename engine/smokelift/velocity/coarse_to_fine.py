@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
 from smokelift.transport import (
     Array,
@@ -21,13 +20,14 @@ from smokelift.transport import (
     advect_cells,
     sides_in_order,
 )
-from smokelift.velocity.estimator import Density, Estimate, checked, coarsened, motion_weight, predict_velocity
+from smokelift.velocity.estimator import VelocityEstimate, checked, coarsened, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.momentum import Centre, Prediction, fit_centre
+from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.preparation import PreparedPair, prepare
 from smokelift.velocity.pyramid import Level, coarsen, pyramid, refine, smoothed
 from smokelift.velocity.settings import VelocitySettings
-from smokelift.velocity.sources import SourceDetection
+from smokelift.velocity.source_detection import SourceDetection
 
 ONE_VIEW_SMOOTHNESS = 10.0
 """Factor on `smoothness` for densities of one view: what moves is mixed along its rays, and a depth that is assumed
@@ -43,49 +43,36 @@ class CoarseToFine:
 
     settings: VelocitySettings = field(default_factory=VelocitySettings)
 
-    def estimate(
-        self,
-        before: Density,
-        after: Density,
-        dt: float,
-        voxel_size: float,
-        *,
-        closed: tuple[Side, ...] = (),
-        inflow: Mask | None = None,
-        prediction: Velocity | None = None,
-    ) -> Velocity:
+    def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """See `smokelift.velocity.estimate_velocity`."""
         settings = self.settings
         # a prediction may be on the coarser grid already, where its shape is checked
-        first, second = checked(before, after, dt, voxel_size, inflow, None if settings.coarsening else prediction)
-        closed = sides_in_order(closed)
+        first, second = checked(pair, None if settings.coarsening else prediction)
+        closed = sides_in_order(pair.closed)
         peaks = sorted(float(density.max()) for density in (first, second))
         if peaks[0] <= settings.smoke_threshold * peaks[1]:
             # Between smoke and none there is no motion to be seen: what is new has come in.
-            source = np.maximum(second - first, 0) / np.float32(dt)
-            rest = Velocity.zero(first.shape, voxel_size, closed)
+            source = np.maximum(second - first, 0) / np.float32(pair.dt)
+            rest = Velocity.zero(first.shape, pair.voxel_size, closed)
             return replace(rest, confidence=np.zeros_like(second), source=source)
         if settings.coarsening:
             coarser = CoarseToFine(replace(settings, coarsening=settings.coarsening - 1))
-            found = coarser.estimate(
-                coarsen(first),
-                coarsen(second),
-                dt,
-                2 * voxel_size,
-                closed=closed,
-                inflow=None if inflow is None else coarsen(inflow.astype(np.float32)) > 0,
-                prediction=coarsened(prediction) if prediction and prediction.shape == first.shape else prediction,
-            )
+            if prediction and prediction.shape == first.shape:
+                prediction = coarsened(prediction)
+            inflow = None if pair.inflow is None else coarsen(pair.inflow.astype(np.float32)) > 0
+            half = DensityPair(coarsen(first), coarsen(second), pair.dt, 2 * pair.voxel_size, closed, inflow)
+            found = coarser.estimate(half, prediction)
             return found if coarser.settings.coarsening else smoothed(found)
-        weight = motion_weight(first.shape, inflow)
-        pair = prepare(first, second, settings)
-        finest = Level(pair.before, pair.after, weight, past=None if prediction is None else prediction.residual)
-        predicted = None if prediction is None else Prediction(replace(prediction, closed=closed), dt)
-        sources = settings.sources if inflow is None else None
-        estimate = _Estimation(finest, predicted, sources, pair, closed, settings).result()
+        weight = motion_weight(first.shape, pair.inflow)
+        prepared = prepare(first, second, settings)
+        past = None if prediction is None else prediction.residual
+        finest = Level(prepared.before, prepared.after, weight, past=past)
+        predicted = None if prediction is None else Prediction(replace(prediction, closed=closed), pair.dt)
+        sources = settings.sources if pair.inflow is None else None
+        estimate = _Estimation(finest, predicted, sources, prepared, closed, settings).result()
         if estimate is None:
-            return Velocity.zero(first.shape, voxel_size, closed)
-        return estimate.velocity(dt, voxel_size)
+            return Velocity.zero(first.shape, pair.voxel_size, closed)
+        return estimate.velocity(pair.dt, pair.voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, carried along on its grid."""
@@ -160,7 +147,7 @@ class _Estimation:
         self._effort: Counter[str] = Counter(iterations=0, products=0, projections=0)
         self._figures: dict[str, float] = {}
 
-    def result(self) -> Estimate | None:
+    def result(self) -> VelocityEstimate | None:
         """The estimate; None where there is no structure to follow."""
         settings = self._settings
         while self._levels:  # a grid is not kept after its turn
@@ -182,7 +169,7 @@ class _Estimation:
                 del solved  # the next linearisation needs the memory
                 if last:
                     break
-        return Estimate(self._u, {**self._effort, **self._figures}, confidence, source, residual)
+        return VelocityEstimate(self._u, {**self._effort, **self._figures}, confidence, source, residual)
 
     def _linearisations(self, level: Level) -> int:
         """How many times the change is linearised on a grid, at most."""

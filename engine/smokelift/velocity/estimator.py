@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import numbers, require_kind
 from smokelift.checks.array_types import Mask
-from smokelift.scene import Side
 from smokelift.transport import (
     Array,
     ResidualMeans,
@@ -28,9 +26,8 @@ from smokelift.transport import (
     require_same_shape,
     without_divergence,
 )
+from smokelift.velocity.pair import Density, DensityPair
 from smokelift.velocity.pyramid import coarsen_faces, prolonged
-
-Density = npt.NDArray[np.floating[Any]]
 
 REACH = 1
 """Coarse voxels around a box that its fine velocity depends on: see `prolonged`."""
@@ -42,17 +39,7 @@ LARGEST_DENSITY = 1e12
 class VelocityEstimator(Protocol):
     """A way to find the velocity between two densities, and to predict the next one."""
 
-    def estimate(
-        self,
-        before: Density,
-        after: Density,
-        dt: float,
-        voxel_size: float,
-        *,
-        closed: tuple[Side, ...] = (),
-        inflow: Mask | None = None,
-        prediction: Velocity | None = None,
-    ) -> Velocity:
+    def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """Estimate the velocity that carries one density into the next: see `estimate_velocity`.
 
         It may be on a coarser grid than the densities (`refined_to` leads back), and so may the prediction.
@@ -142,7 +129,7 @@ def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) ->
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class VelocityEstimate:
     """A velocity in voxels a frame, and what is known about it.
 
     Attributes
@@ -179,18 +166,16 @@ class Estimate:
         )
 
 
-def checked(
-    before: Density, after: Density, dt: float, voxel_size: float, inflow: Mask | None, prediction: Velocity | None
-) -> tuple[Array, Array]:
+def checked(pair: DensityPair, prediction: Velocity | None) -> tuple[Array, Array]:
     """The two densities as float32; ValueError for what no estimator takes."""
-    require_positive("dt", dt)
-    require_positive("voxel_size", voxel_size)
-    first, second = _density("before", before), _density("after", after)
+    require_positive("dt", pair.dt)
+    require_positive("voxel_size", pair.voxel_size)
+    first, second = _density("before", pair.before), _density("after", pair.after)
     require_same_shape("after", second.shape, first.shape)
-    require_kind(inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
+    require_kind(pair.inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
     require_kind(prediction, Velocity | None, "prediction", "a Velocity")
-    if inflow is not None:
-        require_same_shape("inflow", inflow.shape, first.shape)
+    if pair.inflow is not None:
+        require_same_shape("inflow", pair.inflow.shape, first.shape)
     if prediction is not None:
         require_same_shape("the prediction", prediction.shape, first.shape)
     return first, second

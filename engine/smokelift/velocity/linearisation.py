@@ -10,7 +10,7 @@ import numpy.typing as npt
 import smokelift._core as _core
 from smokelift.transport import Array, Faces, StaggeredGrid
 from smokelift.velocity.pyramid import Level
-from smokelift.velocity.sources import SourceDetection
+from smokelift.velocity.source_detection import SourceDetection
 
 
 @dataclass(frozen=True, eq=False)

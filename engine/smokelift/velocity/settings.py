@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from smokelift.scene.checks import integer
 from smokelift.velocity.solver import ProjectedCG, Solver
-from smokelift.velocity.sources import SourceDetection
+from smokelift.velocity.source_detection import SourceDetection
 
 LEVELS = 3
 """Grids by default. They reach several voxels a frame (docs/experiments/velocity-pyramid.md)."""

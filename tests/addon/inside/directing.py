@@ -12,7 +12,7 @@ from addon import directing, smoke_takes, volume
 from addon.blender_scene import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
-from smokelift.direct import Box, Mesh
+from smokelift.direct import BoxObstacle, Mesh
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import DOMAIN, write_plume
 from tests.example_shot import smoke
@@ -115,13 +115,13 @@ def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
     mesh, place = cube()
     obj = placed(acting, "Crate", mesh, **place)
     acting.objects.link(result.smokelift.box)
-    wanted = Box((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
+    wanted = BoxObstacle((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
     (content,) = directing.engine_request(result)[2]
     np.testing.assert_array_equal(solid(content, tmp_path), wanted)
     obj.scale.x = -0.5
     other, there = cube(0.25, (0.5, 0.0, 1.5))
     small = placed(acting, "Small", other, **there)
-    both = wanted | Box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
+    both = wanted | BoxObstacle((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
     np.testing.assert_array_equal(solid(*directing.engine_request(result)[2], tmp_path), both)
     obj.hide_viewport = True
     assert solid(*directing.engine_request(result)[2], tmp_path).sum() < both.sum()
@@ -144,7 +144,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     assert shot.frame_current == before
     assert len(files) == 4  # at the start and 1, 2 and 3 frames later; then it stays
     assert files[0] == files[1]
-    wanted = Box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
+    wanted = BoxObstacle((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
     np.testing.assert_array_equal(solid(files[-1], tmp_path), wanted)
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
     (row,) = bpy.context.window_manager.smokelift.jobs

@@ -15,7 +15,7 @@ from addon.contract import BOX_VOXELS
 from addon.scene_file import options, shot_tables
 from addon.take import Take
 from smokelift.scene import Scene
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 from tests.example_shot import EXAMPLE, add, smoke
 
 CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.0)]
@@ -93,7 +93,7 @@ def agree(scene: bpy.types.Scene, folder: Path) -> None:
     """Compare the picture's places of the box's corners, and of points inside, in pixels of the clip."""
     camera = engines(scene, folder).camera
     points = np.array([*CORNERS, (0.1, 0.2, 1.1), (-0.4, 0.3, 2.0)])
-    found, _ = project(camera, points)
+    found, _ = project_points(camera, points)
     width, height = smoke(scene).smokelift.clip.size
     assert camera.size == (width, height)
     seen = [world_to_camera_view(scene, scene.camera, Vector(point)) for point in points]
@@ -276,7 +276,7 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     low, high = corners.min(0), corners.max(0)
     assert (np.array(found.domain.min) <= low + 1e-5).all()
     assert (np.array(found.domain.max) >= high - 1e-5).all()
-    pixels, _ = project(found.camera, corners)
+    pixels, _ = project_points(found.camera, corners)
     width, height = found.camera.size
     seen = [world_to_camera_view(shot, shot.camera, corner) for corner in box_corners(box)]
     np.testing.assert_allclose(pixels, [(p.x * width, (1 - p.y) * height) for p in seen], atol=1e-3)

@@ -16,7 +16,6 @@ from addon.scene_file import shot_tables
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
 from conftest import quietly, rendered
-from smokelift.density.hull import voxel_centres
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb, read_image
 from smokelift.output.images import write_image
@@ -160,7 +159,7 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
         camera.keyframe_insert("location", frame=frame)
     settings.first, settings.last, settings.longest_side, settings.plate_mode = 1, 4, LONGEST, "ESTIMATE"
     known = scene_from_dict({**shot_tables(smoke(shot)), "medium": {"extinction": 3.0}})
-    points = voxel_centres(known.domain)
+    points = np.stack(np.broadcast_arrays(*known.domain.offsets((0, 0, 0))), -1)
     centre = np.array([0.2, -0.1, 1.3])
     blob = np.maximum(np.exp(-np.sum((points - centre) ** 2, -1) / 0.3**2) - 0.05, 0).astype(np.float32)
     for frame in range(4):

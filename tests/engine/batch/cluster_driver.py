@@ -8,14 +8,14 @@ import signal
 import sys
 from pathlib import Path
 
-from smokelift.batch import Shot, finish_shot, read_record, run_on_cluster
+from smokelift.batch import BatchShot, finish_shot, read_record, run_on_cluster
 from smokelift.batch.work import Patience
 
 FAKE = (sys.executable, "-S", str(Path(__file__).with_name("fake_engine.py")))
 
 
 def main(address: str, folder: Path) -> None:
-    shots = [Shot(path.stem, path, (), folder / "results") for path in sorted(folder.glob("*.task"))]
+    shots = [BatchShot(path.stem, path, (), folder / "results") for path in sorted(folder.glob("*.task"))]
     patience = Patience(pause=0.1, longest_pause=0.2, total=60)
     task = functools.partial(finish_shot, patience=patience, engine=FAKE)
     print("began", flush=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from smokelift.batch import Shot
+from smokelift.batch import BatchShot
 
 FAKE = Path(__file__).parent / "fake_engine.py"
 
@@ -20,19 +20,19 @@ def fake() -> tuple[str, ...]:
 
 
 @pytest.fixture
-def make_shot(tmp_path: Path) -> Callable[..., Shot]:
+def make_shot(tmp_path: Path) -> Callable[..., BatchShot]:
     """Make a shot of so many frames; see `fake_engine`."""
 
-    def make(name: str = "shot", frames: int = 3, seconds: float = 0.0, memory: int = 2**20, **ends: Any) -> Shot:
+    def make(name: str = "shot", frames: int = 3, seconds: float = 0.0, memory: int = 2**20, **ends: Any) -> BatchShot:
         path = tmp_path / f"{name}.task"
         task = {"frames": frames, "seconds": seconds, "memory": memory}
         path.write_text(json.dumps({**task, "ends": {number[1:]: end for number, end in ends.items()}}))
-        return Shot(name, path, (), tmp_path / "results")
+        return BatchShot(name, path, (), tmp_path / "results")
 
     return make
 
 
 @pytest.fixture
-def ledger() -> Callable[[Shot], list[int]]:
+def ledger() -> Callable[[BatchShot], list[int]]:
     """Read the frames of a shot that were finished, in the order in which they were."""
     return lambda shot: [int(line) for line in (shot.folder / f"{shot.name}.ledger").read_text().split()]

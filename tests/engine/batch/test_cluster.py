@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import smokelift
-from smokelift.batch import Shot, read_record, run_on_cluster
+from smokelift.batch import BatchShot, read_record, run_on_cluster
 from smokelift.batch.cluster import ClusterError
 from smokelift.batch.record import Record
 
@@ -148,7 +148,7 @@ class LaterWorker:
     def run_on_scheduler(self, _: object) -> bool:
         return False
 
-    def submit(self, _: object, shot: Shot, *__: object, priority: int = 0, **___: object) -> Given:
+    def submit(self, _: object, shot: BatchShot, *__: object, priority: int = 0, **___: object) -> Given:
         return Given(read_record(shot), priority)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from smokelift.batch import Record, Shot
+from smokelift.batch import BatchShot, Record
 
 if importlib.util.find_spec("distributed") is None:
     pytest.skip("Dask distributed is not installed", allow_module_level=True)
@@ -30,7 +30,7 @@ def test_a_crash_is_an_error_that_dask_tries_again(make_shot) -> None:
 
 
 def test_storage_that_fails_is_no_lost_connection(make_shot) -> None:
-    def fail(_shot: Shot, _stop: threading.Event) -> Record:
+    def fail(_shot: BatchShot, _stop: threading.Event) -> Record:
         raise OSError("Read-only file system")
 
     record = worker.work(make_shot(), fail, "a")
@@ -48,7 +48,7 @@ def test_a_batch_that_is_stopped_takes_no_more(make_shot) -> None:
 def test_a_worker_that_ends_gives_its_shot_back(make_shot, monkeypatch) -> None:
     monkeypatch.setattr(worker, "_CLOSING", threading.Event())
 
-    def end(_shot: Shot, stop: threading.Event) -> Record:
+    def end(_shot: BatchShot, stop: threading.Event) -> Record:
         worker.EndShots().teardown(None)
         assert stop.is_set()
         return replace(DONE, status="cancelled")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import smokelift._core as _core
-from smokelift.density import DensitySettings, FittedDensity, Observation, View, reconstruct_density
+from smokelift.density import DensitySettings, FittedDensity, Observation, ObservedView, reconstruct_density
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.hull import Places, common_hull, project_voxels, visual_hull
@@ -221,7 +221,7 @@ def term_of(scene: Scene, observation: Observation, hull: np.ndarray | None = No
     """A picture before black to be fitted, every pixel counted alike."""
     optics = scene_optics(completed(scene))
     black = noisy_plate(np.zeros_like(observation.image))
-    view = View.of(replace(observation, plate=black), optics)
+    view = ObservedView.of(replace(observation, plate=black), optics)
     renderer = optics.renderer(view.camera, black.image, hull)
     return Term(view, renderer, np.ones(view.mask.shape, np.float32))
 
@@ -284,7 +284,7 @@ def test_turns_meet_every_picture(plume, small, scattering, behind) -> None:
     terms = []
     for degrees in (90.0, 0.0):
         camera = orbit(scene.camera, scene.domain, degrees)
-        view = View.of(Observation(camera, render(plume.densities[1], scene, camera), plate), optics)
+        view = ObservedView.of(Observation(camera, render(plume.densities[1], scene, camera), plate), optics)
         terms.append(Term(view, optics.renderer(camera, plate.image), np.ones(view.mask.shape, np.float32)))
         assert terms[-1].renderer.absorbs_only == (scattering == "absorption")
     start = 0.5 * plume.densities[1]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from smokelift.density.flame import flame_emission
-from smokelift.density.hull import voxel_centres
 from smokelift.render import Optics
 from smokelift.render.emission import emitted
 from smokelift.scene import Camera, Domain, Medium
@@ -12,7 +11,7 @@ from smokelift.scene import Camera, Domain, Medium
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
 CAMERA = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(40, 56))
 OPTICS = Optics(DOMAIN, Medium(extinction=8.0), (), "absorption")
-PLACES = voxel_centres(DOMAIN)
+PLACES = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)
 
 
 def ellipsoid(centre: tuple[float, float, float], widths: tuple[float, float, float]) -> np.ndarray:

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density.hull import common_hull, inside, project_voxels, visual_hull, voxel_centres
+from smokelift.density.hull import common_hull, inside, project_voxels, visual_hull
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (10, 10, 15))
+CENTRES = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)
 SIZE = (21, 17)
 STATM = Path("/proc/self/statm")
 
@@ -29,7 +30,7 @@ def camera(request):
 
 def _expected(camera):
     """Rows, columns and visibility of all voxels by NumPy alone."""
-    pixels, depth = project(camera, voxel_centres(DOMAIN))
+    pixels, depth = project_points(camera, CENTRES)
     columns, rows = pixels[..., 0] - 0.5, pixels[..., 1] - 0.5
     width, height = SIZE
     inside = (columns > -0.5) & (columns < width - 0.5) & (rows > -0.5) & (rows < height - 0.5)
@@ -57,7 +58,7 @@ def test_a_voxel_is_shown_where_its_nearest_pixel_is_marked(camera):
 
 def test_the_footprint_is_that_of_the_nearest_voxel():
     camera = CAMERAS["in front"]
-    _, depth = project(camera, voxel_centres(DOMAIN))
+    _, depth = project_points(camera, CENTRES)
     assert project_voxels(camera, DOMAIN).footprint == pytest.approx(camera.fy * 0.2 * np.sqrt(3) / depth.min())
 
 

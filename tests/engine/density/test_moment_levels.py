@@ -8,7 +8,7 @@ import pytest
 from smokelift.density import DetailedDepth, GradientFit, RoundDepth, ViewSet
 from smokelift.density import depth_prior as expecting
 from smokelift.density import moment_levels as module
-from smokelift.density.moment_levels import Level
+from smokelift.density.moment_levels import MomentLevel
 from smokelift.footage.clip import Clip
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
@@ -35,9 +35,9 @@ def large(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expecting, "MIN_COARSENED_VOXELS", 2500)
 
 
-def level(shot: Shot) -> Level:
+def level(shot: Shot) -> MomentLevel:
     estimate = RoundDepth().of_clip(shot).estimate(ViewSet.of(shot.observe(1), shot.optics, 1))
-    return Level(estimate.views, estimate.inside)
+    return MomentLevel(estimate.views, estimate.inside)
 
 
 def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.density.turntable import Turntable, filled_spans
 from smokelift.scene import Camera, Domain, orbit
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-0.6, -0.4, 0.0), (0.6, 0.4, 1.6), (24, 16, 32))
 CAMERA = Camera.look_at((3, -4, 1.1), (0, 0, 0.8), fov_y_degrees=27, size=(40, 56))
@@ -22,7 +22,7 @@ def test_a_camera_is_where_it_is_turned_to(degrees) -> None:
 def test_the_domain_fits_into_every_picture_at_a_pixel_a_voxel(degrees) -> None:
     turntable = Turntable.before(CAMERA, DOMAIN)
     camera = turntable.camera(degrees)
-    pixels, _ = project(camera, DOMAIN.corners())
+    pixels, _ = project_points(camera, DOMAIN.corners())
     assert (pixels > -1e-6).all()
     assert (pixels < np.array(camera.size) + 1e-6).all()
     assert camera.size == turntable.shape == (29, 32)
@@ -34,10 +34,10 @@ def test_the_screen_shows_what_stands_on_it_where_it_stands() -> None:
     turntable = Turntable.before(CAMERA, DOMAIN)
     point = np.array(DOMAIN.centre) + 0.25 * turntable.lateral + 0.35 * turntable.height
     picture = np.zeros(CAMERA.size[::-1], np.float32)
-    (x, y), _ = project(CAMERA, point)
+    (x, y), _ = project_points(CAMERA, point)
     picture[int(y), int(x)] = 1
     screen = turntable.screen(picture, CAMERA)
-    (column, row), _ = project(turntable.camera(0), point)
+    (column, row), _ = project_points(turntable.camera(0), point)
     found = np.array(np.unravel_index(screen.argmax(), screen.shape))
     np.testing.assert_allclose(found + 0.5, (column, screen.shape[1] - row), atol=1.1)
 

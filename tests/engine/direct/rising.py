@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.direct import Ball, Moment, Simulation
-from smokelift.direct.burning import Fire
+from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.physics import Physics
 from smokelift.direct.surroundings import Surroundings
@@ -67,7 +67,7 @@ def plume(burning: bool = False) -> tuple[Moment, ...]:
     entering = Moment(inlet.astype(np.float32), Velocity(faces, DOMAIN.voxel_size, ("z-",)))
     inflow = Inflow(inlet, (entering,))
     simulation = Simulation(
-        PHYSICS, inflow, Surroundings(), DT, Fire(LEFT, 0.2 * entering.density) if burning else None
+        PHYSICS, inflow, Surroundings(), DT, Combustion(LEFT, 0.2 * entering.density) if burning else None
     )
     start = at_rest(inlet.astype(np.float32))
     start = replace(start, flame=start.density) if burning else start

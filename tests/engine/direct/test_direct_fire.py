@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.direct import Ball, fit_simulation
-from smokelift.direct.burning import Fire, fit_fire
+from smokelift.direct.burning import Combustion, fit_fire
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
 from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume
@@ -15,7 +15,7 @@ from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, 
 def test_fire_without_fuel_burns_out():
     clip = plume(burning=True)
     simulation = fit_simulation(clip[:10], DT)
-    unfed = replace(simulation, fire=Fire(simulation.fire.remaining, np.zeros(DOMAIN.shape, np.float32)))
+    unfed = replace(simulation, fire=Combustion(simulation.fire.remaining, np.zeros(DOMAIN.shape, np.float32)))
     assert course(unfed, clip[9], 12)[-1].flame.sum() == pytest.approx(LEFT**12 * clip[9].flame.sum(), rel=0.3)
 
 

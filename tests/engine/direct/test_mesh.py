@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Box, Mesh
+from smokelift.direct import Ball, BoxObstacle, Mesh
 from smokelift.direct.mesh import HEADER, RECORD
 from tests.engine.direct.rising import DOMAIN
 
@@ -43,8 +43,8 @@ def written(path, triangles) -> None:
 
 def test_a_cube_is_the_box_of_its_corners():
     for low, high in (((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1)), ((-0.4375, -0.5625, 0.5625), (0.4375, 0.5625, 1.4375))):
-        inside, wanted = Mesh(cube(low, high)).voxels(DOMAIN), Box(low, high).voxels(DOMAIN)
-        at_faces = Box([v + 0.01 for v in low], [v - 0.01 for v in high]).voxels(DOMAIN)
+        inside, wanted = Mesh(cube(low, high)).voxels(DOMAIN), BoxObstacle(low, high).voxels(DOMAIN)
+        at_faces = BoxObstacle([v + 0.01 for v in low], [v - 0.01 for v in high]).voxels(DOMAIN)
         assert (inside <= wanted).all()
         assert (inside >= at_faces).all()
 
@@ -60,8 +60,8 @@ def test_a_round_mesh_is_a_ball(turned):
 def test_parts_of_a_mesh_may_overlap_and_leave_the_box():
     triangles = np.concatenate([cube((-0.5, -0.5, -1), (0.3, 0.5, 1)), cube((-0.1, -0.3, 0.5), (5, 0.3, 2))])
     inside = Mesh(triangles).voxels(DOMAIN)
-    wanted = Box((-0.5, -0.5, -1), (0.3, 0.5, 1)).voxels(DOMAIN) | Box((-0.1, -0.3, 0.5), (5, 0.3, 2)).voxels(DOMAIN)
-    np.testing.assert_array_equal(inside, wanted)
+    one, other = BoxObstacle((-0.5, -0.5, -1), (0.3, 0.5, 1)), BoxObstacle((-0.1, -0.3, 0.5), (5, 0.3, 2))
+    np.testing.assert_array_equal(inside, one.voxels(DOMAIN) | other.voxels(DOMAIN))
 
 
 def test_a_mesh_with_a_hole_works_and_a_plane_is_refused():

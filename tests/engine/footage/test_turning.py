@@ -9,7 +9,7 @@ from turning_camera import COUNT, LENS, SIZE, between, clip_of, off, over_a_plai
 
 from smokelift.footage.turning import Turns, find_turns, moved
 from smokelift.scene import Camera
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 
 def turns_of(frames: np.ndarray) -> Turns:
@@ -66,9 +66,9 @@ def test_a_camera_carries_the_turns() -> None:
     moving = turns.carried(mean)
     assert moving.matrix == moving.matrices[0]
     point = np.array([[0.1, 0.2, 0.6]])
-    where, _ = project(mean, point)
+    where, _ = project_points(mean, point)
     for frame, turn in enumerate(turns.rotations):
-        seen, _ = project(moving.at(frame), point)
+        seen, _ = project_points(moving.at(frame), point)
         np.testing.assert_allclose(moved(seen, between(turn)), where, atol=1e-6)
 
 

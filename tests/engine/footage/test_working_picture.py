@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
 CENTRE = np.array([0, 0, 0.8])
@@ -27,17 +27,17 @@ def points(count: int = 50) -> np.ndarray:
 def test_a_working_pixel_is_a_voxel_wide_at_the_centre(camera: Camera) -> None:
     small = working_picture(camera, DOMAIN).camera
     h = DOMAIN.voxel_size
-    origin, _ = project(small, CENTRE)
+    origin, _ = project_points(small, CENTRE)
     for step in ((h, 0, 0), (0, 0, h)):
-        moved, _ = project(small, CENTRE + np.array(step))
+        moved, _ = project_points(small, CENTRE + np.array(step))
         assert np.linalg.norm(moved - origin) == pytest.approx(1.0, rel=0.05)
 
 
 @all_three
 def test_points_fall_to_the_same_place_of_both_pictures(camera: Camera) -> None:
     work = working_picture(camera, DOMAIN)
-    full, depth = project(camera, points())
-    small, small_depth = project(work.camera, points())
+    full, depth = project_points(camera, points())
+    small, small_depth = project_points(work.camera, points())
     shrink = np.array(work.camera.size) / (work.width, work.height)
     np.testing.assert_allclose(small, (full - (work.left, work.top)) * shrink, atol=1e-9)
     np.testing.assert_allclose(small_depth, depth)

@@ -13,7 +13,7 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 from smokelift.baselines.density import FixedRateDescent
 from smokelift.density import GradientFit, RoundDepth, Smoke, Start, ViewSet
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import project_voxels, voxel_centres
+from smokelift.density.hull import project_voxels
 from smokelift.density.screen import view_frame
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
@@ -30,7 +30,7 @@ from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity
-from smokelift.velocity import CoarseToFine
+from smokelift.velocity import CoarseToFine, DensityPair
 from tests.engine.conftest import Plume
 from tests.engine.setup.shots import burning
 
@@ -110,7 +110,7 @@ def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) 
 
 def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
     depth = view_frame(plume.scene.camera)[1]
-    offset = (voxel_centres(plume.scene.domain) - np.array(plume.scene.domain.centre)) @ depth
+    offset = np.stack(np.broadcast_arrays(*plume.scene.domain.offsets(plume.scene.domain.centre)), -1) @ depth
     shift = 3 * plume.scene.domain.voxel_size
     places = []
     for given in (4.0, 4.0 + shift):
@@ -121,7 +121,7 @@ def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
 
 
 def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path) -> None:
-    x, y, z = np.moveaxis(voxel_centres(plume.scene.domain), -1, 0)
+    x, y, z = plume.scene.domain.offsets((0, 0, 0))
     column = (np.hypot(x, y + 0.1) < 0.15) & (z < 1.2)
     scene = plume.write(tmp_path, [column.astype(np.float32)] * 2)
     with Clip.open(scene.clip) as clip:
@@ -169,9 +169,9 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
     inflows = []
 
     class Watched(CoarseToFine):
-        def estimate(self, *arguments: Any, inflow: Any, **options: Any) -> Velocity:
-            inflows.append(inflow)
-            return super().estimate(*arguments, inflow=inflow, **options)
+        def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
+            inflows.append(pair.inflow)
+            return super().estimate(pair, prediction)
 
     scene = replace(plume.scene.with_frames(0, 2), closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
     with Clip.open(scene.clip) as clip:
@@ -271,7 +271,8 @@ def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> No
 def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
     """Where the smoke is, in metres."""
     assert scene.domain is not None
-    return np.average(voxel_centres(scene.domain).reshape(-1, 3), axis=0, weights=density.ravel())
+    places = np.broadcast_arrays(*scene.domain.offsets((0, 0, 0)))
+    return np.array([np.average(place, weights=density) for place in places])
 
 
 def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_path) -> None:
@@ -330,9 +331,8 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
 
     def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
         dt = 1 / plume.scene.clip.fps
-        found = estimator.estimate(
-            before, after, dt, domain.voxel_size, closed=shot.scene.closed, inflow=shot.scene.inflow(), prediction=None
-        )
+        pair = DensityPair(before, after, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
+        found = estimator.estimate(pair)
         return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
 
     np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())

@@ -9,10 +9,9 @@ from scipy import ndimage
 from smokelift.pipeline import compose
 from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.scene import Camera, Domain, look_at_matrix
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 from smokelift.setup.settings import Settings
-from smokelift.transport import Velocity, on_faces
-from smokelift.transport import project as without_divergence
+from smokelift.transport import Velocity, on_faces, project
 
 DT = 1 / 24
 DOMAIN = Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.5), (32, 32, 48))
@@ -51,7 +50,7 @@ def rest() -> Velocity:
 def test_smoke_at_rest_is_moved_as_the_picture_moves(kind: str) -> None:
     """By metres that look as wide as the pixels, somewhat fewer; by none along the line of sight."""
     found = seen(rest(), 0.6, 0.9, kind).centres()[BOX] * DT
-    (pixels, *_) = project(camera(kind), np.array([[0.0, 0.0, 0.75], [0.01, 0.0, 0.75]]))
+    (pixels, *_) = project_points(camera(kind), np.array([[0.0, 0.0, 0.75], [0.01, 0.0, 0.75]]))
     pixel = 0.01 / float(pixels[1, 0] - pixels[0, 0])
     assert 0.5 < found[..., 0].mean() / (0.6 * pixel) < 1
     assert 0.5 < found[..., 2].mean() / (0.9 * pixel) < 1
@@ -76,7 +75,7 @@ def test_motion_along_the_line_of_sight_is_left() -> None:
 def test_it_has_no_divergence_and_keeps_what_is_known() -> None:
     known = replace(rest(), closed=("z-",), figures={"trust": 0.5})
     found = seen(known, 0.6, 0.9, "perspective")
-    assert without_divergence(found).figures["divergence"] < 1e-5
+    assert project(found).figures["divergence"] < 1e-5
     assert (found.closed, found.figures) == (("z-",), {"trust": 0.5})
     assert not found.faces[2][..., 0].any()
 

@@ -8,7 +8,7 @@ import pytest
 from scene_examples import FRONT, moving_camera
 
 from smokelift.scene import Camera, Domain, SceneError, orbit
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
 CENTRE = np.array([0, 0, 0.8])
@@ -82,7 +82,7 @@ def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: floa
     moved = orbit(camera, DOMAIN, yaw, pitch)
     distance = [np.linalg.norm(np.array(c.position) - CENTRE) for c in (camera, moved)]
     assert distance[1] == pytest.approx(distance[0])
-    for before, after in zip(project(camera, CENTRE), project(moved, CENTRE), strict=True):
+    for before, after in zip(project_points(camera, CENTRE), project_points(moved, CENTRE), strict=True):
         np.testing.assert_allclose(after, before, atol=1e-9)
     assert (moved.size, moved.fx, moved.fy, moved.type) == (camera.size, camera.fx, camera.fy, camera.type)
 

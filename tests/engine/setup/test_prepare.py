@@ -11,7 +11,7 @@ from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Domain, Inlet, Scene, as_matrix, completed, look_at_matrix
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project_points
 from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.geometry import MIN_SIDE_VOXELS
 from smokelift.setup.prepare import prepare_shot
@@ -80,7 +80,7 @@ def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
     edges = (np.array(domain.max) - domain.min) / domain.resolution
     np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
     assert MIN_SIDE_VOXELS <= max(domain.resolution) <= LIMITS[draft.quality].most + 4
-    pixels, depth = project(estimated.scene.camera, domain.corners())
+    pixels, depth = project_points(estimated.scene.camera, domain.corners())
     assert (depth > 0).all()
     with Clip.open(passing.clip) as clip:
         smoky = np.max([frame.max(-1) for frame in clip], axis=0) > 0.1
@@ -108,11 +108,11 @@ def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) ->
     low, high = (np.array(corner) for corner in (shot.scene.domain.min, shot.scene.domain.max))
     centre = (low + high) / 2
     camera = given.resized(*shot.clip.size)
-    ends = [project(camera, np.array([*centre[:2], z]))[0] for z in (low[2], centre[2])]
+    ends = [project_points(camera, np.array([*centre[:2], z]))[0] for z in (low[2], centre[2])]
     box = level.scene.domain
-    wanted = [project(level.scene.camera, np.array([*box.centre[:2], z]))[0] for z in (box.min[2], box.centre[2])]
+    right = [project_points(level.scene.camera, np.array([*box.centre[:2], z]))[0] for z in (box.min[2], box.centre[2])]
     # the smoke's lower end and its middle show where they do before a level camera
-    np.testing.assert_allclose(ends, wanted, atol=0.06 * max(shot.clip.size))
+    np.testing.assert_allclose(ends, right, atol=0.06 * max(shot.clip.size))
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
     camera = shot.scene.camera
     assert len(camera.matrices) == len(shot.clip)
     assert {tuple(row[3] for row in matrix) for matrix in camera.matrices} == {tuple(row[3] for row in camera.matrix)}
-    where = np.array([project(camera.at(n), np.array([shot.scene.domain.centre]))[0][0] for n in range(8)])
+    where = np.array([project_points(camera.at(n), np.array([shot.scene.domain.centre]))[0][0] for n in range(8)])
     np.testing.assert_allclose(where - where.mean(0), (offsets.mean(0) - offsets)[:, ::-1], atol=0.3)
     assert "turning camera" in [remark.kind for remark in shot.remarks]
     assert shot.estimated_background is None

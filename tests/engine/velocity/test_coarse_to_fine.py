@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.transport import face_shapes
-from smokelift.velocity import CoarseToFine, ProjectedCG, Velocity, VelocitySettings, estimate_velocity
+from smokelift.velocity import CoarseToFine, DensityPair, ProjectedCG, Velocity, VelocitySettings, estimate_velocity
 from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
 from smokelift.velocity.estimator import refined_to
 from tests.engine.velocity.known_motions import (
@@ -110,17 +110,17 @@ def test_default_finds_the_motion_of_a_smooth_blob(motion):
 @pytest.mark.parametrize("scale", [0.01, 100])
 def test_scale_of_density_does_not_matter(estimator, scale):
     before, after, _ = translation(np.array([0.4, 0.2, 0.6]))
-    reference = estimator.estimate(before, after, DT, VOXEL).centres()
-    scaled = estimator.estimate(scale * before, scale * after, DT, VOXEL).centres()
+    reference = estimator.estimate(DensityPair(before, after, DT, VOXEL)).centres()
+    scaled = estimator.estimate(DensityPair(scale * before, scale * after, DT, VOXEL)).centres()
     assert np.linalg.norm(scaled - reference) < 0.01 * np.linalg.norm(reference)
 
 
 @pytest.mark.parametrize("estimator", [DEFAULT, PAPER], ids=["default", "paper"])
 def test_units_of_space_and_time_do_not_matter(estimator):
     before, after, _ = translation(np.array([0.4, 0.2, 0.6]))
-    reference = estimator.estimate(before, after, DT, VOXEL).centres()
-    centimetres = estimator.estimate(before, after, DT, 100 * VOXEL).centres()
-    slower = estimator.estimate(before, after, 10 * DT, VOXEL).centres()
+    reference = estimator.estimate(DensityPair(before, after, DT, VOXEL)).centres()
+    centimetres = estimator.estimate(DensityPair(before, after, DT, 100 * VOXEL)).centres()
+    slower = estimator.estimate(DensityPair(before, after, 10 * DT, VOXEL)).centres()
     assert np.linalg.norm(centimetres / 100 - reference) < 0.01 * np.linalg.norm(reference)
     assert np.linalg.norm(slower * 10 - reference) < 0.01 * np.linalg.norm(reference)
 
@@ -129,9 +129,9 @@ def test_units_of_space_and_time_do_not_matter(estimator):
 def test_number_of_threads_does_not_matter(estimator, set_threads):
     before, after, _ = rotation(0.1)
     set_threads(2)
-    two = estimator.estimate(before, after, DT, VOXEL)
+    two = estimator.estimate(DensityPair(before, after, DT, VOXEL))
     set_threads(1)
-    one = estimator.estimate(before, after, DT, VOXEL)
+    one = estimator.estimate(DensityPair(before, after, DT, VOXEL))
     for a, b in zip(two.faces, one.faces, strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -215,14 +215,14 @@ def test_confidence_is_where_there_is_structure():
 @pytest.mark.parametrize("estimator", [DEFAULT, PAPER], ids=["default", "paper"])
 @pytest.mark.parametrize("density", [np.zeros(SHAPE), np.ones(SHAPE)])
 def test_nothing_to_see_gives_zero(estimator, density):
-    velocity = estimator.estimate(density, density, DT, VOXEL)
+    velocity = estimator.estimate(DensityPair(density, density, DT, VOXEL))
     assert not velocity.centres().any()
 
 
 @pytest.mark.parametrize("estimator", [DEFAULT, PAPER], ids=["default", "paper"])
 def test_smoke_at_rest_has_no_velocity(estimator):
     before, _, _ = translation(np.zeros(3))
-    velocity = estimator.estimate(before, before, DT, VOXEL)
+    velocity = estimator.estimate(DensityPair(before, before, DT, VOXEL))
     assert not velocity.centres().any()
 
 
@@ -264,7 +264,7 @@ def test_estimate_on_a_coarser_grid_guides_the_next_one() -> None:
     """It leads back to the densities' grid, and its prediction guides as the same one on that grid does."""
     before, after, _ = translation(np.array((0.8, 0.4, 1.2)), (25, 24, 28), 10.0)
     estimator = CoarseToFine(dataclasses.replace(SMOOTH, coarsening=1))
-    found = estimator.estimate(before, after, DT, VOXEL)
+    found = estimator.estimate(DensityPair(before, after, DT, VOXEL))
     assert found.shape == (13, 12, 14)
     assert found.voxel_size == 2 * VOXEL
     fine = refined_to(found, before.shape)
@@ -277,5 +277,5 @@ def test_estimate_on_a_coarser_grid_guides_the_next_one() -> None:
     prediction = estimator.predict(found, DT)
     finely = refined_to(prediction, before.shape)
     for given in (prediction, finely):
-        guided = estimator.estimate(before, after, DT, VOXEL, prediction=given)
+        guided = estimator.estimate(DensityPair(before, after, DT, VOXEL), given)
         assert guided.figures["trust"] > 0.5

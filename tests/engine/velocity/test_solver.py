@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from smokelift import _core
 from smokelift.baselines.velocity import PaperVelocity
-from smokelift.velocity import PrimalDual
+from smokelift.velocity import DensityPair, PrimalDual
 from tests.engine.velocity.known_motions import DT, VOXEL, translation
 
 OPEN = [False] * 6
@@ -140,7 +140,7 @@ def test_steps_that_do_not_converge_are_refused(steps):
     before, after, _ = translation(np.array([0.1, 0.0, 0.0]))
     estimator = PaperVelocity(solver=PrimalDual(**steps))
     with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = .*do not converge"):
-        estimator.estimate(before, after, DT, VOXEL)
+        estimator.estimate(DensityPair(before, after, DT, VOXEL))
 
 
 @pytest.mark.parametrize(("width", "truncate"), [(0.5, 4.0), (1.0, 3.0), (2.0, 3.0)])

@@ -16,10 +16,10 @@ from smokelift.app.commands import reconstruct
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.batch import (
+    BatchShot,
     Record,
     Remaining,
     Room,
-    Shot,
     ShotState,
     duration,
     finish_shot,
@@ -119,8 +119,8 @@ def _run_remaining(
 
 
 def _look_at_shots(
-    scheduler: str | None, unknown: Sequence[tuple[Shot, Record]], stop: threading.Event, say: Reporter
-) -> Generator[tuple[Shot, Record], None, None]:
+    scheduler: str | None, unknown: Sequence[tuple[BatchShot, Record]], stop: threading.Event, say: Reporter
+) -> Generator[tuple[BatchShot, Record], None, None]:
     """Inspect shots, one after the other or on a cluster, and yield each with its forecast."""
     if scheduler is not None:
         yield from run_on_cluster(unknown, look_at_shot, scheduler, say.note)
@@ -130,11 +130,11 @@ def _look_at_shots(
 
 def _run_shots(
     scheduler: str | None,
-    shots: Sequence[tuple[Shot, Record]],
+    shots: Sequence[tuple[BatchShot, Record]],
     workers: int,
     stop: threading.Event,
     say: Reporter,
-) -> Generator[tuple[Shot, Record], None, None]:
+) -> Generator[tuple[BatchShot, Record], None, None]:
     """Run shots, here or on a cluster, and yield each when it has ended."""
     if scheduler is not None:
         yield from run_on_cluster(shots, finish_shot, scheduler, say.note)
@@ -156,7 +156,7 @@ def _run_shots(
         with one_at_a_time:
             say.note(text)
 
-    def work(shot: Shot) -> Record:
+    def work(shot: BatchShot) -> Record:
         note(f"{shot.name}: begins.")
         return finish_shot(shot, stop, note)
 

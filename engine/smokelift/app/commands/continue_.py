@@ -17,7 +17,7 @@ from smokelift.direct import (
     DISSOLVED,
     ROOM,
     Ball,
-    Box,
+    BoxObstacle,
     Continuation,
     Fan,
     Mesh,
@@ -165,7 +165,8 @@ def _continuation(options: argparse.Namespace) -> Continuation:
     if options.room < 1:
         raise ValueError(f"--room {options.room:g}: expected 1 or more, in boxes of the clip.")
     balls = [_ball("--ball", values) for values in options.ball]
-    boxes = [Box(*zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True)) for v in options.box]
+    corners = [zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True) for v in options.box]
+    boxes = [BoxObstacle(low, high) for low, high in corners]
     return Continuation(
         frames=options.frames,
         start=options.start,

@@ -12,7 +12,7 @@ from smokelift.checks import Remark
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium
 from smokelift.setup.estimate import Estimate
-from smokelift.setup.fire import fire_estimate
+from smokelift.setup.fire_estimate import fire_estimate
 from smokelift.setup.first_estimate import FirstEstimate
 from smokelift.setup.source import smoke_colour
 
