@@ -5,8 +5,6 @@
 A scene is a folder that `benchmarks.truth.picture` filled.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

@@ -8,8 +8,6 @@ and the true one in degrees. *Thickness*: source radiance over the true one, as 
 it would be without texture; thin smoke has 0.3 of its optical depth.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Figures of a plate and of the mattes before it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.background.clips import Case

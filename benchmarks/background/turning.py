@@ -1,7 +1,5 @@
 """Clips of baked smoke before a wall as a camera sees them that shakes or pans in its place."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import ndimage
 from scipy.spatial.transform import Rotation

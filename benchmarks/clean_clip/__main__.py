@@ -6,8 +6,6 @@ A scene is a folder that `benchmarks.truth.picture` filled; camera, box, medium 
 the row says so. What OUT/figures.json holds already stays as it is.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import shutil

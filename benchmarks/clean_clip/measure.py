@@ -1,7 +1,5 @@
 """A clip as files, reconstructed by a state of the code, and compared with what is known."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

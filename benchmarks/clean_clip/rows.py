@@ -1,7 +1,5 @@
 """The clips of the table, each with the clean one that it is compared with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial

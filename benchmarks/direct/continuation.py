@@ -7,8 +7,6 @@ Every scene is continued from its true densities and velocities and, where OUT/r
 velocity.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

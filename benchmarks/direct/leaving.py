@@ -7,8 +7,6 @@ what there is at the start. The picture has eight frames of each in the box that
 degrees.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 python -m benchmarks.direct.reacting SCENES/plume-2 FILE.png [--frames 48]
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

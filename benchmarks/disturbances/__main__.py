@@ -6,8 +6,6 @@ OUT/stability.csv gets a row a disturbance, strength, scene and method; rows tha
 people meet come first. OUT gets stability_views.png, stability_velocity.png and stability.md, with the table.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from functools import lru_cache

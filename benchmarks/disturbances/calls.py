@@ -1,7 +1,5 @@
 """Single calls of the density fit and of the velocity, where a whole run would say no more."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

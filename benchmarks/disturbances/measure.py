@@ -1,7 +1,5 @@
 """Reconstruct a take, and compare what comes out with what is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What was measured: the CSV that grows row by row, the strengths from which accuracy is lost, charts and table."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Sequence

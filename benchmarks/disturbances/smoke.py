@@ -3,8 +3,6 @@
 Its pictures are single scattering on the simulation's grid. The light is as strong as the exposure of the camera needs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a camera, a codec, an editor and a wrong description do to a take, by a strength."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

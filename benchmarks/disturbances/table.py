@@ -1,7 +1,5 @@
 """Every disturbance: what it is called, its strengths, and what it does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """A film of a few frames that shows which way is up and which frame is which, and ways to encode it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether a file is read as what was encoded."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

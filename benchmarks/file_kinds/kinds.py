@@ -1,7 +1,5 @@
 """The files, by what is unusual about them; each function makes one in a folder and says what is known of it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Mapping
 from fractions import Fraction

@@ -3,8 +3,6 @@
 It serves for timing only: accuracy has to be measured on pictures from another renderer.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Every run has a process of its own. Machines differ and are shared, so times are
 same grid, which are timed between the frames.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """The pipeline's results as a table for a terminal, beside the paper's times."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rich.table import Table

@@ -5,8 +5,6 @@
 reads the job, a `Job` as JSON, and writes run.json into the folder.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The campaign: so many cases of every class, and a table of how they ended."""
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """The classes of cases: what is damaged and which command reads it, and what of the system fails."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable, Mapping

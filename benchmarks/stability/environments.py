@@ -4,8 +4,6 @@ Each is a context around one case. It gives what is to be done in the command's 
 and what makes the system well again afterwards.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

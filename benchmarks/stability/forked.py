@@ -1,7 +1,5 @@
 """Runs a command in a fork of this process, which has loaded the engine: that saves its second for every case."""
 
-from __future__ import annotations
-
 import faulthandler
 import gc
 import os

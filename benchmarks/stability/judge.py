@@ -1,7 +1,5 @@
 """What a command may do with damaged input: end well, or end with one line and a status, and touch nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Ways to damage what a command reads; all random, all repeatable."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """The functions that read a file that a user has: what each may raise, and a sound file to begin with."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A run whose system fails, and the run that goes on from it: nothing that was said to be done may be lost."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """A shot of a few pixels, whose files a campaign damages: a video, pictures, a plate, a sequence finished and begun."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
