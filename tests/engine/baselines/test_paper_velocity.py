@@ -7,6 +7,7 @@ from scipy import ndimage
 
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.velocity import VelocitySettings
+from smokelift.velocity.pair import DensityPair
 from tests.engine.velocity.known_motions import DT, SHAPE, VOXEL, error_in_smoke, rotation, translation
 
 PAPER = PaperVelocity()
@@ -14,7 +15,7 @@ PAPER = PaperVelocity()
 
 def test_paper_mode_recovers_small_motion():
     before, after, truth = translation(np.array([0.1, 0.2, 0.3]))
-    velocity = PAPER.estimate(before, after, DT, VOXEL)
+    velocity = PAPER.estimate(DensityPair(before, after, DT, VOXEL))
     assert error_in_smoke(velocity, after, truth) < 0.15
     assert velocity.figures["divergence"] < 1e-5
 
@@ -24,8 +25,8 @@ def test_paper_mode_does_not_know_the_limits_of_the_default():
     before, after, _ = rotation(0.15)
     noise = np.random.default_rng(2).standard_normal(SHAPE)
     before = np.maximum(before + 0.1 * noise * (before > 0.01), 0)
-    found = PAPER.estimate(before, after, DT, VOXEL)
+    found = PAPER.estimate(DensityPair(before, after, DT, VOXEL))
     assert found.figures["iterations"] > VelocitySettings().solver.iterations
     blurred = [ndimage.gaussian_filter(a.astype(np.float32), PAPER.blur) for a in (before, after)]
-    alone = dataclasses.replace(PAPER, blur=0.0).estimate(*blurred, DT, VOXEL)
+    alone = dataclasses.replace(PAPER, blur=0.0).estimate(DensityPair(*blurred, DT, VOXEL))
     np.testing.assert_allclose(found.centres(), alone.centres(), atol=1e-5)

@@ -32,7 +32,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
     plate = plate_of(clip)
-    with pytest.raises(ValueError, match="one shape"):
+    with pytest.raises(ValueError, match="must agree"):
         matte(clip.frame(0)[1:], plate)
     with pytest.raises(ValueError, match="finite"):
         matte(clip.frame(0) * np.nan, plate)
