@@ -152,7 +152,7 @@ class _Smoke:
         )
 
     def values(self) -> Array:
-        """Array of the density."""
+        """Values (n,) of the density."""
         return self._values
 
     def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
@@ -161,14 +161,14 @@ class _Smoke:
         return self._volume
 
     def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32]) -> Array:
-        """Array scaled along the rays of a term by a share of the steps (rows, columns) in their logarithm."""
+        """Values scaled along the rays of a term by a share of the steps (rows, columns) in their logarithm."""
         places, uneven = self._places[turn], (self._faint, MAX_UNEVENNESS)
         at = (places.rows, places.columns, places.visible)
         return _core.scale_along_rays(values, self._plausible, logarithm, *at, *uneven, RELAXATION)
 
 
 def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image) -> Array:
-    """Array whose picture is nearer to that of a term, whose turn it is, from those that render to `image`."""
+    """Values whose picture is nearer to that of a term, whose turn it is, from those that render to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
     return smoke.scaled(values, turn, _log_scale(image, transmittance, slope, term))

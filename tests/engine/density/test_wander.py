@@ -61,6 +61,7 @@ def test_middles_scatter_as_much_as_the_pictures_are_rough() -> None:
 
 def test_scatter_travels_with_the_smoke() -> None:
     np.testing.assert_allclose(WANDER.aside(PLANE + 3 * WANDER.velocity, 3), WANDER.aside(PLANE, 0), atol=1e-6)
+    np.testing.assert_allclose(WANDER.halved().aside(PLANE / 2, 3), WANDER.aside(PLANE, 3), atol=1e-6)
 
 
 def test_laminar_smoke_stands_straight() -> None:
