@@ -249,9 +249,6 @@ def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
     assert obj.data.display.density == 1.5
 
 
-# saving
-
-
 def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
     """Settings, smoke, material; the files are found relative to the .blend, also after the folder moved."""
     home = tmp_path / "home"

@@ -278,9 +278,6 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     assert len(smokes(bpy.context.scene)) == 2
 
 
-# lights, as Cycles has them
-
-
 def test_everything_that_makes_a_light_stronger_counts(scene) -> None:
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy = 2.0
