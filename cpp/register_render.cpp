@@ -2,6 +2,7 @@
 #include "camera.h"
 #include "diffuse_light.h"
 #include "lighting.h"
+#include "pixel_rays.h"
 #include "python.h"
 
 #include <optional>
@@ -238,6 +239,23 @@ void register_camera(py::module_ &module) {
                 count += std::max(0, self.rays.planes[4 * ray + 3] - self.rays.planes[4 * ray + 2] + 1);
             return count;
         });
+
+    using Places = std::vector<double>;
+    module.def(
+        "pixel_rays",
+        [](const std::array<Vector, 3> &start, const std::array<Vector, 3> &direction, bool far,
+           const Places &columns, const Places &rows, const Shape &n) {
+            const py::ssize_t height = py::ssize_t(rows.size()), width = py::ssize_t(columns.size());
+            Floats lines({height, width, py::ssize_t(4)}), length({height, width});
+            Integers planes({height, width, py::ssize_t(4)});
+            const Lens lens{{start[0], start[1], start[2]}, {direction[0], direction[1], direction[2]}, far};
+            released([&, to = lines.mutable_data(), steps = length.mutable_data(),
+                      at = planes.mutable_data()](Workers &workers) {
+                pixel_rays(lens, columns, rows, n, to, steps, at, workers);
+            });
+            return py::make_tuple(lines, length, planes);
+        },
+        "start"_a, "direction"_a, "far"_a, "columns"_a, "rows"_a, "shape"_a);
 
     module.def(
         "march",

@@ -324,6 +324,20 @@ class Rays:
     def samples(self) -> int:
         """Samples of all rays together."""
 
+def pixel_rays(
+    start: npt.ArrayLike,
+    direction: npt.ArrayLike,
+    far: bool,
+    columns: npt.ArrayLike,
+    rows: npt.ArrayLike,
+    shape: tuple[int, int, int],
+) -> tuple[Array, Array, npt.NDArray[np.int32]]:
+    """Lines, lengths in voxels and planes of `Rays` through all pixels, as far as their samples meet a grid.
+
+    Where in the grid a ray starts, and which way it goes, is a + x b + y c at the places x and y of its column and row,
+    (3, 3) each. Samples lie before the start unless the camera is far away.
+    """
+
 def pack(density: Array, corner: tuple[int, int, int], support: Support, extinction: float, medium: Volume) -> None:
     """Write the extinction of the marked voxels from their density.
 
