@@ -7,8 +7,9 @@ out into sheets and threads, where plain noise has round grains (Perlin, "An ima
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -114,16 +115,17 @@ class StretchedNoise:
 
     def at(self, level: MomentLevel) -> NDArray[np.float32]:
         """Noise (n,) at the voxels that may hold smoke."""
-        return self._sum(level, np.random.default_rng(self.seed)).noise
+        # an octave's noise, and three more for the motion that draws out the next
+        return self._sum(level, iter(_lattices(self.seed, 4 * len(self.strengths) - 3))).noise
 
-    def _sum(self, level: MomentLevel, random: np.random.Generator) -> _Octaves:
+    def _sum(self, level: MomentLevel, lattices: Iterator[_Lattice]) -> _Octaves:
         """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
         places = size * _core.marked(hull).astype(np.float32)
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
         if level.coarser is not None:
-            coarse = self._sum(level.coarser, random)
+            coarse = self._sum(level.coarser, lattices)
             octaves = coarse.number
             noise, *motions = (_finer(values, level.coarser, level) for values in (coarse.noise, *coarse.motion))
             motion = np.stack(motions)
@@ -131,11 +133,11 @@ class StretchedNoise:
             spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
             if octaves and spacing < MIN_NODE_DISTANCE * size:
                 break
-            noise += np.float32(self.strengths[octaves]) * _octave(places + motion, spacing, random)
+            noise += np.float32(self.strengths[octaves]) * _octave(places + motion, spacing, next(lattices))
             octaves += 1
             if octaves < len(self.strengths):
                 reach = np.float32(STRETCH * spacing)
-                motion += reach * np.stack([_octave(places + motion, spacing, random) for _ in range(3)])
+                motion += reach * np.stack([_octave(places + motion, spacing, next(lattices)) for _ in range(3)])
         return _Octaves(noise, motion, octaves)
 
 
@@ -154,8 +156,26 @@ def _finer(values: NDArray[np.float32], coarser: MomentLevel, level: MomentLevel
     return coarser.finer(field, level)
 
 
-def _octave(places: NDArray[np.float32], spacing: float, random: np.random.Generator) -> NDArray[np.float32]:
+class _Lattice(NamedTuple):
+    """Values of unit variance between nodes, and where in the lattice the domain's low corner lies, (3, 1) nodes."""
+
+    values: NDArray[np.float32]
+    corner: NDArray[np.float32]
+
+
+@lru_cache(maxsize=1)
+def _lattices(seed: int, count: int) -> tuple[_Lattice, ...]:
+    """The lattices of a clip's octaves: they are the same in all of its frames."""
+    random = np.random.default_rng(seed)
+    return tuple(
+        _Lattice(
+            random.standard_normal((LATTICE,) * 3).astype(np.float32) / NODES,
+            random.uniform(0, LATTICE, (3, 1)).astype(np.float32),
+        )
+        for _ in range(count)
+    )
+
+
+def _octave(places: NDArray[np.float32], spacing: float, lattice: _Lattice) -> NDArray[np.float32]:
     """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart."""
-    lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32) / NODES
-    at = places / np.float32(spacing) + random.uniform(0, LATTICE, (3, 1)).astype(np.float32)
-    return _core.read_lattice(lattice, at)
+    return _core.read_lattice(lattice.values, places / np.float32(spacing) + lattice.corner)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +51,12 @@ class Turntable:
         depth /= np.linalg.norm(depth)
         return Turntable(np.cross(depth, height), depth, height, domain)
 
-    @property
+    @cached_property
     def axis(self) -> int:
         """The grid's axis that the domain turns about."""
         return int(np.argmax(np.abs(self.height)))
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Columns of the screen, which holds the domain however it is turned, and voxels along the axis."""
         corners = (self.domain.corners() - np.array(self.domain.centre)) / self.domain.voxel_size
