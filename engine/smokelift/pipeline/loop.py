@@ -208,13 +208,16 @@ def _carried(before: Carried | None, predicted: Velocity | None, shot: Shot) -> 
     """The smoke of the frame before, carried along; None where there is none or no prediction."""
     if before is None or predicted is None:
         return None
-    dt, voxel_size = 1.0 / shot.clip.fps, shot.optics.domain.voxel_size
     steady = before.density if before.steady is None else before.steady
-    return Smoke(
-        # what a moving camera does not see no picture corrects, so that its mass has to be kept
-        carry(steady, predicted, dt, voxel_size, conserve=shot.moves),
-        None if before.smooth is None else carry(before.smooth, predicted, dt, voxel_size),
+    # what a moving camera does not see no picture corrects, so that its mass has to be kept
+    density, *smooth = carry(
+        [steady] if before.smooth is None else [steady, before.smooth],
+        predicted,
+        1.0 / shot.clip.fps,
+        shot.optics.domain.voxel_size,
+        conserve=shot.moves,
     )
+    return Smoke(density, *smooth)
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:

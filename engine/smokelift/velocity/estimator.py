@@ -87,19 +87,19 @@ def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     if coarse.shape == shape:
         return coarse
     x, y, z = (slice(0, count) for count in shape)
-    return replace(refined_in(coarse, shape, (x, y, z)), residual=coarse.residual)
+    fine = refined_in(coarse, shape, (x, y, z))
+    return replace(fine, figures=refined_figures(coarse, fine), residual=coarse.residual)
+
+
+def refined_figures(coarse: Velocity, fine: Velocity) -> dict[str, float]:
+    """The figures of a velocity on a finer grid; its divergence is found there."""
+    if not coarse.figures:
+        return {}
+    return {**coarse.figures, "divergence": _core.relative_divergence(fine.faces)}
 
 
 def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
     """What `refined_to` gives in a box of its voxels, as the velocity of a box of its own, without a residual."""
-    part = _refined_in(coarse, shape, box)
-    figures = dict(coarse.figures)
-    if figures:
-        figures["divergence"] = _core.relative_divergence(part.faces)
-    return replace(part, figures=figures, known_finite=True)
-
-
-def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
     if coarse.shape == shape:
         return part_of(coarse, box)
     half = halved(shape)
@@ -107,7 +107,7 @@ def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) ->
         slice(max(side.start // 2 - REACH, 0), min((side.stop + 1) // 2 + REACH, count))
         for side, count in zip(box, half, strict=True)
     )
-    part = _refined_in(coarse, half, (x, y, z))
+    part = refined_in(coarse, half, (x, y, z))
     counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
     confidence, source = (
         None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +12,7 @@ import smokelift._core as _core
 from smokelift.checks.array_types import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
-from smokelift.velocity.estimator import refined_in
+from smokelift.velocity.estimator import refined_figures, refined_in
 
 MIN_SLAB_VOXELS = 4_000_000
 """Voxels of a box around smoke, above which it is cut into slabs: each is as narrow as the smoke is there."""
@@ -19,40 +21,44 @@ SLAB = 64
 """Voxels across a slab, many beside how far smoke moves in a step."""
 
 
-def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False) -> Array:
-    """Carry a density along by a velocity of its grid or of a coarser one.
+def carry(
+    densities: Sequence[Array], velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False
+) -> tuple[Array, ...]:
+    """Carry densities along by a velocity of their grid or of a coarser one.
 
     Parameters
     ----------
-    density : (nx, ny, nz)
+    densities : (nx, ny, nz) each
         Not negative.
     velocity
-        On the density's grid, or on one that was halved from it.
+        On the densities' grid, or on one that was halved from it.
     dt
         Time step in seconds.
     voxel_size
-        Of the density, in metres.
+        Of the densities, in metres.
     conserve
         As of `advect`.
 
     Returns
     -------
-    (nx, ny, nz) float32
-        What `advect` makes of it with `refined_to`, but for rounding.
+    tuple of (nx, ny, nz) float32
+        What `advect` makes of each with `refined_to`, but for rounding.
     """
-    result: Array = np.zeros(density.shape, np.float32)
-    reach = _reach(velocity, dt / voxel_size)
-    x, y, z = density.shape
-    for box, source in _boxes(density > 0, reach, whole=conserve):
+    results = tuple(np.zeros(density.shape, np.float32) for density in densities)
+    smoke = functools.reduce(np.logical_or, (density > 0 for density in densities))
+    x, y, z = smoke.shape
+    for box, source in _boxes(smoke, _reach(velocity, dt / voxel_size), whole=conserve):
         along = refined_in(velocity, (x, y, z), source)
-        if conserve:
-            moved = advect(density[source], along, dt, conserve=True)
-        else:
-            moved = _core.advect_cells(density[source], along.displacement(dt).faces, True)
+        way = along.displacement(dt).faces
         inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))
-        # memory is given where something is written: where the smoke is, not all over its box
-        np.copyto(result[box], moved[inner], where=moved[inner] > 0)
-    return result
+        for density, result in zip(densities, results, strict=True):
+            if conserve:
+                moved = advect(density[source], along, dt, conserve=True)
+            else:
+                moved = _core.advect_cells(density[source], way, True)
+            # memory is given where something is written: where the smoke is, not all over its box
+            np.copyto(result[box], moved[inner], where=moved[inner] > 0)
+    return results
 
 
 def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) -> Velocity:
@@ -87,8 +93,8 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
         for values, found_values in zip((confidence, source), _known(part), strict=True):
             if values is not None and found_values is not None:
                 np.copyto(values[box], found_values, where=found_values != 0)
-        largest = max(figures.get("divergence", 0.0), part.figures.get("divergence", 0.0))
-        figures = {**part.figures, **({"divergence": largest} if "divergence" in part.figures else {})}
+        found_figures = refined_figures(velocity, part)
+        figures = {name: max(value, figures.get(name, value)) for name, value in found_figures.items()}
     return Velocity(
         (i, j, k),
         voxel_size,
