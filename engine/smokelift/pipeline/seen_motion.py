@@ -94,9 +94,11 @@ def _correction(
     steepness = float(np.mean(sum(part[smoke.ravel()] ** 2 for part in gradient)))
     if steepness == 0:
         return np.zeros(motion.shape, np.float32)
-    along = sparse.hstack([screen.pixels.multiply(part[:, None]) for part in gradient]).tocsr()
+    steep = np.flatnonzero((gradient[0] != 0) | (gradient[1] != 0))  # the others say nothing
+    pixels = screen.pixels[steep]
+    along = sparse.hstack([pixels.multiply(part[steep, None]) for part in gradient]).tocsr()
     normal = (along.T @ along / steepness + sparse.block_diag([screen.stiffness] * 2)).tocsr()
-    right = along.T @ (carried - after).ravel() / steepness
+    right = along.T @ (carried - after).ravel()[steep] / steepness
     found, _ = cg(normal, right, rtol=TOLERANCE, maxiter=MAX_STEPS, M=sparse.diags(1 / normal.diagonal()))
     # sums may be taken in another order on another day, and a run has to be the same to the bit
     return np.asarray(found.reshape(2, -1).T, np.float32)
