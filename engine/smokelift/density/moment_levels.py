@@ -29,6 +29,10 @@ from smokelift.scene.projection import voxel_width
 BLUR_REACH = 3.0
 """Standard deviations up to which a blur reaches: 0.3 % of a Gaussian lie beyond."""
 
+MIN_DEVIATION = 1.5
+"""Standard deviation of a blur in voxels of its own grid, at least. Means of two voxels, and what is linear between
+their middles, have a variance of 11/12 of a finer voxel: they make a blur there 5 % wider at most."""
+
 
 @dataclass(frozen=True, eq=False)
 class MomentLevel:
@@ -85,14 +89,12 @@ class MomentLevel:
         return means
 
     def blurred(self, values: Volume, deviation: float) -> NDArray[np.float32]:
-        """A volume blurred by a Gaussian of so many voxels, (n,) at those that may hold smoke; on the coarsest grid."""
-        coarser = self.coarser
-        if coarser is not None:
-            means = np.zeros(coarser.views.hull.shape, np.float32)
-            means.ravel()[coarser.views.where] = coarser.blurred(coarser.means(values, self), deviation / 2)
-            return coarser.finer(means, self)
+        """A volume blurred by a Gaussian of so many voxels, (n,) at those that may hold smoke.
+
+        Beside another one, blurred alike: where the smoke ends both fade.
+        """
         box = box_around(self.views.hull, round(BLUR_REACH * deviation))
-        return np.asarray(_core.blur(values[box], deviation, BLUR_REACH)[self.views.hull[box]])
+        return _blurred(values[box], self.views.hull[box], deviation)
 
     @cached_property
     def _box(self) -> tuple[slice, slice, slice]:
@@ -106,6 +108,16 @@ class MomentLevel:
             slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(self._box, shape, strict=True)
         )
         return fine, self._box
+
+
+def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDArray[np.float32]:
+    """A volume blurred, (n,) at the marked voxels; on a grid that is as coarse as the blur allows."""
+    if deviation < 2 * MIN_DEVIATION:
+        return np.asarray(_core.blur(values, deviation, BLUR_REACH)[marked])
+    coarse = any_of_two(marked)
+    means = np.zeros(coarse.shape, np.float32)
+    means[coarse] = _blurred(_core.means_of_two(values), coarse, deviation / 2)
+    return _core.prolong_values(means, marked)
 
 
 def _shrunk(view: ObservedView, domain: Domain) -> Observation:
