@@ -24,7 +24,7 @@ from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.screen import view_frame
-from smokelift.density.wander import Wander
+from smokelift.density.wander import Scatter, Wander
 from smokelift.render import Volume
 from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
@@ -118,48 +118,37 @@ class RoundDepth:
         return self if self.axis is not None or clip.place is None else replace(self, axis=clip.place.axis)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
-        """Spread the pictures' smoke by the profiles; of one picture before darkness again, as its shadows ask for."""
-        if len(views.views) > 1 or views.optics.scattering not in SHADOWED or not views.hull.any():
-            return self._spread(views)
-        (view,) = views.views
-        if not view.before_darkness(views.optics.unshadowed_source()):
-            return self._spread(views)
-        coarser = _coarser(views)  # shadows need no single voxels
-        first = (self if coarser is views else self._halved())._spread(coarser)
-        if not first.density.any():
-            return self._spread(views)
-        (renderer,) = first.views.renderers
-        image = renderer.image(first.density)
-        depth = shadowed_optical_depth(view, image, renderer.transmittance, views.optics)
-        return self._spread(replace(views, views=(replace(view, optical_depth=depth),)))
+        """Spread the pictures' smoke by the profiles; of one picture before darkness as its shadows ask for."""
+        scatter = None
+        if len(views.views) == 1:
+            (view,) = views.views
+            if self.wander is not None:
+                scatter = self.wander.scatter(view.camera, views.optics.domain, views.frame)
+            shadowed = views.optics.scattering in SHADOWED and views.hull.any()
+            if shadowed and view.before_darkness(views.optics.unshadowed_source()):
+                views = replace(views, views=(self._in_its_shadows(view, views, scatter),))
+        profiles = self._profiles(views, scatter)
+        expected = replace(views, hull=_expected(views, profiles))
+        return DepthEstimate(_density(expected, profiles), tuple(p.share_inside() for p in profiles), expected)
 
-    def _halved(self) -> RoundDepth:
-        """The prior of a grid half as fine."""
-        return replace(self, wander=None if self.wander is None else self.wander.halved())
+    def _in_its_shadows(self, view: ObservedView, views: ViewSet, scatter: Scatter | None) -> ObservedView:
+        """The only view, with the optical depth that explains it in the shadows of the smoke that it shows itself."""
+        optics = replace(views.optics, domain=views.optics.domain.halved())  # shadows need no single voxels
+        coarse = replace(view, projection=project_voxels(view.camera, optics.domain))
+        seen = ViewSet((coarse,), any_of_two(views.hull), optics, views.frame)
+        density = _density(seen, self._profiles(seen, scatter))
+        renderer = optics.renderer(view.camera, view.plate.image, density > 0)
+        image = renderer.image(density)
+        return replace(view, optical_depth=shadowed_optical_depth(view, image, renderer.transmittance, optics))
 
-    def _spread(self, views: ViewSet) -> DepthEstimate:
-        """Spread the views' optical depths by the profiles."""
+    def _profiles(self, views: ViewSet, scatter: Scatter | None) -> list[DepthProfile]:
+        """How each view's smoke is spread in depth."""
         one = self.axis or SmokeAxis.upright()
-        single = len(views.views) == 1
-        axes = [one] if single else [_common_axis(view, views) for view in views.views]
-        wander = self.wander if single else None
-        profiles = [
-            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis, wander, views.frame)
+        axes = [one] if len(views.views) == 1 else [_common_axis(view, views) for view in views.views]
+        return [
+            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis, scatter)
             for view, axis in zip(views.views, axes, strict=True)
         ]
-        expected = replace(views, hull=_expected(views, profiles))
-        density = _spread(expected, profiles)
-        np.divide(density, np.float32(views.optics.medium.extinction), out=density, where=expected.hull)
-        return DepthEstimate(density, tuple(p.share_inside() for p in profiles), expected)
-
-
-def _coarser(views: ViewSet) -> ViewSet:
-    """The views against a grid half as fine, where the smoke has many voxels."""
-    if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
-        return views
-    optics = replace(views.optics, domain=views.optics.domain.halved())
-    seen = tuple(replace(view, projection=project_voxels(view.camera, optics.domain)) for view in views.views)
-    return ViewSet(seen, any_of_two(views.hull), optics, views.frame)
 
 
 def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
@@ -191,16 +180,17 @@ def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthP
     return expected
 
 
-def _spread(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
-    """Optical depth per metre (nx, ny, nz) that has the profiles' shape and the pictures' amounts."""
-    hull, spread = views.hull, np.zeros(views.optics.domain.resolution, np.float32)
+def _density(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
+    """A density (nx, ny, nz) that has the profiles' shape and the pictures' amounts."""
+    hull, density = views.hull, np.zeros(views.optics.domain.resolution, np.float32)
     seen_at = [view.projection.places(hull) for view in views.views]
     single = [
         places.read(view.optical_depth) * profile.at(places, hull)
         for view, places, profile in zip(views.views, seen_at, profiles, strict=True)
     ]
-    spread.ravel()[views.where] = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
-    return spread
+    spread = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
+    density.ravel()[views.where] = spread / np.float32(views.optics.medium.extinction)
+    return density
 
 
 def _common(

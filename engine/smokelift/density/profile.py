@@ -23,8 +23,8 @@ from scipy.special import gamma, gammainc
 import smokelift._core as _core
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places, voxel_axes
-from smokelift.density.screen import upright_rows, view_frame
-from smokelift.density.wander import Wander
+from smokelift.density.screen import crossings, upright_rows, view_frame
+from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
@@ -129,9 +129,9 @@ class DepthProfile:
         What is seen, from where.
     axis
         Where in depth its middle is, on the mean.
-    wander, frame
-        How the rays' middles scatter about it in a frame; None lets them stand on it. The profile is narrower then, so
-        that the smoke is as deep as without.
+    scatter
+        How the rays' middles scatter about it; None lets them stand on it. The profile is narrower then, so that the
+        smoke is as deep as without.
     """
 
     def __init__(
@@ -140,8 +140,7 @@ class DepthProfile:
         camera: Camera,
         domain: Domain,
         axis: SmokeAxis,
-        wander: Wander | None = None,
-        frame: int = 0,
+        scatter: Scatter | None = None,
     ) -> None:
         self._camera, self._domain, self._axis = camera, domain, axis
         self._centre = np.array(domain.centre)
@@ -150,9 +149,9 @@ class DepthProfile:
         self._balls = ball_spread(amount, camera, domain)
         self._narrowing = 1.0
         self._aside = np.zeros_like(amount)
-        if wander is not None:
-            self._aside = self._scatter(amount, wander, frame)
-            self._narrowing = float(np.sqrt(1 - wander.share**2))
+        if scatter is not None:
+            self._aside = self._metres_aside(amount, scatter)
+            self._narrowing = float(np.sqrt(1 - scatter.share**2))
 
     def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""
@@ -224,16 +223,11 @@ class DepthProfile:
         spread = np.sqrt(across * balls + (DISTANCE_SHARE * self._axis.spread_at(height, lateral)) ** 2)
         return np.asarray(np.maximum(spread, self._domain.voxel_size))
 
-    def _scatter(self, amount: NDArray[np.float32], wander: Wander, frame: int) -> NDArray[np.float32]:
+    def _metres_aside(self, amount: NDArray[np.float32], scatter: Scatter) -> NDArray[np.float32]:
         """How far (m) behind the axis each pixel's smoke has its middle, (rows, columns)."""
-        origin, direction = ray_through_pixels(self._camera)
-        start = origin - self._centre
-        place = start - (start @ self._depth)[..., None] / (direction @ self._depth)[..., None] * direction
-        height, lateral = place @ self._height, place @ self._lateral
         # a lobe moves as one, so what is as deep as its surroundings on the mean tells how far
-        blur = wander.width * self._domain.voxel_size / _pixel_size(self._camera, self._domain)
+        blur = scatter.width / _pixel_size(self._camera, self._domain)
         weight = amount + 1e-6 * amount.max(initial=1e-30)
-        deep = ndimage.gaussian_filter(weight * self._deviation(height, lateral, self._balls), blur)
-        deep /= ndimage.gaussian_filter(weight, blur)
-        step = (height[..., None] * self._height + lateral[..., None] * self._lateral) / self._domain.voxel_size
-        return np.asarray(deep * wander.aside(step, frame), np.float32)
+        deviation = self._deviation(*crossings(self._camera, self._domain.centre), self._balls)
+        deep = ndimage.gaussian_filter(weight * deviation, blur) / ndimage.gaussian_filter(weight, blur)
+        return np.asarray(deep * scatter.aside, np.float32)

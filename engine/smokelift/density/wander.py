@@ -8,12 +8,15 @@ smoke stays straight. It travels with the smoke.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
+from smokelift.density.screen import crossings, view_frame
+from smokelift.scene import Camera, Domain
 
 SHARE = 0.5
 """Standard deviation of the rays' middles over the smoke's in depth, where all octaves are of unit strength
@@ -35,6 +38,25 @@ LATTICE = 32
 NODE_DEVIATION = (151 / 315) ** 1.5
 """Standard deviation of cubic B-splines with coefficients of unit variance in three dimensions: the squares of those
 that reach a place have the sum 151 / 315 along each, on the mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Where the middles of the rays' smoke stand at one moment.
+
+    Attributes
+    ----------
+    aside : (rows, columns)
+        How far behind the axis, over the smoke's standard deviation in depth.
+    share
+        Standard deviation of that.
+    width
+        Of the smoke across its axis, in metres: a lobe moves as one.
+    """
+
+    aside: NDArray[np.float32]
+    share: float
+    width: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +85,12 @@ class Wander:
         """Standard deviation of the rays' middles, over that of the smoke in depth."""
         return float(np.linalg.norm(self._shares))
 
-    def halved(self) -> Wander:
-        """How the smoke wanders on a grid half as fine."""
-        return replace(self, velocity=self.velocity / 2, width=self.width / 2)
+    def scatter(self, camera: Camera, domain: Domain, frame: int) -> Scatter:
+        """How the rays of a camera's pixels scatter in a frame."""
+        lateral, _, height = view_frame(camera)
+        up, right = (each[..., None] / domain.voxel_size for each in crossings(camera, domain.centre))
+        aside = self.aside(up * height + right * lateral, frame)
+        return Scatter(np.asarray(aside, np.float32), self.share, self.width * domain.voxel_size)
 
     def aside(self, places: Doubles, frame: int) -> Doubles:
         """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
