@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,13 @@ from smokelift.output.archive import VELOCITY, Shape, read_arrays, write_arrays
 from smokelift.transport import Array, Faces, face_shapes, halved
 
 _EXTRA = "extra_"
+
+_VOXELS = "_voxels"
+"""Ends the name of the bits that say where an array is not 0, by which its values alone are written: most of a large
+grid is empty."""
+
+_SHAPE = "_shape"
+"""Ends the name of such an array's shape."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +46,13 @@ class ResumeState:
 
     def write(self, path: Path) -> None:
         """Write the state; OSError if that fails."""
-        velocity = dict(zip(VELOCITY, self.velocity, strict=True))
-        extra = {f"{_EXTRA}{name}": value for name, value in self.extra.items()}
-        arrays = {"number": np.array(self.number), "density": self.density, **velocity, **extra}
+        arrays = {"number": np.array(self.number), **dict(zip(VELOCITY, self.velocity, strict=True))}
+        for name, values in {
+            "density": self.density,
+            **{_EXTRA + name: kept for name, kept in self.extra.items()},
+        }.items():
+            there = values != 0
+            arrays |= {name: values[there], name + _VOXELS: np.packbits(there.ravel()), name + _SHAPE: np.array(values.shape)}
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod
@@ -62,18 +74,37 @@ class ResumeState:
         if not path.is_file():
             return None
         shape = shape_of(int(read_arrays(path, {"number": ()})["number"]))
-        expected: dict[str, Shape | None] = {"number": (), "density": shape, **dict.fromkeys(VELOCITY)}
-        arrays = read_arrays(path, expected, others={_EXTRA: shape})
-        number, density = arrays.pop("number"), arrays.pop("density")
+        arrays = read_arrays(
+            path,
+            {"number": (), **dict.fromkeys(VELOCITY)},
+            others=dict.fromkeys(("density", _EXTRA), (math.prod(shape),)),
+        )
+        number = arrays.pop("number")
         x, y, z = (arrays.pop(name) for name in VELOCITY)
-        extra = {name.removeprefix(_EXTRA): value for name, value in arrays.items()}
-        if number.dtype.kind != "i" or number < 0 or density.min() < 0:
-            raise OSError(f"{path}: cannot be read: number or density is negative")
+        try:
+            volumes = {name: _filled(arrays, name, shape) for name in arrays if not name.endswith((_VOXELS, _SHAPE))}
+            density = volumes.pop("density")
+        except (KeyError, TypeError, ValueError) as error:
+            raise OSError(f"{path}: cannot be read: what it says of its voxels does not fit") from error
+        if number.dtype.kind != "i" or number < 0 or density.shape != shape or density.min() < 0:
+            raise OSError(f"{path}: cannot be read: its number or density is not one that a run writes")
         if (x.shape, y.shape, z.shape) not in _grids(shape):
             raise OSError(
                 f"{path}: cannot be read: the grid of its velocity does not fit its density; choose another directory"
             )
+        extra = {name.removeprefix(_EXTRA): values for name, values in volumes.items()}
         return ResumeState(int(number), density, (x, y, z), extra)
+
+
+def _filled(arrays: Mapping[str, npt.NDArray[Any]], name: str, most: Shape) -> npt.NDArray[Any]:
+    """Give the array of that name, zeros included; KeyError, TypeError or ValueError if its parts do not fit."""
+    values, shape = arrays[name], tuple(arrays[name + _SHAPE].tolist())
+    if len(shape) > len(most) or any(not 0 <= n <= m for n, m in zip(shape, most, strict=False)):
+        raise ValueError(f"{name} cannot have the shape {shape}")
+    there = np.unpackbits(arrays[name + _VOXELS], count=math.prod(shape)).view(bool).reshape(shape)
+    filled = np.zeros(shape, values.dtype)
+    filled[there] = values
+    return filled
 
 
 def _grids(shape: tuple[int, int, int]) -> list[tuple[tuple[int, int, int], ...]]:
