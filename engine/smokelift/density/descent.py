@@ -3,8 +3,10 @@
 Every voxel is measured in units of its own scale, start + floor: in these units the steepest descent changes a ray's
 smoke in proportion to what is there, so what the start assumes about depth survives where the pictures say nothing.
 The direction is that of the limited-memory BFGS method (Nocedal 1980), among the voxels that no bound holds (two-metric
-projection: Bertsekas 1982). No voxel changes by more than a share of itself, and the step is shortened until the
-objective falls sufficiently (Armijo), so the objective never rises.
+projection: Bertsekas 1982). What neighbours share counts more in it than what each wants for itself: thick smoke that
+is too dark is so over a whole lobe, and voxels that mend it one by one become spikes. No voxel changes by more than a
+share of itself, and the step is shortened until the objective falls sufficiently (Armijo), so the objective never
+rises.
 """
 
 from __future__ import annotations
@@ -24,6 +26,13 @@ from smokelift.render import Image, Volume
 
 MEMORY = 3
 """Steps that the direction remembers: as good as six, for half the memory (docs/experiments/density-descent.md)."""
+
+BLOCK = 4
+"""Voxels along the cubes whose voxels share a step: small lobes (docs/experiments/density-descent.md)."""
+
+SHARED = 3.0
+"""How many times as much a gradient's mean over such a cube counts as the gradient itself
+(docs/experiments/density-descent.md)."""
 
 FLOOR = 0.1
 """Scale of an empty voxel of the hull, in mean densities of the start, or as much as the prior expects there if that is
@@ -97,7 +106,7 @@ def descend(
     else:
         residuals = problem.residuals(current)
     loss, enough = objective(terms, residuals), noise_floor(terms)
-    curvature = _Curvature()
+    curvature = _Curvature(_Neighbours(where, shape))
     gradient: Array | None = None
     step: _Step | None = None
     done = idle = 0
@@ -210,10 +219,12 @@ class _Curvature:
     with limited storage", 1980).
 
     Of each of the last `MEMORY` steps it keeps s, the step itself, y, the change of the gradient along it, and their
-    product ys = 1 / rho.
+    product ys = 1 / rho. Where nothing is known, the inverse of the second derivatives is a multiple of what
+    `neighbours` does.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, neighbours: _Neighbours) -> None:
+        self._neighbours = neighbours
         self._steps: deque[tuple[Array, Array, float]] = deque(maxlen=MEMORY)
 
     @property
@@ -228,18 +239,45 @@ class _Curvature:
             self._steps.append((s, y, ys))
 
     def newton(self, q: Array) -> Array:
-        """Newton's step for a gradient q, which is overwritten; where nothing is known, the gradient itself."""
+        """Newton's step for a gradient q, which is overwritten."""
         alphas = []
         for s, y, ys in reversed(self._steps):
             alphas.append(_dot(s, q) / ys)
             q = saxpy(y, q, a=-alphas[-1])
         if self._steps:
             _, y, ys = self._steps[-1]
-            q *= np.float32(ys / _dot(y, y))
+            q *= np.float32(ys / _dot(y, self._neighbours.shared(y)))
+        q = self._neighbours.shared(q)
         for (s, y, ys), alpha in zip(self._steps, reversed(alphas), strict=True):
             beta = _dot(y, q) / ys
             q = saxpy(s, q, a=alpha - beta)
         return q
+
+
+class _Neighbours:
+    """The cubes of voxels that share a step. There are two lattices of them, half a cube apart, so that no cube shows.
+
+    Parameters
+    ----------
+    where : (n,)
+        The voxels in a volume of that shape.
+    """
+
+    def __init__(self, where: NDArray[np.intp], shape: tuple[int, ...]) -> None:
+        places = np.unravel_index(where, shape)
+        self._lattices = []
+        for offset in (0, BLOCK // 2):
+            cubes = [(count + offset) // BLOCK + 1 for count in shape]
+            cube = np.ravel_multi_index([(place + offset) // BLOCK for place in places], cubes)
+            self._lattices.append((cube, np.maximum(np.bincount(cube), 1)))
+
+    def shared(self, values: Array) -> Array:
+        """The voxels' values (n,) and, `SHARED` times as much, their means over the cubes."""
+        result = values / np.float32(1 + SHARED)
+        for cube, count in self._lattices:
+            mean = np.bincount(cube, values) * (SHARED / (1 + SHARED) / len(self._lattices)) / count
+            result += mean.astype(np.float32)[cube]
+        return result
 
 
 def _dot(a: Array, b: Array) -> float:

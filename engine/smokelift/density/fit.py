@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.checks import listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
@@ -27,6 +28,7 @@ from smokelift.footage.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import CompleteScene, Domain, Scene, completed
+from smokelift.scene.domain import box_around
 
 LARGEST_START = 1e12
 """Initial density, at most: squares of larger ones are not finite in 32 bits."""
@@ -34,6 +36,14 @@ LARGEST_START = 1e12
 MIN_DENSITY = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
 range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
+
+
+SINGLE_VOXELS = 1.0
+"""Standard deviation (voxels) of the Gaussian that leaves of a change what lobes share
+(docs/experiments/density-descent.md)."""
+
+FAINT_SHARE = 1e-3
+"""Share of the largest density below which smoke is too faint for a ratio to say how it changes."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +69,7 @@ class DensitySettings:
     """
 
     fit_iterations: int = 6
-    descent_iterations: int = 8
+    descent_iterations: int = 14
     tolerance: float = 0.02
     patience: int = 2
     bound: float = 3.0
@@ -83,8 +93,8 @@ class FittedDensity:
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
     steady : (nx, ny, nz) float32, optional
-        The density before the descent, which a next frame carries along; None if that is `density`. What the descent
-        makes of single pixels would pile up along the rays from frame to frame.
+        The density that a next frame carries along; None if that is `density`. It has what the descent changes from
+        some voxels to the next, but not in single ones: that would pile up along the rays from frame to frame.
     """
 
     density: Volume
@@ -154,7 +164,9 @@ class GradientFit:
             expected=depth.density if smooth is None else smooth,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
-        steady = None if smooth is None else scaled.density
+        steady = None
+        if smooth is not None:
+            steady = _without_single_voxels(scaled.density, final.density, hull) if final.iterations else scaled.density
         return FittedDensity(without_traces(final.density, where), hull, figures, smooth, steady)
 
 
@@ -246,6 +258,16 @@ def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
     shown = values >= MIN_DENSITY
     result = np.zeros(density.shape, np.float32)
     result.ravel()[within[shown]] = values[shown]
+    return result
+
+
+def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_]) -> Volume:
+    """A density with what changes in it from one to another of the hull's densities, but for single voxels' changes."""
+    box = box_around(hull, 1)
+    blurred_before, blurred_after = (ndimage.gaussian_filter(each[box], SINGLE_VOXELS) for each in (before, after))
+    faint = FAINT_SHARE * float(blurred_before.max())
+    result = np.zeros(before.shape, np.float32)
+    result[box] = before[box] * ((blurred_after + faint) / (blurred_before + max(faint, MIN_DENSITY)))
     return result
 
 

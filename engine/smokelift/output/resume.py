@@ -52,7 +52,11 @@ class ResumeState:
             **{_EXTRA + name: kept for name, kept in self.extra.items()},
         }.items():
             there = values != 0
-            arrays |= {name: values[there], name + _VOXELS: np.packbits(there.ravel()), name + _SHAPE: np.array(values.shape)}
+            arrays |= {
+                name: values[there],
+                name + _VOXELS: np.packbits(there.ravel()),
+                name + _SHAPE: np.array(values.shape),
+            }
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod

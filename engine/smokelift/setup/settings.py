@@ -57,7 +57,7 @@ LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine":
 much as the one before (docs/experiments/resolution-selection.md)."""
 
 ITERATIONS: Mapping[Quality, tuple[int, int]] = {
-    "draft": (4, 4), "balanced": (6, 8), "fine": (8, 14), "final": (8, 14)
+    "draft": (4, 4), "balanced": (6, 14), "fine": (8, 14), "final": (8, 14)
 }  # fmt: skip
 """Multiplicative iterations and steps of descent at most (docs/experiments/density-descent.md)."""
 
