@@ -24,7 +24,8 @@ MAX_NODE_DISTANCE = 2.0
 """Distance between nodes of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large."""
 
 MIN_NODE_DISTANCE = 3.5
-"""Voxels between nodes of the finest octave, at least: finer ones flicker (docs/experiments/stretched-noise.md)."""
+"""Voxels between nodes of the finest octave, at least: finer ones flicker (docs/experiments/stretched-noise.md), and
+where their detail is made to last the front loses (docs/experiments/detail-strength.md)."""
 
 STRETCH = 0.2
 """Standard deviation of the motion of each scale, over the distance between its nodes: more draws the smoke out into
