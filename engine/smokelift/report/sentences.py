@@ -248,19 +248,9 @@ SENTENCES: Mapping[str, str] = {
     ),
     # what a run needs besides
     "given": "{what} by hand: {value}.",
-    "domain": (
-        "Domain: only voxels in which the picture allows smoke are computed, {hull_share:.0%} of the box. Frames "
-        "without smoke cost nothing."
-    ),
-    "iterations": (
-        "Iterations: {value} at most, {iterations:.0f} on the coarse frames. They stop when one lowers the error by "
-        "less than {tolerance:.0%}, or when only noise is left."
-    ),
     "velocity grid coarsening": (
         "Velocity grid: {voxels:.0f} voxels along the longest side, because the depth of the smoke is uncertain."
     ),
-    "velocity levels": "Velocity grids: {value}, because the fastest smoke goes {voxels_a_frame:.1f} voxels a frame.",
-    "velocity levels without motion": "Velocity grids: {value}, since there is no motion to measure.",
     # where the parts of a result come from
     "replaced pictures": "Those of {frames} missing or damaged; a neighboring good one stands in.",
     "pictures that are fitted": (

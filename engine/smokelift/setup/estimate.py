@@ -23,9 +23,9 @@ class Estimate(Remark, Generic[Value]):
     Attributes
     ----------
     what
-        ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"domain"``, ``"environment directions"``,
-        ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"``, ``"axis depth"``, ``"smoke colour"``,
-        ``"smoke thickness"``, ``"light direction"``, ``"gain of view 1"`` or ``"fire"``.
+        ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"environment directions"``,
+        ``"velocity grid coarsening"``, ``"axis depth"``, ``"smoke colour"``, ``"smoke thickness"``,
+        ``"light direction"``, ``"gain of view 1"`` or ``"fire"``.
     value
         What will be used, or `UNDETERMINED`.
     source

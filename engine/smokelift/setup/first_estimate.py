@@ -5,27 +5,36 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from smokelift.checks import Doubt, Remark
+from smokelift.checks import Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plate, Plates
+from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.steady import steady
 from smokelift.footage.turning import Turns
-from smokelift.render import Image
 from smokelift.scene import Background, Camera
-from smokelift.setup.backdrop_remarks import (
-    backdrop_doubts,
-    backdrop_remarks,
-    between_bars,
-    cut_doubts,
-    exposure_remarks,
-    nothing_seen,
-    smoke_in_plate,
-)
-from smokelift.setup.fire_estimate import Fire, find_fire
+from smokelift.scene.checks import Vector
+from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, exposure_remarks
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
-from smokelift.setup.source import several_colours
+
+
+@dataclass(frozen=True, eq=False)
+class Fire:
+    """What shines by itself.
+
+    Attributes
+    ----------
+    share
+        Of the smoke's pixels that do.
+    light
+        The clip of the light that it adds, in the place of smoke.
+    color
+        Of that light, as the clip shows it.
+    """
+
+    share: float
+    light: Clip
+    color: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,41 +51,20 @@ class FirstEstimate:
         Its smoke.
     fire
         None where none burns.
-    doubts
-        Why the result may be nothing, or wrong.
-    unused
-        Whether a background is given that an alpha channel replaces.
+    remarks
+        What was assumed or noticed, and why the result may be nothing, or wrong.
     """
 
     clip: Clip
     found: Backdrop
     samples: SmokeSamples
     fire: Fire | None
-    doubts: tuple[Doubt, ...]
-    unused: bool
-
-    @property
-    def plates(self) -> Plates:
-        """Plates of the full pictures."""
-        return self.found.plates
+    remarks: tuple[Remark, ...]
 
     @property
     def turns(self) -> Turns | None:
         """How the camera turned, if it was found to."""
         return None if self.found.steadied is None else self.found.steadied[0].turns
-
-    @property
-    def picture(self) -> Image | None:
-        """The background, if it was estimated as one picture: linear, (rows, columns, 3)."""
-        if self.found.background is None and isinstance(self.plates, Plate):
-            return self.plates.image
-        return None
-
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """What was assumed or estimated; the doubts are among them."""
-        unused = (Remark("background unused"),) if self.unused else ()
-        return (*backdrop_remarks(self.found), *unused, *self.doubts, *exposure_remarks(self.samples.exposure))
 
 
 def first_estimate(
@@ -86,20 +74,18 @@ def first_estimate(
     found = find_backdrop(clip, camera, background, lenses)
     corner = (0, 0) if found.steadied is None else found.steadied[0].corner
     samples = sample_smoke(*found.still(found.clip), corner)
-    clip = steady(found.clip, found.plates, samples.gains)
-    fire = find_fire(clip, found.plates, samples)
-    if fire is not None:
-        clip = fire.doused
-        samples = replace(sample_smoke(*found.still(clip), corner), gains=samples.gains)
-    cuts = cut_doubts(found)
-    nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
-    bars = between_bars(samples) if background is None else ()
-    doubts = (
-        *(nothing or cuts),
-        *backdrop_doubts(found),
-        *smoke_in_plate(samples),
-        *bars,
-        *several_colours(samples),
-    )
+    exposed = steady(found.clip, found.plates, samples.gains)
+    fire, share = None, fire_share(samples.colours, samples.behind)
+    if share:
+        doused = without_fire(exposed, found.plates)
+        light = firelight(exposed, doused)
+        fire, exposed = Fire(share, light, fire_colour(exposed, light)), doused
+        samples = replace(sample_smoke(*found.still(doused), corner), gains=samples.gains)
     unused = found.source == "alpha" and background is not None
-    return FirstEstimate(clip, found, samples, fire, doubts, unused)
+    remarks = (
+        *backdrop_remarks(found),
+        *((Remark("background unused"),) if unused else ()),
+        *doubts(found, samples, background is not None),
+        *exposure_remarks(samples.exposure),
+    )
+    return FirstEstimate(exposed, found, samples, fire, remarks)

@@ -1,10 +1,19 @@
-"""Further calibrated cameras: their clips in step with the input's, their backgrounds, and whether they agree."""
+"""Further calibrated cameras: their clips in step with the input's, their backgrounds and exposures, their agreement.
+
+Cameras have exposures and white balances of their own. Two pictures of one smoke bind each other: every slice across
+both cameras holds as much smoke in one as in the other. So a density is fitted to both, on coarse frames and for
+several gains of the further one; the gain with which both are fitted best is the camera's. Figures:
+docs/experiments/view-gain.md.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smokelift.checks import Doubt, Figures, Remark
 from smokelift.density import ViewSet
@@ -12,10 +21,14 @@ from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.steady import steady
-from smokelift.footage.working_picture import CameraError, working_picture
+from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.backdrop_remarks import backdrop_remarks, exposure_change, exposure_remarks
+from smokelift.setup.backdrop_remarks import backdrop_remarks
+from smokelift.setup.coarse import coarse_frames
+from smokelift.setup.estimate import Estimate, measured
 from smokelift.setup.geometry import fitting
+from smokelift.setup.held_out import HeldOut, held_out
+from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 
 AGREEMENT_SAMPLES = 4
@@ -26,54 +39,59 @@ MIN_AGREED_SHARE = 0.9
 cameras upside down on a tenth to nine tenths (docs/experiments/view-agreement.md)."""
 
 SAME_RATE = 0.01
-"""Relative difference of two frame rates that are the same."""
+"""Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""
+
+STEP = 1.2
+"""Ratio of one gain to the next that is tried; between them it is where a parabola has its lowest point."""
+
+MAX_GAIN = 8.0
+"""Largest gain that is tried, and the inverse of the smallest: three stops."""
+
+RATIO, RATIO_UNLIT = 1.2, 1.35
+"""Ratio of brightness from which on it is the cameras', where light is known and where it is taken to come from
+everywhere. Cameras that are exposed alike are found to differ by up to 1.15 and 1.30 (docs/experiments/view-gain.md):
+coarse voxels cast other shadows, and light from one side is brighter there."""
+
+COLOUR_RATIO = 1.05
+"""Ratio of two colours from which on it is the cameras'; light and shadow do not change it
+(docs/experiments/view-gain.md)."""
+
+Gain = NDArray[np.float32]
 
 
-def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
-    """Open a further view of a complete scene and find its background; with remarks on it.
+def open_views(
+    first: ShotView, scene: CompleteScene, numbers: Sequence[int], lit: bool, settings: Settings
+) -> tuple[tuple[ShotView, ...], tuple[Estimate[str], ...], tuple[Remark, ...]]:
+    """Open the further views of a scene, at the input's exposure; with what was measured and noticed.
 
     Parameters
     ----------
-    number
-        Of the view among the further ones.
-    clip
+    first
         The input.
     scene
-        What both show.
+        What all show, with its lights and its model of scattering.
+    numbers
+        Frames in which brightness is compared.
+    lit
+        Whether the lights are given, and not estimated.
+    settings
+        How to fit, and the error that a gain has to take away.
 
     Raises
     ------
     ValueError
-        If its clip or its camera does not fit the input's.
+        If a clip or a camera does not fit the input's.
     """
-    view, name = scene.views[number], f"View {number + 1}"
-    opened = _opened(view.clip, clip, scene)
-    if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
-        raise ValueError(
-            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
-            "convert one, or give the frame rate of the clip whose file says it wrongly."
-        )
-    camera = fitting(view.camera, opened)
-    try:
-        working = working_picture(camera, scene.domain)
-    except CameraError as error:
-        raise ValueError(f"{name}: {error}") from error
-    background = view.background
-    if background is None and scene.background.color is not None:
-        background = scene.background
-    found = find_backdrop(opened, camera, background)
-    axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
-    angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
-    last = opened.first + len(opened) - 1
-    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
-    remarks = [
-        *opened.remarks(),
-        Remark("further view", which),
-        *backdrop_remarks(found),
-        *exposure_remarks(exposure_change(found.clip, found.plates)),
-    ]
-    of_view = [replace(remark, figures={**remark.figures, "view": number + 1}) for remark in remarks]
-    return ShotView(steady(found.clip, found.plates), camera, found.plates, working), of_view
+    views, remarks = [], []
+    estimates: list[Estimate[str]] = []
+    for number in range(len(scene.views)):
+        view, noticed = _open_view(number, first.clip, scene)
+        if settings.selection.measure:
+            gain, found = _exposure(number + 1, first, view, scene, numbers, lit, settings)
+            view, estimates = view if gain is None else _over(view, gain), [*estimates, *found]
+        views.append(view)
+        remarks += noticed
+    return tuple(views), tuple(estimates), tuple(remarks)
 
 
 def disagreement(shot: Shot) -> tuple[Doubt, ...]:
@@ -84,6 +102,31 @@ def disagreement(shot: Shot) -> tuple[Doubt, ...]:
         shares.append(agreement([view.mask for view in views], [view.projection for view in views]))
     agreed = float(np.median(shares))
     return () if agreed >= MIN_AGREED_SHARE else (Doubt("disagreeing views", {"agreed": agreed}),)
+
+
+def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
+    """A further view of a complete scene before its background; with remarks on it."""
+    view = scene.views[number]
+    opened = _opened(view.clip, clip, scene)
+    if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
+        raise ValueError(
+            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
+            "convert one, or give the frame rate of the clip whose file says it wrongly."
+        )
+    camera, background = fitting(view.camera, opened), view.background
+    if background is None and scene.background.color is not None:
+        background = scene.background
+    found = find_backdrop(opened, camera, background)
+    try:
+        shown = ShotView.before(scene.domain, steady(found.clip, found.plates), camera, found.plates)
+    except CameraError as error:
+        raise ValueError(f"View {number + 1}: {error}") from error
+    axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
+    angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
+    last = opened.first + len(opened) - 1
+    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
+    remarks = (*opened.remarks(), Remark("further view", which), *backdrop_remarks(found))
+    return shown, [replace(remark, figures={**remark.figures, "view": number + 1}) for remark in remarks]
 
 
 def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
@@ -102,3 +145,64 @@ def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
             "fewer frames of the input, or say which frames of the view belong to them."
         )
     return Clip.open(source, fps=fps, frames=(first, last))
+
+
+def _exposure(
+    number: int,
+    front: ShotView,
+    view: ShotView,
+    scene: CompleteScene,
+    numbers: Sequence[int],
+    lit: bool,
+    settings: Settings,
+) -> tuple[Gain | None, tuple[Estimate[str], ...]]:
+    """By how much view ``number``, from 1, is brighter than the input (3,); None where no gain is better than none."""
+    frames = coarse_frames((front, view), numbers, scene)
+    if not frames or scene.scattering == "absorption":
+        return None, ()
+
+    def tried(gain: Gain) -> HeldOut:
+        evened = [replace(frame, views=(frame.views[0], frame.views[1].over(gain))) for frame in frames]
+        return held_out(evened, scene.scattering, scene.scattering, settings.density)
+
+    as_it_is, tolerance = tried(np.ones(3, np.float32)).error, settings.selection.scattering_error
+    scalar = _best(lambda factor: tried(np.full(3, factor, np.float32)).error, as_it_is)
+    own, other = np.maximum(tried(np.full(3, scalar, np.float32)).colours, 1e-6)
+    ratio = other / own
+    colour = ratio / np.exp(np.mean(np.log(ratio)))
+    if max(scalar, 1 / scalar) < (RATIO if lit else RATIO_UNLIT):
+        scalar = 1.0
+    if colour.max() / colour.min() < COLOUR_RATIO:
+        colour = np.ones(3)
+    gain = (scalar * colour).astype(np.float32)
+    error = as_it_is if (gain == 1).all() else tried(gain).error
+    if error >= as_it_is - tolerance:
+        return None, ()
+    named = ", ".join(f"{value:.2f}" for value in gain)
+    figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
+    return gain, (measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance),)
+
+
+def _best(error_of: Callable[[float], float], at_one: float) -> float:
+    """The gain of the least error, from 1 on downhill."""
+    errors = {0: at_one}
+    last = int(math.log(MAX_GAIN) / math.log(STEP))
+
+    def error(step: int) -> float:
+        if step not in errors:
+            errors[step] = error_of(STEP**step)
+        return errors[step]
+
+    best = 0
+    way = -1 if error(-1) < error(1) else 1
+    while abs(best) < last and error(best + way) < error(best):
+        best += way
+    below, lowest, above = (error(step) for step in (best - 1, best, best + 1))
+    bend = below - 2 * lowest + above
+    return float(STEP ** (best + (0.5 * (below - above) / bend if bend > 0 else 0.0)))
+
+
+def _over(view: ShotView, gain: Gain) -> ShotView:
+    """The view with its pictures and backgrounds over a gain."""
+    clip = view.clip.changed(lambda _, picture: picture / gain)
+    return replace(view, clip=clip, plates=view.plates.through(lambda part: part / gain if part.ndim == 3 else part))

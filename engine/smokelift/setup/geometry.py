@@ -1,30 +1,27 @@
-"""Camera, domain and resolution: as the scene gives them, or estimated from where the smoke is in the picture."""
+"""Camera, box and resolution: as the scene gives them, or estimated from where the smoke is in the picture."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smokelift.checks import Figures, Remark
+from smokelift.checks import Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
-from smokelift.footage.plate import Plates
-from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.detail import DetailSpectrum, smoke_detail
-from smokelift.setup.estimate import Estimate, Grid, given, measured
-from smokelift.setup.settings import LIMITS, LOST_DETAIL, QUALITIES, Quality, Settings
+from smokelift.setup.estimate import Estimate, Grid, given
+from smokelift.setup.first_estimate import FirstEstimate
+from smokelift.setup.resolution import DetailSpectrum, Shape, choose_grid, smoke_detail
+from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 from smokelift.setup.smoke import SmokeSamples
-
-Shape = tuple[int, int, int]
 
 PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
@@ -45,7 +42,8 @@ NARROWEST = 0.25
 """Width over height of an estimated box at least, and the reverse."""
 
 MIN_SIDE_VOXELS = 32
-"""Voxels along the longest side at least: with fewer there is nothing more to save."""
+"""Voxels along the longest side at least: with fewer there is nothing more to save
+(docs/experiments/resolution-selection.md)."""
 
 DETAIL_FRAMES = 3
 """Frames whose detail decides the resolution: those with the most smoke."""
@@ -58,33 +56,26 @@ class Geometry:
     Attributes
     ----------
     camera
-        Of the clip's full pictures.
+        Of the clip's full pictures; with a matrix for every frame if it was found to turn.
     domain
         With its final resolution.
     resolution
-        Why it has that resolution; None for the finest grid of a quality that nothing was measured for.
+        Why it has that resolution.
+    qualities
+        The grid that each quality would take of this clip.
     remarks
         What was assumed.
-    qualities
-        The grid that each quality would take of this clip; empty where nothing was measured.
     """
 
     camera: Camera
     domain: Domain
-    resolution: Estimate[Shape] | None
-    remarks: tuple[Remark, ...] = ()
-    qualities: Mapping[Quality, Grid] = field(default_factory=dict)
-
-    @property
-    def estimates(self) -> tuple[Estimate[Shape], ...]:
-        """What was measured for it."""
-        return () if self.resolution is None else (self.resolution,)
+    resolution: Estimate[Shape]
+    qualities: Mapping[Quality, Grid]
+    remarks: tuple[Remark, ...]
 
 
-def find_geometry(
-    clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples, turns: Turns | None = None
-) -> Geometry:
-    """Complete camera and domain; a camera that was found to turn gets a matrix for every frame.
+def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> Geometry:
+    """Complete camera and domain.
 
     Raises
     ------
@@ -92,69 +83,58 @@ def find_geometry(
         If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
         looks steeply up or down, or is orthographic.
     """
+    clip, samples, turns, box = estimate.clip, estimate.samples, estimate.turns, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
-    if known is not None and scene.domain is not None:
-        camera = _turning(known, turns)
-        box, division, qualities = _divided(scene.domain, clip, camera, settings, plates, samples)
-        return Geometry(camera, box, division, _grown(scene.domain, box), qualities)
-    if scene.domain is not None:
+    _require_place(scene, known)
+    focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
+    camera = known or _level(clip, focal, settings.distance)
+    metres, multiple = 0.0, 1
+    if box is None:
+        # multiples of four, so that pyramids halve them evenly
+        (floor, size, metres), multiple = _around(camera, samples, settings.distance), 4
+    else:
+        floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
+    camera = camera if turns is None else turns.carried(camera)
+    still = camera.at(next(iter(samples.smoky), 0))
+
+    def grids(quality: Quality) -> tuple[Domain, ...]:
+        limit = LIMITS[quality]
+        if isinstance(box, Domain):
+            return _same_shape(box, limit.voxels(_pixels(still, box)))
+        pixels = max(size) / metres if box is None else _pixels(still, _grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
+        return _grids(floor, size, limit.voxels(pixels), multiple)
+
+    qualities: Mapping[Quality, Grid]
+    remarks: tuple[Remark, ...]
+    asked = box.resolution if isinstance(box, Domain) and settings.resolution is None else settings.resolution
+    if isinstance(asked, tuple):
+        voxel = float((size / asked).max())
+        domain = replace(box, resolution=asked) if isinstance(box, Domain) else _standing_on(floor, voxel, asked)
+        resolution, qualities = given("resolution", asked), dict.fromkeys(QUALITIES, Grid(asked, None))
+    else:
+        domain, resolution, qualities = choose_grid(grids, lambda whole: _detail(estimate, camera, whole), settings)
+    if box is None:
+        around = "box around the smoke" if samples.smoky else "box over the picture"
+        remarks = (
+            _assumed(known, clip, focal, metres * camera.size[1]),
+            Remark(around, {"size": _size(domain), "resolution": domain.resolution}),
+        )
+    else:
+        remarks = _grown(box, domain)
+    return Geometry(camera, domain, resolution, qualities, remarks)
+
+
+def _require_place(scene: Scene, known: Camera | None) -> None:
+    """Refuse a scene whose camera and box do not go together."""
+    if scene.domain is not None and known is None:
         raise ValueError("The scene gives a box but no camera; give the camera that filmed it.")
-    if scene.inlets:
+    if scene.domain is None and scene.inlets:
         raise ValueError("The scene marks an inlet but gives no box; give camera and box to say where it is.")
-    if known is not None and not _boxes(known):
+    if scene.domain is None and known is not None and not _boxes(known):
         raise ValueError(
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
-    focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
-    camera = known or _level(clip, focal, settings.distance)
-    base, size, metres = _around(camera, samples, settings.distance)
-    camera = _turning(camera, turns)
-
-    def grids(quality: Quality) -> tuple[Domain, ...]:
-        # multiples of four, so that pyramids halve them evenly
-        return _grids(base, size, LIMITS[quality].voxels(max(size) / metres), 4)
-
-    estimate: Estimate[Shape] | None = None
-    by_quality: Mapping[Quality, Grid] = {}
-    if isinstance(settings.resolution, tuple):
-        domain = _filled(base, size, settings.resolution)
-        estimate = given("resolution", domain.resolution)
-    elif settings.selection.measure:
-        domain, estimate, by_quality = _resolved(clip, camera, grids, plates, samples.smoky, settings)
-    else:
-        domain = grids(settings.quality)[-1]
-    around = Remark(
-        "box around the smoke" if samples.smoky else "box over the picture",
-        {"size": _size(domain), "resolution": domain.resolution},
-    )
-    return Geometry(
-        camera, domain, estimate, (_assumed(known, clip, focal, metres * camera.size[1]), around), by_quality
-    )
-
-
-def _divided(
-    box: Box, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
-) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
-    """A box that is given, with as many voxels as are asked for, and why; and the grid of each quality."""
-    floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
-    if isinstance(settings.resolution, tuple):
-        if isinstance(box, Domain):
-            domain = replace(box, resolution=settings.resolution)
-        else:
-            domain = _filled(floor, size, settings.resolution)
-        return domain, given("resolution", domain.resolution), {}
-    if isinstance(box, Domain) and settings.resolution is None:
-        return box, given("resolution", box.resolution), {}
-    still = camera.at(next(iter(samples.smoky), 0))
-
-    def grids(quality: Quality) -> tuple[Domain, ...]:
-        if isinstance(box, Domain):
-            return _same_shape(box, LIMITS[quality].voxels(_pixels(still, box)))
-        (coarsest,) = _grids(floor, size, MIN_SIDE_VOXELS, 1)
-        return _grids(floor, size, LIMITS[quality].voxels(_pixels(still, coarsest)), 1)
-
-    return _resolved(clip, camera, grids, plates, samples.smoky, settings)
 
 
 def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
@@ -179,11 +159,6 @@ def _focal(clip: Clip) -> float:
     """Focal length in pixels of a clip without a camera: the file's, or that of the usual lens."""
     width, height = clip.size
     return LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
-
-
-def _turning(camera: Camera, turns: Turns | None) -> Camera:
-    """The camera, with a matrix for every frame if it was found to turn."""
-    return camera if turns is None else turns.carried(camera)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -277,11 +252,6 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
     return base, np.array([across, across, up]), metres
 
 
-def _filled(floor: Doubles, size: Doubles, resolution: Shape) -> Domain:
-    """The box of so many voxels that holds one of a size in metres about the middle of its floor."""
-    return _standing_on(floor, float((size / resolution).max()), resolution)
-
-
 def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
     """A box of a size in metres about the middle of its floor, with every number of voxels, the fewest first.
 
@@ -340,53 +310,14 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
     )
 
 
-def _resolved(
-    clip: Clip,
-    camera: Camera,
-    grids: Callable[[Quality], tuple[Domain, ...]],
-    plates: Plates,
-    smoky: tuple[int, ...],
-    settings: Settings,
-) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
-    """The coarsest of a quality's grids that loses no more of what the finest shows than tolerated, and why.
-
-    The clip's detail is measured once, and says what each quality would take.
-    """
-    own = grids(settings.quality)
-    if not smoky:
-        shape = own[0].resolution
-        return own[0], Estimate("resolution without smoke", what="resolution", value=shape, source="assumed"), {}
-    detail = _detail(clip, camera, own[-1], plates, smoky)
-
-    def coarsest(allowed: tuple[Domain, ...], tolerance: float) -> Domain:
-        finest = max(allowed[-1].resolution)
-        return next((grid for grid in allowed if detail.lost(max(grid.resolution), finest) <= tolerance), allowed[-1])
-
-    tolerance = settings.selection.lost_detail
-    domain = coarsest(own, tolerance)
-    longest, finest = max(domain.resolution), max(own[-1].resolution)
-    lost = detail.lost(longest)
-    figures: Figures = {
-        "lost": lost,
-        "lost_beside_finest": detail.lost(longest, finest),
-        "pixels": detail.pixels,
-        "quality": settings.quality,
-    }
-    estimate = measured("resolution", domain.resolution, figures, tolerance=tolerance)
-    others = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
-    taken = {**others, settings.quality: domain}
-    by_quality = {name: Grid(grid.resolution, detail.lost(max(grid.resolution))) for name, grid in taken.items()}
-    return domain, estimate, by_quality
-
-
-def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> DetailSpectrum:
-    """The detail of the smoke in some frames, at the clip's own pixels."""
-    frames = []
+def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
+    """The detail of the smoke in some frames, at the clip's own pixels; None without smoke."""
+    smoky, frames = estimate.samples.smoky, []
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
-            frames.append((part(clip.frame(number)), plates.at(number).through(part)))
-    return smoke_detail(frames, _pixels(camera.at(smoky[0]), box))
+            frames.append((part(estimate.clip.frame(number)), estimate.found.plates.at(number).through(part)))
+    return smoke_detail(frames, _pixels(camera.at(smoky[0]), box)) if smoky else None
 
 
 def _pixels(camera: Camera, box: Domain) -> float:

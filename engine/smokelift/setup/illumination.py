@@ -9,7 +9,7 @@ All but the first are judged by `smokelift.setup.held_out`. Figures: docs/select
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -21,16 +21,27 @@ from smokelift.density import DensitySettings
 from smokelift.footage.noise import Noise
 from smokelift.render import Image
 from smokelift.render.environment_count import MIN_LIGHTS, TOLERANCE, lights_needed
-from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
-from smokelift.setup.coarse import CoarseClip, CoarseFrame
-from smokelift.setup.estimate import UNDETERMINED, Estimate, given, measured, undetermined
-from smokelift.setup.held_out import HalfFit, HeldOut, fit_half, held_out
-from smokelift.setup.scattering import MAX_ERROR_RATIO, choose_scattering, tries_multiple
+from smokelift.scene import SHADOWED, CompleteScene, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
+from smokelift.setup.coarse import CoarseFrame
+from smokelift.setup.estimate import Estimate, given, measured, undetermined
+from smokelift.setup.held_out import HeldOut, fit_half, held_out
+from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
 from smokelift.setup.sky import AMBIENT, directional, find_sky, light_around
 from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.source import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.thickness import smoke_thickness
+
+MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
+"""Models of scattering, from the cheapest to the richest."""
+
+MAX_ERROR_RATIO = 0.75
+"""Error of one model over that of another of which it is no special case, below which it is taken. Multiple over single
+scattering: 0.01 to 0.63 where paths were traced, but for smoke that either model fits, and 0.82 and more where light
+is scattered once (docs/experiments/scattering-selection.md)."""
+
+MAX_DESCENT_STEPS = 64
+"""Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
+by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
 STEP = 1.25
 """Ratio of one strength of given lights to the next that is tried: smoke nearly as bright as its light allows differs
@@ -52,7 +63,7 @@ MAX_COLOUR_SPREAD = 0.1
 """Spread of a background of one colour at most, as a share of its mean."""
 
 MAX_QUIET_NOISE = 2 / 255
-"""Noise up to which what is left is not the noise's."""
+"""Noise up to which what is left is not the noise's (docs/experiments/surroundings.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,34 +77,27 @@ class Illumination:
     scattering
         The chosen model; until it is measured the richest that the light allows.
     origin
-        Of the lights: the scene gives them (or none is needed), the clip shows how strong they are, or it does not.
+        Of the lights: the scene gives them (or none is needed), texture behind the smoke shows how strong they are,
+        several views show a sun, or nothing shows them.
     by_hand
         Whether the user gives the model of scattering.
     measured
         What was chosen on coarse densities.
-    thickness, direction
-        What is known of a light that is not given; None of a light that is.
+    unknown
+        Thickness of the smoke and direction of the light, where that is not given.
     """
 
     lights: tuple[Light, ...]
     scattering: Scattering
-    origin: Literal["given", "measured", "assumed"]
+    origin: Literal["given", "texture", "views", "assumed"]
     by_hand: bool
     measured: tuple[Estimate[Any], ...] = ()
-    thickness: Estimate[str] | None = None
-    direction: Estimate[str] | None = None
-
-    @property
-    def sunny(self) -> bool:
-        """Whether the lights are those of a sun that was found."""
-        return self.direction is not None and self.direction.value != UNDETERMINED
+    unknown: tuple[Estimate[str], ...] = ()
 
     @property
     def estimates(self) -> tuple[Estimate[Any], ...]:
         """All that was measured of it, if its model of scattering asks for light."""
-        if self.thickness is None or self.direction is None or self.scattering == "absorption":
-            return self.measured
-        return (*self.measured, *(() if self.sunny else (self.thickness,)), self.direction)
+        return self.measured if self.scattering == "absorption" else (*self.measured, *self.unknown)
 
 
 def first_light(
@@ -119,12 +123,14 @@ def first_light(
     share = np.array(medium.albedos) / (4 * np.pi)
     sun = directional(np.array((0.0, 0.0, 1.0)), np.divide(radiance, share, out=np.zeros(3), where=share > 0))
     unknown = undetermined("light direction undetermined by one view", "light direction")
-    origin: Literal["measured", "assumed"] = "assumed" if source is None else "measured"
-    return Illumination((sun,), richest, origin, by_hand, (), thickness, unknown)
+    return Illumination((sun,), richest, "assumed" if source is None else "texture", by_hand, (), (thickness, unknown))
 
 
 def measured_light(
-    light: Illumination, clip: CoarseClip, frames: dict[int, CoarseFrame], settings: Settings
+    light: Illumination,
+    frames: Sequence[CoarseFrame],
+    finer: Callable[[], CoarseFrame | None],
+    settings: Settings,
 ) -> Illumination:
     """Measure on coarse densities how strong the lights are and how they are scattered.
 
@@ -132,59 +138,54 @@ def measured_light(
     ----------
     light
         With the richest model that is allowed, or the one that the user gives.
-    clip
-        With the scene's camera and medium.
     frames
-        Those that models are tried on by their numbers, one at least.
+        Those that models are tried on, one at least.
+    finer
+        Returns one of them on twice the voxels, for models that are nearly alike on these; None if there is none.
     settings
         How to fit, and what errors a cheaper model may have.
     """
-    fit, tolerance = settings.density, settings.selection.scattering_error
     richest, lights = light.scattering, light.lights
-    seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames.values()]
-    lights, found = _with_directions(lights, seen, fit)
+    seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames]
+    lights, found = _with_directions(lights, seen, settings.density)
     known: dict[Scattering, float] = {}
     # what single scattering lacks would be taken for light that is missing
-    if richest == "multiple" or (richest == "single" and tries_multiple(clip.scene) and not light.by_hand):
-        lights, known["multiple"], strength = _strengthened(lights, seen, fit)
+    if richest == "multiple" or (_tries_multiple(richest, frames) and not light.by_hand):
+        lights, known["multiple"], strength = _strengthened(lights, seen, settings.density)
         found += strength
     if light.by_hand:
         return replace(light, lights=lights, measured=(*found, given("scattering", richest)))
     seen = [frame.lit_by(lights) for frame in seen]
-
-    def finer() -> CoarseFrame | None:
-        return clip.frame(next(iter(frames)), times=2)
-
-    chosen, scattered = choose_scattering(seen, richest, fit, tolerance, known, finer)
-    around = _surroundings(seen, scattered, fit) if light.origin == "assumed" else None
+    chosen, scattered = _cheapest(seen, richest, known, finer, settings)
+    around = _surroundings(seen, scattered, settings.density) if light.origin == "assumed" else None
     if around is not None:
-        lights, scattered = around
-        chosen = "single"
+        (lights, scattered), chosen = around, "single"
     return replace(light, lights=lights, scattering=chosen, measured=(*found, scattered))
 
 
-def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], settings: Settings) -> Illumination:
-    """The light with what several cameras around the smoke show of a sun, whose scattering is to be measured then.
+def sunlight(
+    light: Illumination, frames: Sequence[CoarseFrame], scene: CompleteScene, settings: DensitySettings
+) -> Illumination:
+    """Return the light with what several cameras around the smoke show of a sun, whose scattering is to be measured.
 
     Parameters
     ----------
     light
         As it is measured.
-    clip
-        Of all cameras, none of which moves, at one exposure; in that light.
-    numbers
-        Of frames with smoke.
+    frames
+        What all cameras saw, none of which moves, at one exposure.
+    scene
+        In that light.
     settings
         How to fit.
     """
-    if light.origin == "given" or light.by_hand or light.scattering == "absorption" or len(clip.views) < 2:
+    if light.origin == "given" or light.by_hand or light.scattering == "absorption" or not frames:
         return light
-    frames = list(clip.smoky(numbers).values())
-    sky = find_sky(frames, clip.scene, settings.density) if frames else None
+    sky = find_sky(frames, scene, settings)
     if sky is None:
         return light
     figures = {
-        "views": len(clip.views),
+        "views": len(frames[0].views),
         "ambient_share": sky.ambient_share,
         "shading": sky.shading,
         "explained": sky.explained,
@@ -192,10 +193,10 @@ def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], sett
     if not sky.determined:
         kind = "light direction undetermined by several views"
         unknown = undetermined(kind, "light direction", figures, spread=sky.spread, tolerance=AMBIENT)
-        return replace(light, direction=unknown)
+        return replace(light, unknown=(light.unknown[0], unknown))
     named = ", ".join(f"{value:.2f}" for value in -sky.towards)
     direction = measured("light direction", named, figures, spread=sky.spread, tolerance=AMBIENT)
-    return Illumination(sky.lights(), "single", "measured", False, (), light.thickness, direction)
+    return Illumination(sky.lights(), "single", "views", False, (), (direction,))
 
 
 def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
@@ -204,11 +205,11 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
     the light leaves unexplained is its own fault.
     """
-    if light.thickness is None or light.sunny:
+    if light.origin in ("given", "views"):
         return ()
     if light.scattering in SHADOWED:
         kind = "light as behind the smoke"
-    elif light.origin == "measured":
+    elif light.origin == "texture":
         kind = "light as the smoke hides"
     else:
         kind = "light as the thickest smoke" if samples.smoky else "light without smoke"
@@ -237,22 +238,21 @@ def _with_directions(
         for light in lights
     )
     fitted = fit_half([frame.lit_by(few).scattered_by("unshadowed") for frame in frames], settings)
-    scattering = frames[0].scene.scattering
-    found = {light: _directions(light, fitted, scattering) for light in lights if isinstance(light, EnvironmentLight)}
-    taken = (replace(light, directions=found[light].value) if light in found else light for light in lights)
-    return tuple(taken), tuple(found.values())
-
-
-def _directions(light: EnvironmentLight, fitted: HalfFit, scattering: Scattering) -> Estimate[int]:
-    """How many directions stand for an environment: their number doubles until the picture hardly changes."""
-    if light.directions is not None:
-        return given("environment directions", light.directions)
 
     def picture(lights: tuple[DirectionalLight, ...]) -> Image:
-        return np.concatenate(fitted.lit(lights, scattering)).astype(np.float32)
+        return np.concatenate(fitted.lit(lights, frames[0].scene.scattering)).astype(np.float32)
 
-    count, change = lights_needed(light, picture)
-    return measured("environment directions", count, {"change": change}, tolerance=TOLERANCE)
+    taken: list[Light] = []
+    found: list[Estimate[Any]] = []
+    for light in lights:
+        if isinstance(light, EnvironmentLight) and light.directions is None:
+            count, change = lights_needed(light, picture)
+            found.append(measured("environment directions", count, {"change": change}, tolerance=TOLERANCE))
+            light = replace(light, directions=count)
+        elif isinstance(light, EnvironmentLight):
+            found.append(given("environment directions", light.directions))
+        taken.append(light)
+    return tuple(taken), tuple(found)
 
 
 def _strengthened(
@@ -283,6 +283,55 @@ def _strengthened(
     figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
     strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MAX_MISSING_LIGHT)
     return tuple(light.scaled(factor) for light in lights), found.error, (strength,)
+
+
+def _tries_multiple(richest: Scattering, frames: Sequence[CoarseFrame]) -> bool:
+    """Whether multiple scattering is tried as well: beside single scattering, by smoke that is isotropic."""
+    return richest == "single" and frames[0].scene.medium.anisotropy == 0.0
+
+
+def _cheapest(
+    frames: Sequence[CoarseFrame],
+    richest: Scattering,
+    known: Mapping[Scattering, float],
+    finer: Callable[[], CoarseFrame | None],
+    settings: Settings,
+) -> tuple[Scattering, Estimate[str]]:
+    """The cheapest model of scattering that finds as good a density as the richest, which judges all.
+
+    Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Of these two
+    multiple scattering is the richest only where its own picture of its own density is clearly nearer: smoke whose
+    picture both models fit is twice as dense in one as in the other (docs/experiments/multiple-scattering.md). Neither
+    is the cheaper answer, so that the tolerance of cheaper models says nothing here: errors are compared as a ratio, in
+    which what no model fits counts for both.
+
+    Errors of models, each of its own densities, are ``known`` as far as they are measured already.
+    """
+    fit, tolerance = settings.density, settings.selection.scattering_error
+    rivals: tuple[Scattering, ...] = ("single", "multiple") if _tries_multiple(richest, frames) else (richest,)
+    errors = {each: known[each] if each in known else held_out(frames, each, each, fit).error for each in rivals}
+    if len(rivals) > 1:
+        alike = errors["multiple"] >= MAX_ERROR_RATIO * errors["single"]
+        # the errors may be those of the coarse grid: either model seems to fit the smoke, or neither does
+        if alike and (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
+            frames = [larger.lit_by(frames[0].scene.lights)]
+            fit = replace(fit, descent_iterations=max(MAX_DESCENT_STEPS, fit.descent_iterations))
+            errors = {each: held_out(frames, each, each, fit).error for each in rivals}
+        if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:
+            richest = "multiple"
+    chosen = richest
+    for model in MODELS[: MODELS.index(richest)]:
+        errors[model] = min(held_out(frames, model, richest, fit).error, 1.0)  # which no smoke at all leaves
+        if errors[model] <= errors[richest] + tolerance:
+            chosen = model
+            break
+    figures: Figures = {f"error_{name}": value for name, value in errors.items()}
+    if len(errors) == 1:
+        return chosen, measured("scattering", chosen, figures, tolerance=tolerance)
+    # beside the one that it is compared with: the richest, or of that the next cheaper one
+    other = MODELS[MODELS.index(richest) - 1] if chosen == richest else richest
+    figures = {**figures, "error": errors[chosen], "other": other, "other_error": errors[other]}
+    return chosen, measured("compared scattering", chosen, figures, what="scattering", tolerance=tolerance)
 
 
 def _surroundings(

@@ -60,6 +60,11 @@ class SmokeSamples:
     textures: tuple[NDArray[np.float64], ...] = ()
 
     @property
+    def typical(self) -> tuple[int, ...]:
+        """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
+        return tuple(dict.fromkeys((*self.smoky[:1], *self.smoky[len(self.smoky) // 2 :][:1])))
+
+    @property
     def exposure(self) -> float:
         """Share by which the exposure of a sample differs from its background's at most."""
         return largest_change(list(self.gains.values()))

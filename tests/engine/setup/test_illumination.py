@@ -119,12 +119,16 @@ def scattering_of(shot: Shot) -> Estimate[str]:
 def leaves(monkeypatch):
     """Makes light from everywhere leave a given error; returns its strengths over that of what is behind the smoke."""
 
+    held_out = illumination.held_out
+
     def of(error: float) -> list[float]:
         tried = []
 
-        def known(frames, _, judge, __) -> HeldOut:
+        def known(frames, model, judge, settings) -> HeldOut:
             if judge == "multiple":  # of given lights
                 return HeldOut(1.0)
+            if judge == "unshadowed":  # of the light that is assumed
+                return held_out(frames, model, judge, settings)
             lights = frames[0].scene.lights
             radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
             tried.append(round(float(radiance.mean()) / BEHIND, 2))
@@ -164,9 +168,8 @@ def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
 
 
 def test_a_light_that_is_given_stays(lit, draft, leaves) -> None:
-    tried = leaves(1.0)
+    leaves(1.0)
     assert shot_of(lit, draft).scene.lights == lit.lights
-    assert not tried
 
 
 @pytest.mark.parametrize(
@@ -187,6 +190,6 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
         "scattering", {"error_absorption": error}, what="scattering", value="absorption", source="measured"
     )
     unknown = Estimate("unknown", what="smoke thickness", value="undetermined", source="assumed")
-    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), unknown, unknown)
+    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), (unknown, unknown))
     _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255))
     assert doubts == [Doubt("likely wrong light", {"error": error})] * said

@@ -16,14 +16,13 @@ from smokelift.footage.working_picture import working_picture
 from smokelift.output.images import write_image
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Domain, EnvironmentLight, Medium, Scene, SceneError, completed
-from smokelift.setup import illumination, scattering
+from smokelift.setup import illumination
 from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
+from smokelift.setup.prepare import velocity_coarsening
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
-from smokelift.velocity import VelocitySettings
 from tests.engine.setup.shots import shot_of
 
 
@@ -93,10 +92,9 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
 def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
     """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
     own = {"single": 0.028, "multiple": 0.026}
-    for module in (scattering, illumination):
-        monkeypatch.setattr(
-            module, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4)
-        )
+    monkeypatch.setattr(
+        illumination, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4)
+    )
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert choice.value == "single"
     own["single"] = 0.035  # by less than a cheaper model may add, which is no question here
@@ -117,8 +115,7 @@ def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
         return HeldOut(errors[judge] if fitted == judge else 0.4)
 
     monkeypatch.setattr("smokelift.setup.coarse.COARSE_SIDE", 8)
-    for module in (scattering, illumination):
-        monkeypatch.setattr(module, "held_out", known)
+    monkeypatch.setattr(illumination, "held_out", known)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert fitted_on == asked
     assert choice.value == "multiple"
@@ -148,7 +145,7 @@ def test_shadows_need_a_light(silhouette, draft) -> None:
 def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
     assert shot.scene.scattering == "single"
-    assert [choice.what for choice in shot.estimates] == ["resolution"]
+    assert [choice.what for choice in shot.estimates] == ["resolution", "velocity grid coarsening"]
 
 
 # coarse boxes and pictures
@@ -161,7 +158,7 @@ def test_a_coarse_box_stays_in_the_box(resolution, pixels) -> None:
     """A light beside the box must not come to stand in it; voxels are cubes, few, and not smaller than before."""
     x, y, z = resolution
     domain = Domain((0.0, 0.0, 0.0), (0.1 * x, 0.1 * y, 0.1 * z), resolution)
-    coarse = coarse_domain(domain, pixels)
+    coarse = coarse_domain(domain, pixels, COARSE_SIDE)
     assert max(coarse.resolution) <= max(COARSE_SIDE, 4)
     assert coarse.voxel_size >= domain.voxel_size * (1 - 1e-6)
     assert np.all(np.array(coarse.min) >= np.array(domain.min) - 1e-9)
@@ -170,7 +167,7 @@ def test_a_coarse_box_stays_in_the_box(resolution, pixels) -> None:
 
 def test_a_usual_box_keeps_its_corners() -> None:
     domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (64, 64, 96))
-    assert coarse_domain(domain, 4.0) == replace(domain, resolution=(16, 16, 24))
+    assert coarse_domain(domain, 4.0, COARSE_SIDE) == replace(domain, resolution=(16, 16, 24))
 
 
 def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
@@ -187,7 +184,6 @@ def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
     (seen,) = coarse_frame([view], 0, scene).views
     np.testing.assert_allclose(seen.fitted, 0.2, atol=1e-5)
     np.testing.assert_allclose(seen.held_out, 0.5, atol=1e-5)
-    assert seen.held_out is seen.held_out  # which is made once
     assert 0.3 < seen.picture.mean() < 0.4
     dimmed = seen.over(np.full(3, 2, np.float32))
     np.testing.assert_allclose(dimmed.held_out, 0.25, atol=1e-5)
@@ -198,34 +194,15 @@ def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
 # velocity
 
 
-@pytest.mark.parametrize(("motion", "levels"), [(0.0, 1), (0.8, 1), (0.9, 2), (2.4, 2), (2.5, 3), (9.0, 3), (500.0, 3)])
-def test_grids_reach_as_far_as_the_smoke_goes(motion, levels) -> None:
-    assert levels_for(motion) == levels
-
-
-def test_faster_smoke_gets_more_grids(plume) -> None:
-    scene, finer = plume.scene, replace(plume.scene, domain=replace(plume.scene.domain, resolution=(48, 48, 64)))
-    slow, fast = ([plume.blob(scene, 0.6), plume.blob(scene, 0.6 + rise)] for rise in (0.03, 0.25))
-    found = [
-        choose_levels([pair], scene.domain, final.domain, VelocitySettings())
-        for pair in (slow, fast)
-        for final in (scene, finer)
-    ]
-    motions = [choice.figures["voxels_a_frame"] for choice in found]
-    assert motions[1] == pytest.approx(2 * motions[0])
-    assert motions[2] > 2 * motions[0]
-    assert [choice.value for choice in found] == [levels_for(motion) for motion in motions]
-
-
 def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
     """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
-    free = draft.velocity
     shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
-    choices = [choose_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), free, 30) for shape in shapes]
+    choices = [velocity_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), draft) for shape in shapes]
     assert [choice.value for choice in choices] == [0, 1, 2, 3, 4, 1]
     assert [choice.figures["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
-    by_hand = choose_coarsening(plume.scene.domain, replace(free, coarsening=0), 30)
-    assert (by_hand.value, by_hand.source) == (0, "given")
+    by_hand = replace(draft, velocity=replace(draft.velocity, coarsening=0))
+    choice = velocity_coarsening(plume.scene.domain, by_hand)
+    assert (choice.value, choice.source) == (0, "given")
 
 
 # environments

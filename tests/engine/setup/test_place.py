@@ -8,7 +8,7 @@ import pytest
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
 from smokelift.density.screen import view_frame
 from smokelift.scene import Inlet, as_matrix
-from smokelift.setup.place import place_estimate
+from smokelift.setup.prepare import place_estimate
 from smokelift.setup.settings import Settings
 from tests.engine.setup.shots import shot_of
 

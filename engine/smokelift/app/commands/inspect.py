@@ -21,9 +21,7 @@ from smokelift.report.page import PAGE_KINDS, Fact, write_page
 from smokelift.report.provenance import made_up, record
 from smokelift.report.workload import Workload
 from smokelift.scene import Background, Scene, scene_to_dict
-from smokelift.setup.estimate import Grid
 from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import QUALITIES
 from smokelift.setup.shot import Shot
 
 
@@ -99,10 +97,11 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _qualities(shot: Shot, work: Workload) -> dict[str, dict[str, Any]]:
-    """What each quality takes of this clip, and what it loses of it; the same where the resolution is given."""
-    grids = shot.qualities or dict.fromkeys(QUALITIES, Grid(shot.scene.domain.resolution, None))
-    costs = {quality: asdict(estimate_cost(grid.resolution, work)) for quality, grid in grids.items()}
-    return {quality: {**asdict(grids[quality]), **cost} for quality, cost in costs.items()}
+    """What each quality takes of this clip, and what it loses of it."""
+    return {
+        quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work))}
+        for quality, grid in shot.qualities.items()
+    }
 
 
 def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:

@@ -1,4 +1,4 @@
-"""What the smoke's pixels say of its source radiance: how bright smoke of any thickness is, and of what colour.
+"""The smoke as a medium: of the scene, or the usual one in the colour that its pixels show; and its source radiance.
 
 A pixel shows T behind + (1 - T) source: it lies between its background and the source radiance, which is the light
 times the smoke's colour. So the source lies on the line from the background through the smoke, beyond the thickest
@@ -9,15 +9,25 @@ the smoke, which stands in the same light. Figures: docs/experiments/smoke-colou
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
-from smokelift.checks import Doubt
+from smokelift.checks import Doubt, Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.fire import CLIPPED_VALUE
 from smokelift.footage.images import brightest_channel
+from smokelift.render import scene_optics
+from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
 from smokelift.scene.checks import Vector
 from smokelift.setup.estimate import Estimate, measured, undetermined
+from smokelift.setup.first_estimate import FirstEstimate
 from smokelift.setup.smoke import SmokeSamples
+
+OPTICAL_DEPTH_AT_ONE = 5.0
+"""Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid. A convention,
+since a picture shows density times extinction."""
 
 SOURCE_EXCESS = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
@@ -40,8 +50,56 @@ MIN_SOURCE_VALUE = 0.01
 WHITE: Vector = (1.0, 1.0, 1.0)
 """Colour of grey smoke."""
 
-PLACES = 256
-"""Points of the line that are compared with the light."""
+
+def find_medium(
+    scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain
+) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
+    """Complete the medium.
+
+    Parameters
+    ----------
+    scene
+        With what is known of the medium, and of the lights: smoke has their colour times its own.
+    estimate
+        What the clip shows.
+    camera, domain
+        The view and the box in whose middle the colour of the light is computed.
+
+    Returns
+    -------
+    medium
+        With the colour of its flame, where fire burns.
+    estimates
+        What was measured for it.
+    remarks
+        What was assumed, and whether the smoke has more than one colour.
+    """
+    medium, samples, fire = scene.medium, estimate.samples, estimate.fire
+    estimates: list[Estimate[Any]] = []
+    remarks: list[Remark] = []
+    if medium is None:
+        medium = Medium(extinction=OPTICAL_DEPTH_AT_ONE / min(np.subtract(domain.max, domain.min).tolist()))
+        remarks.append(Remark("assumed medium", {"extinction": medium.extinction, "albedo": medium.albedo}))
+        color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
+        medium = replace(medium, color=color)
+        estimates.append(coloured)
+    off = degrees_off_one_colour(samples)
+    if off >= COLOURED:
+        remarks.append(Doubt("smoke of several colours", {"degrees": off}))
+    if fire is not None:
+        red, green, blue = color = medium.flame_color or fire.color
+        figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
+        estimates.append(measured("fire", f"{fire.share:.3f}", figures))
+        medium = replace(medium, flame_color=color)
+    return medium, tuple(estimates), tuple(remarks)
+
+
+def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, grey: Medium) -> Doubles:
+    """Colour (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
+    # only the sum of an environment's directions counts, so one stands for all
+    few = tuple(replace(each, directions=1) if isinstance(each, EnvironmentLight) else each for each in lights)
+    source = scene_optics(CompleteScene(camera, domain, grey, few, Background(), "single")).unshadowed_source()
+    return source / source.max() if source.max() > 0 else np.ones(3)
 
 
 def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> Doubles:
@@ -108,22 +166,19 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
     return (red, green, blue), measured("smoke colour", named, figures, tolerance=COLOURED)
 
 
-def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
-    """Return a doubt about smoke of more than one colour before black.
+def degrees_off_one_colour(samples: SmokeSamples) -> float:
+    """Return by how much the light of smoke differs from one colour; 0 before anything but black, or if too faint.
 
     Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
     explains the most of the light is another colour's. White that is clipped has none.
     """
     shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
     if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
-        return ()
+        return 0.0
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
-        return ()
+        return 0.0
     along = np.linalg.eigvalsh(shown.T @ shown)
-    off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
-    if off < COLOURED:
-        return ()
-    return (Doubt("smoke of several colours", {"degrees": off}),)
+    return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
 
 
 def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
@@ -159,7 +214,7 @@ def _sources(behind: Doubles, seen: Doubles) -> Doubles:
     change = seen - behind
     falling = change < 0
     most = min((behind[falling] / -change[falling]).min(), 1e3) if falling.any() else 1e3
-    return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), PLACES)[:, None] * change, 0))
+    return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), 256)[:, None] * change, 0))
 
 
 def _degrees(colours: Doubles, other: Doubles) -> Doubles:
