@@ -143,14 +143,6 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if strength is not None and given.lights:
         return (Fact("light", f"{strength.value} times as strong as given", "measured", sentence(strength)),)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    direction = _estimate(shot, "light direction")
-    if direction is not None and direction.value != UNDETERMINED:
-        return (
-            Fact("light strength", f"smoke of radiance {colour}", "measured", "Light strength: as the views show it."),
-            _chosen(shot, "light direction", "sun's direction", str(direction.value), False),
-            Fact("sun's colour", "that of all light", UNDETERMINED),
-            Fact("ambient share", f"{direction.figures['ambient_share']:.0%}", "measured"),
-        )
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
     hides, origin = "as the light asks for", UNDETERMINED
@@ -159,9 +151,9 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     return (
         Fact("light strength", f"smoke of radiance {colour}", origin, _said(shot, "light")),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
-        _chosen(shot, "light direction", "sun's direction", "no sun", False),
-        _chosen(shot, "light direction", "sun's colour", "that of all light", False),
-        _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
+        Fact("sun's direction", "no sun", UNDETERMINED, "Suns from many sides look the same. Give the lights."),
+        Fact("sun's colour", "that of all light", UNDETERMINED),
+        Fact("ambient share", "all light is from everywhere", UNDETERMINED),
     )
 
 

@@ -215,20 +215,6 @@ SENTENCES: Mapping[str, str] = {
         "Smoke thickness: undetermined, because the texture behind it shows it only to {spread:.0%} ({tolerance:.0%} "
         "or less is needed). Thinner smoke in stronger light looks the same. Give the lights if you know them."
     ),
-    "light direction": (
-        "Light direction: {value}, give or take 20 degrees, as the {views} views show together. {ambient_share:.0%} of "
-        "the light comes from everywhere."
-    ),
-    "light direction undetermined by one view": (
-        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. In one "
-        "view suns from many sides look the same. Give the lights if you know them."
-    ),
-    "light direction undetermined by several views": (
-        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. "
-        "{ambient_share:.0%} of the light from everywhere explains the {views} views best, but leaves {shading:.0%} of "
-        "the smoke's light. A sun explains {explained:.0%} of that rest, and its direction is right to {spread:.0f} "
-        "degrees. Give the lights if you know them."
-    ),
     "scattering": "Scattering: {value}.",
     "compared scattering": (
         "Scattering: {value}; pixels that the fit leaves out differ by {error:.1%} of the smoke's contrast, with "
@@ -237,9 +223,6 @@ SENTENCES: Mapping[str, str] = {
     "scattering in light from everywhere": (
         "Scattering: {value}, in light from everywhere, because no light is given; pixels that the fit leaves out "
         "differ by {error:.1%} of the smoke's contrast, with {other} by {other_error:.1%}."
-    ),
-    "environment directions": (
-        "Environment: {value} directions; doubling them last changed the picture by {change:.1%}."
     ),
     "gain of a view": (
         "It shows the smoke {value} times (red, green, blue) as bright as the input. This is evened out: the pictures "

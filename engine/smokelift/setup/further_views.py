@@ -156,7 +156,7 @@ def _exposure(
     lit: bool,
     settings: Settings,
 ) -> tuple[Gain | None, tuple[Estimate[str], ...]]:
-    """By how much view ``number``, from 1, is brighter than the input (3,); None where no gain is better than none."""
+    """The gain (3,) of view ``number``, from 1, over the input; None where no gain is better than none."""
     frames = coarse_frames((front, view), numbers, scene)
     if not frames or scene.scattering == "absorption":
         return None, ()

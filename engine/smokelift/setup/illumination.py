@@ -2,9 +2,8 @@
 
     what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   first_light
     coarse densities in it -> its strength, the model of scattering, shadows without a known light      measured_light
-    cameras around the smoke -> a sun where no light is given                                           sunlight
 
-All but the first are judged by `smokelift.setup.held_out`. Figures: docs/selection.md.
+The second is judged by `smokelift.setup.held_out`. Figures: docs/selection.md.
 """
 
 from __future__ import annotations
@@ -14,20 +13,19 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smokelift.checks import Doubt, Figures, Remark
+from smokelift.checks.array_types import Doubles
 from smokelift.density import DensitySettings
 from smokelift.footage.noise import Noise
-from smokelift.render import Image
-from smokelift.render.environment_count import MIN_LIGHTS, TOLERANCE, lights_needed
-from smokelift.scene import SHADOWED, CompleteScene, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
+from smokelift.render.environment_count import environment_count
+from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import CoarseFrame
-from smokelift.setup.estimate import Estimate, given, measured, undetermined
-from smokelift.setup.held_out import HeldOut, fit_half, held_out
+from smokelift.setup.estimate import Estimate, given, measured
+from smokelift.setup.geometry import Geometry
+from smokelift.setup.held_out import HeldOut, held_out
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
-from smokelift.setup.sky import AMBIENT, directional, find_sky, light_around
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.thickness import smoke_thickness
 
@@ -66,6 +64,10 @@ MAX_QUIET_NOISE = 2 / 255
 """Noise up to which what is left is not the noise's (docs/experiments/surroundings.md)."""
 
 
+AXES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
+"""Directions of travel that stand for all: 14 find no other density (docs/experiments/surroundings.md)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Illumination:
     """The light of a shot and how its smoke scatters it.
@@ -77,53 +79,61 @@ class Illumination:
     scattering
         The chosen model; until it is measured the richest that the light allows.
     origin
-        Of the lights: the scene gives them (or none is needed), texture behind the smoke shows how strong they are,
-        several views show a sun, or nothing shows them.
+        Of the lights: the scene gives them (or none is needed), texture behind the smoke shows how strong they are, or
+        nothing does.
     by_hand
         Whether the user gives the model of scattering.
     measured
         What was chosen on coarse densities.
-    unknown
-        Thickness of the smoke and direction of the light, where that is not given.
+    thickness
+        What is known of the smoke's, where no light is given.
     """
 
     lights: tuple[Light, ...]
     scattering: Scattering
-    origin: Literal["given", "texture", "views", "assumed"]
+    origin: Literal["given", "texture", "assumed"]
     by_hand: bool
     measured: tuple[Estimate[Any], ...] = ()
-    unknown: tuple[Estimate[str], ...] = ()
+    thickness: tuple[Estimate[str], ...] = ()
 
     @property
     def estimates(self) -> tuple[Estimate[Any], ...]:
         """All that was measured of it, if its model of scattering asks for light."""
-        return self.measured if self.scattering == "absorption" else (*self.measured, *self.unknown)
+        return self.measured if self.scattering == "absorption" else (*self.measured, *self.thickness)
 
 
 def first_light(
-    given: tuple[Light, ...], scattering: Scattering | None, medium: Medium, samples: SmokeSamples
+    lights: tuple[Light, ...], scattering: Scattering | None, geometry: Geometry, medium: Medium, samples: SmokeSamples
 ) -> Illumination:
-    """The light of a scene, or one from everywhere without shadows as strong as the clip shows.
+    """Return the light of a scene, or one from everywhere without shadows as strong as the clip shows.
+
+    Every environment gets the number of directions that stand for it.
 
     Raises
     ------
     ValueError
         If the user wants shadows without a light to cast them.
     """
-    if scattering in SHADOWED and not given:
+    if scattering in SHADOWED and not lights:
         raise ValueError(
             f'Scattering "{scattering}" needs a light that casts the shadows; give one, or leave scattering to "auto".'
         )
-    richest = scattering or ("absorption" if medium.albedo == 0 else "single" if given else "unshadowed")
+    richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     by_hand = scattering is not None
-    if given or richest == "absorption":
-        return Illumination(given, richest, "given", by_hand)
+    if lights or richest == "absorption":
+        return Illumination(tuple(_countable(each, geometry, medium) for each in lights), richest, "given", by_hand)
     source, thickness = smoke_thickness(samples.textures)
-    radiance = source_radiance(samples, source)
     share = np.array(medium.albedos) / (4 * np.pi)
-    sun = directional(np.array((0.0, 0.0, 1.0)), np.divide(radiance, share, out=np.zeros(3), where=share > 0))
-    unknown = undetermined("light direction undetermined by one view", "light direction")
-    return Illumination((sun,), richest, "assumed" if source is None else "texture", by_hand, (), (thickness, unknown))
+    red, green, blue = np.divide(source_radiance(samples, source), share, out=np.zeros(3), where=share > 0).tolist()
+    sun = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
+    return Illumination((sun,), richest, "assumed" if source is None else "texture", by_hand, (), (thickness,))
+
+
+def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
+    """The light, as so many directions if it is an environment."""
+    if not isinstance(light, EnvironmentLight) or light.directions is not None:
+        return light
+    return replace(light, directions=environment_count(light, geometry.camera.at(0), geometry.domain, medium))
 
 
 def measured_light(
@@ -147,12 +157,11 @@ def measured_light(
     """
     richest, lights = light.scattering, light.lights
     seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames]
-    lights, found = _with_directions(lights, seen, settings.density)
+    found: tuple[Estimate[Any], ...] = ()
     known: dict[Scattering, float] = {}
     # what single scattering lacks would be taken for light that is missing
     if richest == "multiple" or (_tries_multiple(richest, frames) and not light.by_hand):
-        lights, known["multiple"], strength = _strengthened(lights, seen, settings.density)
-        found += strength
+        lights, known["multiple"], found = _strengthened(lights, seen, settings.density)
     if light.by_hand:
         return replace(light, lights=lights, measured=(*found, given("scattering", richest)))
     seen = [frame.lit_by(lights) for frame in seen]
@@ -163,40 +172,10 @@ def measured_light(
     return replace(light, lights=lights, scattering=chosen, measured=(*found, scattered))
 
 
-def sunlight(
-    light: Illumination, frames: Sequence[CoarseFrame], scene: CompleteScene, settings: DensitySettings
-) -> Illumination:
-    """Return the light with what several cameras around the smoke show of a sun, whose scattering is to be measured.
-
-    Parameters
-    ----------
-    light
-        As it is measured.
-    frames
-        What all cameras saw, none of which moves, at one exposure.
-    scene
-        In that light.
-    settings
-        How to fit.
-    """
-    if light.origin == "given" or light.by_hand or light.scattering == "absorption" or not frames:
-        return light
-    sky = find_sky(frames, scene, settings)
-    if sky is None:
-        return light
-    figures = {
-        "views": len(frames[0].views),
-        "ambient_share": sky.ambient_share,
-        "shading": sky.shading,
-        "explained": sky.explained,
-    }
-    if not sky.determined:
-        kind = "light direction undetermined by several views"
-        unknown = undetermined(kind, "light direction", figures, spread=sky.spread, tolerance=AMBIENT)
-        return replace(light, unknown=(light.unknown[0], unknown))
-    named = ", ".join(f"{value:.2f}" for value in -sky.towards)
-    direction = measured("light direction", named, figures, spread=sky.spread, tolerance=AMBIENT)
-    return Illumination(sky.lights(), "single", "views", False, (), (direction,))
+def light_around(radiance: Doubles) -> tuple[DirectionalLight, ...]:
+    """Return light from everywhere of a radiance (3,), in W/m^2/sr."""
+    red, green, blue = (4 * np.pi * radiance / len(AXES)).tolist()
+    return tuple(DirectionalLight(way, (red, green, blue)) for way in AXES)
 
 
 def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
@@ -205,7 +184,7 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
     the light leaves unexplained is its own fault.
     """
-    if light.origin in ("given", "views"):
+    if light.origin == "given":
         return ()
     if light.scattering in SHADOWED:
         kind = "light as behind the smoke"
@@ -224,35 +203,6 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
         return (taken,)
     return taken, Doubt("likely wrong light", {"error": error})
-
-
-def _with_directions(
-    lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], tuple[Estimate[Any], ...]]:
-    """Give every environment as many directions as change the picture of the clip's own smoke."""
-    if not any(isinstance(light, EnvironmentLight) for light in lights):
-        return lights, ()
-    # without shadows the fewest do, since only the sum of the light counts
-    few = tuple(
-        replace(light, directions=light.directions or MIN_LIGHTS) if isinstance(light, EnvironmentLight) else light
-        for light in lights
-    )
-    fitted = fit_half([frame.lit_by(few).scattered_by("unshadowed") for frame in frames], settings)
-
-    def picture(lights: tuple[DirectionalLight, ...]) -> Image:
-        return np.concatenate(fitted.lit(lights, frames[0].scene.scattering)).astype(np.float32)
-
-    taken: list[Light] = []
-    found: list[Estimate[Any]] = []
-    for light in lights:
-        if isinstance(light, EnvironmentLight) and light.directions is None:
-            count, change = lights_needed(light, picture)
-            found.append(measured("environment directions", count, {"change": change}, tolerance=TOLERANCE))
-            light = replace(light, directions=count)
-        elif isinstance(light, EnvironmentLight):
-            found.append(given("environment directions", light.directions))
-        taken.append(light)
-    return tuple(taken), tuple(found)
 
 
 def _strengthened(
@@ -353,7 +303,7 @@ def _surroundings(
     if error <= tolerance or behind.max() < MIN_SOURCE_VALUE:
         return None
 
-    def left(radiance: NDArray[np.float64]) -> HeldOut:
+    def left(radiance: Doubles) -> HeldOut:
         return held_out([frame.lit_by(light_around(radiance)) for frame in frames], "single", "single", settings)
 
     radiance = behind / max(frames[0].scene.medium.albedos)

@@ -19,7 +19,7 @@ from smokelift.setup.estimate import Estimate, given, measured, undetermined
 from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import clip_lenses, find_geometry
-from smokelift.setup.illumination import first_light, light_remarks, measured_light, sunlight
+from smokelift.setup.illumination import first_light, light_remarks, measured_light
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -57,7 +57,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium, medium_remarks = find_medium(scene, estimate, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    light = first_light(scene.lights, asked, medium, samples)
+    light = first_light(scene.lights, asked, geometry, medium, samples)
     complete = CompleteScene(
         camera=camera,
         domain=domain,
@@ -77,12 +77,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         light = measured_light(light, coarse, finer, settings)
         complete = replace(complete, lights=light.lights, scattering=light.scattering)
     others, gains, view_remarks = open_views(first, complete, samples.typical, bool(scene.lights), settings)
-    if coarse and others and estimate.fire is None:
-        around = coarse_frames((first, *others), samples.typical, complete)
-        light = sunlight(light, around, complete, settings.density)
-        if light.origin == "views":
-            light = measured_light(light, coarse, finer, settings)
-        complete = replace(complete, lights=light.lights, scattering=light.scattering)
     coarsening: tuple[Estimate[int], ...] = ()
     if settings.selection.measure:
         coarsening = (velocity_coarsening(domain, settings),)

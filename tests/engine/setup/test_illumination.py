@@ -13,10 +13,9 @@ from smokelift.scene import Background, DirectionalLight, Medium, Scene
 from smokelift.setup import illumination
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.illumination import Illumination, light_remarks
+from smokelift.setup.illumination import Illumination, light_around, light_remarks
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.setup.sky import light_around
 from tests.engine.setup.shots import shot_of
 
 # a light that is not given
@@ -151,8 +150,13 @@ def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(li
     assert choice.kind == "scattering in light from everywhere"
     radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
     assert radiance == pytest.approx(BEHIND * np.array([1.2, 1.0, 0.8]), rel=0.01)
-    assert next(found.value for found in shot.estimates if found.what == "light direction") == "undetermined"
     assert "light as behind the smoke" in [remark.kind for remark in shot.remarks]
+
+
+def test_light_around_has_its_radiance_and_no_direction() -> None:
+    lights = light_around(np.array([0.2, 0.3, 0.4]))
+    assert np.allclose(np.sum([light.irradiance for light in lights], 0) / (4 * np.pi), (0.2, 0.3, 0.4))
+    assert np.allclose(np.sum([light.direction for light in lights], 0), 0)
 
 
 def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
@@ -190,6 +194,6 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
         "scattering", {"error_absorption": error}, what="scattering", value="absorption", source="measured"
     )
     unknown = Estimate("unknown", what="smoke thickness", value="undetermined", source="assumed")
-    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), (unknown, unknown))
+    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), (unknown,))
     _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255))
     assert doubts == [Doubt("likely wrong light", {"error": error})] * said

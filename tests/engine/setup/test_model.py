@@ -14,7 +14,6 @@ from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
 from smokelift.footage.working_picture import working_picture
 from smokelift.output.images import write_image
-from smokelift.render import scene_optics
 from smokelift.scene import Background, Domain, EnvironmentLight, Medium, Scene, SceneError, completed
 from smokelift.setup import illumination
 from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
@@ -213,37 +212,19 @@ def environment(folder: Path, radiance: np.ndarray, **options: int) -> Environme
     return EnvironmentLight(folder / "sky.exr", **options)
 
 
-def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp_path) -> None:
-    """A lamp needs fewer than a sky with a bright half; the number is part of the scene from then on."""
-    lamp, sky = np.zeros((32, 64, 3), np.float32), np.full((32, 64, 3), 0.3, np.float32)
-    lamp[8, 40] = 400
-    sky[4:12, 16:40] = 3
-    forward = replace(plume.scene, medium=Medium(8.0, 0.9, 0.6))
-    counts = {}
-    for name, radiance in (("lamp", lamp), ("sky", sky)):
-        (tmp_path / name).mkdir()
-        light = environment(tmp_path / name, radiance)
-        scene = plume.write(tmp_path / name, plume.densities[1:3], replace(forward, lights=(light,)))
-        shot = shot_of(scene, draft)
-        choice = chosen(shot, "environment directions")
-        counts[name] = choice.value
-        assert shot.scene.lights == (replace(light, directions=choice.value),)
-        assert len(shot.optics.lights) <= choice.value
-        assert choice.figures["change"] <= choice.tolerance
-        assert choice.source == "measured"
-    assert counts["lamp"] < counts["sky"]
-
-
-def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
-    light = environment(tmp_path, np.full((8, 16, 3), 0.5, np.float32), directions=6)
-    scene = replace(plume.scene, lights=(light,))
+def test_an_environment_gets_its_directions(plume, draft, tmp_path) -> None:
+    """The number is part of the scene from then on; by hand it is what is said."""
+    sky = environment(tmp_path, np.full((8, 16, 3), 0.5, np.float32))
+    scene = plume.write(tmp_path / "clip", plume.densities[1:3], replace(plume.scene, lights=(sky,)))
+    (light,) = shot_of(scene, draft).scene.lights
+    assert light == replace(sky, directions=light.directions) and light.directions >= 4
+    scene = replace(plume.scene, lights=(replace(sky, directions=6),))
     scene.save(tmp_path / "scene.toml")
     assert Scene.load(tmp_path / "scene.toml") == scene
-    assert len(scene_optics(completed(scene)).lights) == 6
-    choice = chosen(shot_of(scene, draft), "environment directions")
-    assert (choice.value, choice.source) == (6, "given")
+    shot = shot_of(scene, draft)
+    assert shot.scene.lights == scene.lights and len(shot.optics.lights) == 6
     with pytest.raises(SceneError, match="directions must be a whole number from 1 to 4096, not 0"):
-        replace(light, directions=0)
+        replace(sky, directions=0)
 
 
 # what is said and kept

@@ -68,10 +68,9 @@ def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
 
 
 def test_the_light_that_nothing_tells_is_called_undetermined(estimated) -> None:
-    """Before black neither its strength nor where it comes from, in estimates that are said and kept."""
-    known = {estimate.what: estimate for estimate in estimated.estimates}
-    assert known["smoke thickness"].value == known["light direction"].value == UNDETERMINED
-    assert known["light direction"].kind == "light direction undetermined by one view"
+    """Before black, with how thick the smoke is, in an estimate that is said and kept."""
+    (thickness,) = [estimate for estimate in estimated.estimates if estimate.what == "smoke thickness"]
+    assert thickness.value == UNDETERMINED
 
 
 def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
