@@ -13,10 +13,10 @@ from smokelift.report.sentences import sentence
 from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.backdrop_remarks import BLACK
 from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import unknown_part
 
 CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
 """Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
@@ -122,7 +122,8 @@ def _exposure(shot: Shot, plate: Plate) -> Fact:
     if not shows_exposure(small(plate.image)):
         how = "The background is too dark or too bright to show it, so what flickers is taken for smoke."
         return Fact("exposure", "taken to be steady", UNDETERMINED, how)
-    value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
+    changes = [remark.figures["change"] for remark in shot.remarks if remark.kind == "exposure"]
+    value = f"changes by up to {changes[0]:.0%}, evened out" if changes else "steady"
     return Fact("exposure", value, "measured", "Measured on what does not move, against the background.")
 
 

@@ -9,7 +9,7 @@ from smokelift.footage.backdrop import Backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
 from smokelift.footage.quantiser import COARSE
-from smokelift.setup.smoke import SAMPLE_FRAMES, SmokeSamples, unknown_part
+from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, unknown_part
 
 BLACK = 0.001
 """Linear radiance below which a background is called black: less than a third of a step of 8 bit video from 0."""
@@ -29,6 +29,17 @@ MIN_SAME_FRAMES = 4
 
 LARGE_NOISE = 6 / 255
 """Noise in sRGB values from which on the background may be what moves (docs/experiments/background.md)."""
+
+
+def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
+    """Return what was assumed or noticed of a clip before a background that may be given, the doubts among it."""
+    found, change = estimate.found, estimate.samples.exposure
+    return (
+        *backdrop_remarks(found),
+        *((Remark("background unused"),) if found.source == "alpha" and given else ()),
+        *doubts(found, estimate.samples, given),
+        *(() if change == 0 else (Remark("exposure", {"change": change}),)),
+    )
 
 
 def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
@@ -53,11 +64,6 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
         Remark("black background") if black else Remark("background of one colour", {"color": (red, green, blue)}),
         *((Remark("background with objects", {"share": other}),) if other else ()),
     )
-
-
-def exposure_remarks(change: float) -> tuple[Remark, ...]:
-    """Return a remark on a clip whose exposure changes by a share."""
-    return () if change == 0 else (Remark("exposure", {"change": change}),)
 
 
 def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, ...]:

@@ -92,18 +92,9 @@ def coarse_frames(views: Sequence[ShotView], numbers: Sequence[int], scene: Comp
 
 
 def coarse_frame(views: Sequence[ShotView], number: int, scene: CompleteScene, times: int = 1) -> CoarseFrame | None:
-    """Make a frame coarse; None if one of the cameras does not see the domain.
+    """Make a frame coarse, on a grid so many times finer than `COARSE_SIDE` asks for.
 
-    Parameters
-    ----------
-    views
-        The cameras, the input first.
-    number
-        Of the frame.
-    scene
-        With the fine domain.
-    times
-        By how much the grid is finer than `COARSE_SIDE` asks for.
+    None if one of the cameras, of which the input is the first, does not see the domain.
     """
     try:
         pixels = voxel_width(views[0].camera.at(number), scene.domain)
@@ -117,14 +108,7 @@ def coarse_frame(views: Sequence[ShotView], number: int, scene: CompleteScene, t
 def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
     """Return the box with fewer voxels: a whole number of fine ones in each if possible, else a little less of it.
 
-    Parameters
-    ----------
-    domain
-        The box with its own voxels.
-    pixels
-        Pixels of the clip along one of them.
-    most_voxels
-        Voxels along the longest side at most.
+    Of the fine ones each is so many pixels of the clip wide; ``most_voxels`` lie along the longest side.
     """
     longest = max(domain.resolution)
     most = min(most_voxels, int(longest * pixels / PIXELS))

@@ -2,20 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from smokelift.checks import Remark
+import numpy as np
+from numpy.typing import NDArray
+
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
+from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
-from smokelift.footage.steady import steady
+from smokelift.footage.images import area_average
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plates
+from smokelift.footage.steady import exposures, steady
 from smokelift.footage.turning import Turns
 from smokelift.scene import Background, Camera
 from smokelift.scene.checks import Vector
-from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, exposure_remarks
-from smokelift.setup.smoke import SmokeSamples, sample_smoke
+from smokelift.setup.thickness import seen_texture
+
+SAMPLE_FRAMES, SAMPLE_SIDE = 16, 320
+"""Frames that are examined, and pixels along their longer side."""
+
+UNKNOWN = 0.5
+"""Confidence of a plate below which what is behind the smoke is unknown there."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmokeSamples:
+    """Where and how bright smoke is in some frames, at reduced size.
+
+    Attributes
+    ----------
+    scale
+        Full pixels to a reduced one.
+    bounds
+        Left, top, right and bottom of ``covered`` in pixels of the camera's full picture.
+    covered : (rows, columns) bool
+        Pixels with smoke in at least one sample.
+    unknown : (rows, columns) bool
+        Pixels whose background is unknown, likewise.
+    colours : (n, 3)
+        Radiance of all smoke pixels.
+    behind : (n, 3)
+        Background radiance at the same pixels.
+    smoky
+        Numbers of the frames with smoke, those with the most first.
+    gains
+        By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
+    textures
+        What the samples with smoke show of the texture behind it.
+    """
+
+    scale: float
+    bounds: tuple[float, float, float, float]
+    covered: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+    colours: NDArray[np.float32]
+    behind: NDArray[np.float32]
+    smoky: tuple[int, ...]
+    gains: Mapping[int, NDArray[np.float32]]
+    textures: tuple[NDArray[np.float64], ...] = ()
+
+    @property
+    def typical(self) -> tuple[int, ...]:
+        """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
+        return tuple(dict.fromkeys((*self.smoky[:1], *self.smoky[len(self.smoky) // 2 :][:1])))
+
+    @property
+    def exposure(self) -> float:
+        """Share by which the exposure of a sample differs from its background's at most."""
+        return largest_change(list(self.gains.values()))
+
+    @property
+    def brightens(self) -> bool:
+        """Whether smoke adds more light to what is behind it than it takes away."""
+        change = np.sum(self.colours - self.behind, -1)
+        return bool(np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +115,12 @@ class FirstEstimate:
         Its smoke.
     fire
         None where none burns.
-    remarks
-        What was assumed or noticed, and why the result may be nothing, or wrong.
     """
 
     clip: Clip
     found: Backdrop
     samples: SmokeSamples
     fire: Fire | None
-    remarks: tuple[Remark, ...]
 
     @property
     def turns(self) -> Turns | None:
@@ -81,11 +142,50 @@ def first_estimate(
         light = firelight(exposed, doused)
         fire, exposed = Fire(share, light, fire_colour(exposed, light)), doused
         samples = replace(sample_smoke(*found.still(doused), corner), gains=samples.gains)
-    unused = found.source == "alpha" and background is not None
-    remarks = (
-        *backdrop_remarks(found),
-        *((Remark("background unused"),) if unused else ()),
-        *doubts(found, samples, background is not None),
-        *exposure_remarks(samples.exposure),
-    )
-    return FirstEstimate(exposed, found, samples, fire, remarks)
+    return FirstEstimate(exposed, found, samples, fire)
+
+
+def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
+    """Return where the background of a frame is unknown (rows, columns), and no mask hides it."""
+    unknown = plates.at(number).confidence < UNKNOWN
+    seen = clip.seen(number, *unknown.shape[::-1])
+    return unknown if seen is None else unknown & seen
+
+
+def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -> SmokeSamples:
+    """Find the smoke in frames spread over a clip, whose exposure may change.
+
+    Parameters
+    ----------
+    clip, plates
+        The footage, and what is behind the smoke.
+    corner
+        Left and top of its pictures in pixels of the camera's.
+    """
+    width, height = clip.size
+    scale = max(1.0, max(width, height) / SAMPLE_SIDE)
+    columns, rows = (max(1, round(side / scale)) for side in (width, height))
+    covered, unknown = np.zeros((2, rows, columns), np.bool_)
+    colours, behind, textures = [], [], []
+    gains: dict[int, NDArray[np.float32]] = {}
+    amounts: dict[int, int] = {}
+    reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
+    gains_of = exposures(reduced)
+    for number in clip.spread(SAMPLE_FRAMES):
+        plate = reduced.at(number)
+        seen = clip.stored(number).averaged(columns, rows)
+        gains[number] = gains_of(number, small(seen))
+        picture = seen / gains[number]
+        mask = matte(picture, plate).mask
+        covered |= mask
+        unknown |= unknown_part(reduced, clip, number)
+        colours.append(picture[mask])
+        behind.append(plate.image[mask])
+        if mask.any():
+            amounts[number] = int(mask.sum())
+            textures.append(seen_texture(picture, plate, mask))
+    smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
+    left, top = corner
+    bounds = (float(left), float(top), float(left + width), float(top + height))
+    radiance = np.concatenate(colours), np.concatenate(behind)
+    return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures))

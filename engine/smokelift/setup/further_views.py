@@ -62,20 +62,9 @@ Gain = NDArray[np.float32]
 def open_views(
     first: ShotView, scene: CompleteScene, numbers: Sequence[int], lit: bool, settings: Settings
 ) -> tuple[tuple[ShotView, ...], tuple[Estimate[str], ...], tuple[Remark, ...]]:
-    """Open the further views of a scene, at the input's exposure; with what was measured and noticed.
+    """Open the further views of a lit scene, at the input's exposure; with what was measured and noticed.
 
-    Parameters
-    ----------
-    first
-        The input.
-    scene
-        What all show, with its lights and its model of scattering.
-    numbers
-        Frames in which brightness is compared.
-    lit
-        Whether the lights are given, and not estimated.
-    settings
-        How to fit, and the error that a gain has to take away.
+    Brightness is compared in frames of some numbers. It says more where lights are given (``lit``), not estimated.
 
     Raises
     ------

@@ -18,10 +18,9 @@ from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.estimate import Estimate, Grid, given
-from smokelift.setup.first_estimate import FirstEstimate
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.resolution import DetailSpectrum, Shape, choose_grid, smoke_detail
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
-from smokelift.setup.smoke import SmokeSamples
 
 PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of

@@ -22,11 +22,11 @@ from smokelift.render.environment_count import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import CoarseFrame
 from smokelift.setup.estimate import Estimate, given, measured
+from smokelift.setup.first_estimate import SmokeSamples
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.held_out import HeldOut, held_out
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
-from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.thickness import smoke_thickness
 
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")

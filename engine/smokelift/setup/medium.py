@@ -22,8 +22,7 @@ from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
 from smokelift.scene.checks import Vector
 from smokelift.setup.estimate import Estimate, measured, undetermined
-from smokelift.setup.first_estimate import FirstEstimate
-from smokelift.setup.smoke import SmokeSamples
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 
 OPTICAL_DEPTH_AT_ONE = 5.0
 """Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid. A convention,
@@ -54,25 +53,9 @@ WHITE: Vector = (1.0, 1.0, 1.0)
 def find_medium(
     scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain
 ) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
-    """Complete the medium.
+    """Complete the medium, with the colour of its flame where fire burns; with what was measured and assumed for it.
 
-    Parameters
-    ----------
-    scene
-        With what is known of the medium, and of the lights: smoke has their colour times its own.
-    estimate
-        What the clip shows.
-    camera, domain
-        The view and the box in whose middle the colour of the light is computed.
-
-    Returns
-    -------
-    medium
-        With the colour of its flame, where fire burns.
-    estimates
-        What was measured for it.
-    remarks
-        What was assumed, and whether the smoke has more than one colour.
+    Smoke has the colour of the lights in the middle of the box times its own.
     """
     medium, samples, fire = scene.medium, estimate.samples, estimate.fire
     estimates: list[Estimate[Any]] = []
@@ -105,15 +88,9 @@ def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, gre
 def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> Doubles:
     """Return the source radiance (3,) of the smoke; white where the clip shows none.
 
-    Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it.
-
-    Parameters
-    ----------
-    samples
-        Smoke pixels of the clip and what is behind them.
-    measured : (3,), optional
-        The same for the mean of the smoke, if a texture behind it shows it (`thickness`). Smoke that is brighter than
-        that, or darker where it darkens, is still fitted.
+    Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it. If
+    a texture behind the smoke shows that of its mean, ``measured`` (3,), smoke that is brighter, or darker where it
+    darkens, is still fitted.
     """
     if len(samples.colours) == 0:
         return np.ones(3)
@@ -132,21 +109,9 @@ def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> D
 
 
 def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimate[str]]:
-    """Find the smoke's own colour.
+    """Return the smoke's own colour, and what decided it, in light of a colour (3,), ones where that is unknown.
 
-    Parameters
-    ----------
-    samples
-        Smoke pixels of the clip and what is behind them.
-    light : (3,)
-        Colour of the light, ones where it is unknown.
-
-    Returns
-    -------
-    color
-        Red, green and blue, the largest 1; white where nothing says that the smoke is not grey.
-    estimate
-        The same with what decided it.
+    The largest of red, green and blue is 1; the colour is white where nothing says that the smoke is not grey.
     """
     line = _thickest(samples)
     if line is None:
@@ -182,13 +147,7 @@ def degrees_off_one_colour(samples: SmokeSamples) -> float:
 
 
 def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
-    """Direction (3,), of length 1, in which smoke changes what is behind it: the one that explains most of the change.
-
-    Parameters
-    ----------
-    colours, behind : (n, 3)
-        Radiance of at least one pixel with smoke, and without.
-    """
+    """Direction (3,), of length 1, that explains most of what smoke (n, 3) changes of what is behind it."""
     change = colours - behind
     axis = np.linalg.eigh(change.T @ change)[1][:, -1]
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)

@@ -14,16 +14,16 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.proxy import proxy_frames
 from smokelift.render import scene_optics
 from smokelift.scene import Background, CompleteScene, Domain, Scene
+from smokelift.setup.backdrop_remarks import first_remarks
 from smokelift.setup.coarse import coarse_frame, coarse_frames
 from smokelift.setup.estimate import Estimate, given, measured, undetermined
-from smokelift.setup.first_estimate import first_estimate
+from smokelift.setup.first_estimate import SAMPLE_FRAMES, first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import clip_lenses, find_geometry
 from smokelift.setup.illumination import first_light, light_remarks, measured_light
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.smoke import SAMPLE_FRAMES
 
 
 def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
@@ -89,7 +89,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         settings=settings,
         remarks=(
             *clip.remarks(),
-            *estimate.remarks,
+            *first_remarks(estimate, scene.background is not None),
             *geometry.remarks,
             *medium_remarks,
             *light_remarks(light, samples, plates.noise),
@@ -97,7 +97,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         ),
         estimates=(geometry.resolution, *of_medium, *light.estimates, *coarsening, *gains),
         qualities=geometry.qualities,
-        exposure=samples.exposure,
         smoky=samples.smoky,
         place=None,
         fire=None if estimate.fire is None else replace(first, clip=estimate.fire.light),

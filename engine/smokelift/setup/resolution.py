@@ -91,12 +91,7 @@ def choose_grid(
 
     Returns
     -------
-    domain
-        The grid.
-    estimate
-        Why it is that one.
-    qualities
-        What each quality would take of this clip.
+    The grid, why it is that one, and what each quality would take of this clip.
     """
     own = grids(settings.quality)
     spectrum = detail(own[-1])
@@ -125,14 +120,9 @@ def choose_grid(
 
 
 def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> DetailSpectrum:
-    """Measure the detail in some frames.
+    """Measure the detail in parts of linear pictures (rows, columns, 3) where the box is, and the plates behind them.
 
-    Parameters
-    ----------
-    frames
-        Of each: the part of the picture (rows, columns, 3) where the box is, linear; and the plate behind it.
-    pixels
-        Along the longest side of the box.
+    So many pixels lie along the longest side of the box.
     """
     energy = np.zeros(RINGS)
     for picture, plate in frames:

@@ -95,8 +95,6 @@ class Shot:
         What was decided, with the figures that decided it.
     qualities
         The grid that each quality would take of this clip.
-    exposure
-        Largest relative change of exposure, which is evened out; 0 where it is steady.
     smoky
         Numbers of the frames, of those examined, that show smoke, those with the most first.
     place
@@ -113,7 +111,6 @@ class Shot:
     remarks: tuple[Remark, ...]
     estimates: tuple[Estimate[Any], ...]
     qualities: Mapping[Quality, Grid]
-    exposure: float
     smoky: tuple[int, ...]
     place: AxisEstimate | None
     fire: ShotView | None

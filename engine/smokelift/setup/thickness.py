@@ -40,16 +40,7 @@ FRAMES = 3
 
 
 def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Doubles:
-    """Compare the texture of a frame with that of its background.
-
-    Parameters
-    ----------
-    picture : (rows, columns, 3)
-        Linear radiance.
-    plate
-        The background, of the same size.
-    smoke : (rows, columns) bool
-        Pixels that show smoke.
+    """Compare the texture of a linear frame (rows, columns, 3) with that of its background, where it shows smoke.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, what_helps
-from smokelift.setup.smoke import SmokeSamples, sample_smoke
+from smokelift.setup.first_estimate import SmokeSamples, sample_smoke
 from tests.engine.footage.films import coded, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from smokelift.setup.estimate import UNDETERMINED
+from smokelift.setup.first_estimate import SmokeSamples
 from smokelift.setup.medium import COLOURED, degrees_off_one_colour, smoke_colour, source_radiance
-from smokelift.setup.smoke import SmokeSamples
 
 WHITE = np.ones(3)
 RED, DUST = np.array((1.0, 0.3, 0.2)), np.array((1.0, 0.75, 0.48))

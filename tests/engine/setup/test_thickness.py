@@ -6,8 +6,8 @@ import pytest
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.setup.estimate import UNDETERMINED
+from smokelift.setup.first_estimate import SmokeSamples
 from smokelift.setup.medium import source_radiance
-from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.thickness import seen_texture, smoke_thickness
 
 SIZE = (80, 96)
