@@ -8,7 +8,7 @@ The second is judged by `smokelift.setup.held_out`. Figures: docs/selection.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -158,14 +158,13 @@ def measured_light(
     richest, lights = light.scattering, light.lights
     seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames]
     found: tuple[Estimate[Any], ...] = ()
-    known: dict[Scattering, float] = {}
     # what single scattering lacks would be taken for light that is missing
     if richest == "multiple" or (_tries_multiple(richest, frames) and not light.by_hand):
-        lights, known["multiple"], found = _strengthened(lights, seen, settings.density)
+        lights, found = _strengthened(lights, seen, settings.density)
     if light.by_hand:
         return replace(light, lights=lights, measured=(*found, given("scattering", richest)))
     seen = [frame.lit_by(lights) for frame in seen]
-    chosen, scattered = _cheapest(seen, richest, known, finer, settings)
+    chosen, scattered = _cheapest(seen, richest, finer, settings)
     around = _surroundings(seen, scattered, settings.density) if light.origin == "assumed" else None
     if around is not None:
         (lights, scattered), chosen = around, "single"
@@ -207,8 +206,8 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
 
 def _strengthened(
     lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], float, tuple[Estimate[Any], ...]]:
-    """Given lights as strong as the clip needs, and what multiple scattering leaves in them.
+) -> tuple[tuple[Light, ...], tuple[Estimate[Any], ...]]:
+    """Given lights as strong as the clip needs.
 
     Given lights are measured or tracked, and a picture hardly contradicts them: stronger light with thinner smoke fits
     it as well or better, since thin smoke is the simpler one to fit. So lights are too weak only where even the
@@ -229,10 +228,10 @@ def _strengthened(
             break
         factor, found = factor * STEP, stronger
     if factor == 1.0:
-        return lights, as_given.error, ()
+        return lights, ()
     figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
     strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MAX_MISSING_LIGHT)
-    return tuple(light.scaled(factor) for light in lights), found.error, (strength,)
+    return tuple(light.scaled(factor) for light in lights), (strength,)
 
 
 def _tries_multiple(richest: Scattering, frames: Sequence[CoarseFrame]) -> bool:
@@ -243,7 +242,6 @@ def _tries_multiple(richest: Scattering, frames: Sequence[CoarseFrame]) -> bool:
 def _cheapest(
     frames: Sequence[CoarseFrame],
     richest: Scattering,
-    known: Mapping[Scattering, float],
     finer: Callable[[], CoarseFrame | None],
     settings: Settings,
 ) -> tuple[Scattering, Estimate[str]]:
@@ -254,12 +252,10 @@ def _cheapest(
     picture both models fit is twice as dense in one as in the other (docs/experiments/multiple-scattering.md). Neither
     is the cheaper answer, so that the tolerance of cheaper models says nothing here: errors are compared as a ratio, in
     which what no model fits counts for both.
-
-    Errors of models, each of its own densities, are ``known`` as far as they are measured already.
     """
     fit, tolerance = settings.density, settings.selection.scattering_error
     rivals: tuple[Scattering, ...] = ("single", "multiple") if _tries_multiple(richest, frames) else (richest,)
-    errors = {each: known[each] if each in known else held_out(frames, each, each, fit).error for each in rivals}
+    errors = {each: held_out(frames, each, each, fit).error for each in rivals}
     if len(rivals) > 1:
         alike = errors["multiple"] >= MAX_ERROR_RATIO * errors["single"]
         # the errors may be those of the coarse grid: either model seems to fit the smoke, or neither does

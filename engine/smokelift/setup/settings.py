@@ -22,17 +22,7 @@ QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine", "final")
 
 @dataclass(frozen=True)
 class GridLimit:
-    """How many voxels a quality allows along the domain's longest side, where they are chosen.
-
-    Attributes
-    ----------
-    share
-        Of the clip's pixels along that side, between the bounds; 0 for a number of voxels whatever the clip has.
-    least
-        Voxels that are allowed in any case, if the clip has as many pixels.
-    most
-        Voxels that are allowed whatever the clip has.
-    """
+    """How many voxels a quality allows along the domain's longest side: a share of the clip's pixels within bounds."""
 
     share: float
     least: int
