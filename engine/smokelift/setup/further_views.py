@@ -1,15 +1,14 @@
 """Further calibrated cameras: their clips in step with the input's, their backgrounds and exposures, their agreement.
 
 Cameras have exposures and white balances of their own. Two pictures of one smoke bind each other: every slice across
-both cameras holds as much smoke in one as in the other. So a density is fitted to both, on coarse frames and for
-several gains of the further one; the gain with which both are fitted best is the camera's. Figures:
-docs/experiments/view-gain.md.
+both cameras holds as much smoke in one as in the other. So a density is fitted to both, on coarse frames. How much
+brighter than the density the further one shows it, over how much brighter the input does, is the camera's gain; both
+are fitted again with that evened out, until little is left. Figures: docs/experiments/view-gain.md.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,11 +40,12 @@ cameras upside down on a tenth to nine tenths (docs/experiments/view-agreement.m
 SAME_RATE = 0.01
 """Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""
 
-STEP = 1.2
-"""Ratio of one gain to the next that is tried; between them it is where a parabola has its lowest point."""
+ROUNDS = 3
+"""Fits from which a gain is found, each with the one before evened out: a fourth changes it by .3 % at most
+(docs/experiments/view-gain.md)."""
 
 MAX_GAIN = 8.0
-"""Largest gain that is tried, and the inverse of the smallest: three stops."""
+"""Largest gain, and the inverse of the smallest: three stops."""
 
 RATIO, RATIO_UNLIT = 1.2, 1.35
 """Ratio of brightness from which on it is the cameras', where light is known and where it is taken to come from
@@ -154,11 +154,15 @@ def _exposure(
         evened = [replace(frame, views=(frame.views[0], frame.views[1].over(gain))) for frame in frames]
         return held_out(evened, scene.scattering, scene.scattering, settings.density)
 
-    as_it_is, tolerance = tried(np.ones(3, np.float32)).error, settings.selection.scattering_error
-    scalar = _best(lambda factor: tried(np.full(3, factor, np.float32)).error, as_it_is)
-    own, other = np.maximum(tried(np.full(3, scalar, np.float32)).colours, 1e-6)
-    ratio = other / own
-    colour = ratio / np.exp(np.mean(np.log(ratio)))
+    errors: list[float] = []
+    ratio = np.ones(3)
+    for _ in range(ROUNDS):
+        found = tried(ratio.astype(np.float32))
+        own, other = np.maximum(found.colours, 1e-6)
+        errors, ratio = [*errors, found.error], np.clip(ratio * other / own, 1 / MAX_GAIN, MAX_GAIN)
+    as_it_is, tolerance = errors[0], settings.selection.scattering_error
+    scalar = float(np.exp(np.mean(np.log(ratio))))
+    colour = ratio / scalar
     if max(scalar, 1 / scalar) < (RATIO if lit else RATIO_UNLIT):
         scalar = 1.0
     if colour.max() / colour.min() < COLOUR_RATIO:
@@ -170,25 +174,6 @@ def _exposure(
     named = ", ".join(f"{value:.2f}" for value in gain)
     figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
     return gain, (measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance),)
-
-
-def _best(error_of: Callable[[float], float], at_one: float) -> float:
-    """The gain of the least error, from 1 on downhill."""
-    errors = {0: at_one}
-    last = int(math.log(MAX_GAIN) / math.log(STEP))
-
-    def error(step: int) -> float:
-        if step not in errors:
-            errors[step] = error_of(STEP**step)
-        return errors[step]
-
-    best = 0
-    way = -1 if error(-1) < error(1) else 1
-    while abs(best) < last and error(best + way) < error(best):
-        best += way
-    below, lowest, above = (error(step) for step in (best - 1, best, best + 1))
-    bend = below - 2 * lowest + above
-    return float(STEP ** (best + (0.5 * (below - above) / bend if bend > 0 else 0.0)))
 
 
 def _over(view: ShotView, gain: Gain) -> ShotView:
