@@ -16,7 +16,7 @@ BLACK = 0.001
 
 MOSTLY = 0.5
 """Share from which on it is most of a whole: of the smoke's pixels, those without a known background; of what lies
-between bars, the smoke of a frame."""
+between bars, the smoke of a frame. A majority, by definition."""
 
 BETWEEN_BARS = 0.95
 """Share of the picture between two bars which smoke covers at some time there, if it is not the picture itself: smoke

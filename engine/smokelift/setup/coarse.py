@@ -20,7 +20,8 @@ from smokelift.scene.projection import voxel_width
 from smokelift.setup.shot import ShotView
 
 COARSE_SIDE = 32
-"""Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""
+"""Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place
+(docs/experiments/scattering-selection.md)."""
 
 SHORTEST = 4
 """Voxels along the shortest side at least."""

@@ -45,7 +45,7 @@ MIN_SIDE_VOXELS = 32
 (docs/experiments/resolution-selection.md)."""
 
 DETAIL_FRAMES = 3
-"""Frames whose detail decides the resolution: those with the most smoke."""
+"""Frames whose detail decides the resolution: those with the most smoke (docs/selection.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,8 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     clip, samples, turns, box = estimate.clip, estimate.samples, estimate.turns, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
     _require_place(scene, known)
-    focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
-    camera = known or _level(clip, focal, settings.distance)
+    focal = _focal(clip.size, clip.lens) if turns is None else float(turns.lens[0, 0])
+    camera = known or _level(clip.size, focal, settings.distance)
     metres, multiple = 0.0, 1
     if box is None:
         # multiples of four, so that pyramids halve them evenly
@@ -115,7 +115,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     if box is None:
         around = "box around the smoke" if samples.smoky else "box over the picture"
         remarks = (
-            _assumed(known, clip, focal, metres * camera.size[1]),
+            _assumed(known, clip.lens, focal / max(clip.size), metres * camera.size[1]),
             Remark(around, {"size": _size(domain), "resolution": domain.resolution}),
         )
     else:
@@ -146,7 +146,8 @@ def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
         If the camera's picture has another shape than the clip's.
     """
     scales = (1.0, *OTHER_LENSES) if clip.lens is None else (1.0,)
-    cameras = [_level(clip, scale * _focal(clip)) for scale in scales] if camera is None else [fitting(camera, clip)]
+    focal = _focal(clip.size, clip.lens)
+    cameras = [_level(clip.size, scale * focal) for scale in scales] if camera is None else [fitting(camera, clip)]
     return tuple(
         np.array([[each.fx, 0, each.cx], [0, each.fy, each.cy], [0, 0, 1.0]])
         for each in cameras
@@ -154,10 +155,9 @@ def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
     )
 
 
-def _focal(clip: Clip) -> float:
-    """Focal length in pixels of a clip without a camera: the file's, or that of the usual lens."""
-    width, height = clip.size
-    return LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
+def _focal(size: tuple[int, int], lens: float | None) -> float:
+    """Focal length in pixels where no camera is given: that of the file's lens (mm), or of the usual one."""
+    return LENS * max(size) if lens is None else lens / FILM_DIAGONAL * math.hypot(*size)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -176,17 +176,17 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _assumed(given: Camera | None, clip: Clip, focal: float, height: float) -> Remark:
-    """What is assumed of a camera, with its focal length in pixels, or of the scale where that alone is unknown.
+def _assumed(given: Camera | None, lens: float | None, focal: float, height: float) -> Remark:
+    """What is assumed of a camera, or of the scale where that alone is unknown.
 
-    The picture is so many metres high where the smoke is.
+    The file says its lens (mm), or its focal length is so many times the longer side of the picture, which is so many
+    metres high where the smoke is.
     """
     if given is not None:
         return Remark("assumed scale", {"height": height})
-    if clip.lens is not None:
-        return Remark("assumed camera with the file's lens", {"height": height, "lens": clip.lens})
-    lens = FILM_WIDTH * focal / max(clip.size)
-    return Remark("assumed camera", {"height": height, "lens": lens, "film": FILM_WIDTH})
+    if lens is not None:
+        return Remark("assumed camera with the file's lens", {"height": height, "lens": lens})
+    return Remark("assumed camera", {"height": height, "lens": FILM_WIDTH * focal, "film": FILM_WIDTH})
 
 
 def _size(box: Box) -> tuple[float, ...]:
@@ -194,9 +194,9 @@ def _size(box: Box) -> tuple[float, ...]:
     return tuple(high - low for low, high in zip(box.min, box.max, strict=True))
 
 
-def _level(clip: Clip, focal: float, distance: float | None = None) -> Camera:
+def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
     """A level camera of a focal length in pixels that looks along +Y at the smoke above the world's origin."""
-    width, height = clip.size
+    width, height = size
     metres = _pixel_at(distance, height, focal)
     up = metres * height / 2
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * metres], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)

@@ -47,7 +47,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
-    _check(clip, scene, settings)
+    _check(len(clip), scene, settings)
     _expect(clip, scene)
     # a search for the lens finds turns of a camera; several cameras are calibrated, so they stand still where given
     lenses = () if scene.views else clip_lenses(scene.camera, clip)
@@ -127,8 +127,8 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
     return measured("velocity grid coarsening", coarsening, {"voxels": float(longest)}, tolerance=finest)
 
 
-def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
-    """Refuse what can be seen to be wrong before anything is examined."""
+def _check(length: int, scene: Scene, settings: Settings) -> None:
+    """Refuse what can be seen to be wrong before any of so many frames is examined."""
     if settings.distance is not None and (scene.views or scene.inlets):
         known = "further views show" if scene.views else "inlets say"
         raise ValueError(f"The {known} where the smoke stands; leave the distance out.")
@@ -141,8 +141,8 @@ def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
                 camera.require_outside(scene.domain)
     if scene.views and (moves or any(view.camera.moves for view in scene.views)):
         raise ValueError("With further views no camera may move; give one matrix a camera, or one view only.")
-    if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
-        given, used = counted(len(scene.camera.matrices), "frame"), counted(len(clip), "frame")
+    if scene.camera is not None and moves and len(scene.camera.matrices) != length:
+        given, used = counted(len(scene.camera.matrices), "frame"), counted(length, "frame")
         raise ValueError(
             f"The camera's matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
         )
