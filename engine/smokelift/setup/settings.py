@@ -59,8 +59,8 @@ class SelectionSettings:
     Attributes
     ----------
     measure
-        Measure open choices on the clip. Without it an estimated box gets the finest grid of the quality, and the
-        richest model of scattering that the known light allows is taken.
+        Measure open choices but the resolution on the clip. Without it the richest model of scattering that the known
+        light allows is taken.
     lost_detail
         Share of the smoke's contrast that a grid may lose of what the finest of the quality shows; a preset has that
         of `LOST_DETAIL`.
