@@ -17,6 +17,7 @@ import bisect
 from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -295,12 +296,21 @@ class Video:
 
     def _decode(self, index: int) -> av.VideoFrame:
         """Return the decoded frame at an index into ``_times``."""
+        frame = None
         if not self._keys:
-            return self._decode_by_count(index)
-        if index in self._lost:
+            frame = self._count_to(index)
+        elif index not in self._lost:
+            frame = self._seek(index)
+        if frame is None:
+            self._rewind()
+            self._lost.add(index)
             raise DamagedFrameError(
                 f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
             )
+        self._next = index + 1
+        return frame
+
+    def _seek(self, index: int) -> av.VideoFrame | None:
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
         key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
@@ -312,13 +322,6 @@ class Video:
             # A seek may land late (open groups of pictures); from the start nothing can be missed.
             self._rewind()
             frame = self._forward_to(wanted)
-        if frame is None:
-            self._rewind()
-            self._lost.add(index)
-            raise DamagedFrameError(
-                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
-            )
-        self._next = index + 1
         return frame
 
     def _forward_to(self, wanted: int) -> av.VideoFrame | None:
@@ -327,15 +330,10 @@ class Video:
                 return frame if frame.pts == wanted and not frame.is_corrupt else None
         return None
 
-    def _decode_by_count(self, index: int) -> av.VideoFrame:
+    def _count_to(self, index: int) -> av.VideoFrame | None:
         if index < self._next:
             self._rewind()
-        for frame in self._decoded:
-            self._next += 1
-            if self._next == index + 1:
-                return frame
-        self._rewind()
-        raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again")
+        return next(islice(self._decoded, index - self._next, None), None)
 
     def _pixel_shape(self) -> Fraction:
         """Return how many times as wide as high a pixel is, as stored."""
