@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.images import Picture, area_average
-from smokelift.footage.seen import median_of_seen
+from smokelift.footage.noise import median_of_seen
 
 COMPARED_SIDE = 160
 """Pixels along the longer side of the pictures that are compared: noise is averaged out, and there are thousands."""
@@ -40,10 +40,7 @@ SPREAD = 0.06
 def gain_of(picture: Picture, background: Picture) -> Picture:
     """Return how much brighter a picture is than its background, (3,); ones where that cannot be measured or seen.
 
-    Parameters
-    ----------
-    picture, background : (rows, columns, 3)
-        Linear, of one size, small enough that their noise does not count.
+    Both are linear (rows, columns, 3), `small` enough that their noise does not count.
     """
     low, high = USABLE
     gains = np.ones(3, np.float32)

@@ -95,18 +95,10 @@ def decode_integers(
     white: float = 1.0,
     premultiplied: bool = False,
 ) -> Picture:
-    """Return integer pixels [row, column, rgb or rgba] as linear RGB, alpha over black.
+    """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB, alpha over black.
 
-    Parameters
-    ----------
-    codes
-        8 or 16 bit values.
-    encoding
-        How they encode light; None is ``"srgb"``.
-    white
-        Share of the largest value that stands for white, and for opaque.
-    premultiplied
-        Whether colours are over black as they are stored.
+    The encoding is by default sRGB. ``white`` is the share of the largest value that stands for white, and for opaque.
+    Colours that are ``premultiplied`` are over black as they are stored.
     """
     linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
     alpha = decode_alpha(codes, white)

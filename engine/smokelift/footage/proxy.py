@@ -60,22 +60,17 @@ class Proxy:
 
     @staticmethod
     def of(clip: Clip) -> Proxy:
-        """Read the frames of a clip's file.
-
-        Raises
-        ------
-        ClipError
-            If a frame of the clip cannot be read.
-        """
+        """Read the frames of a clip's file; ClipError is raised if one of the clip's own cannot be read."""
         first, last = clip.first, clip.first + len(clip) - 1
         (columns, rows), whole = proxy_size(*clip.size), clip.whole()
         pictures, seen = {}, []
-        for number in proxy_frames(clip):
+        own = {first + number for number in clip.spread(OF_CLIP)}
+        for number in sorted(own | set(whole.spread(OF_FILE))):
             inside = first <= number <= last
-            of, own = (clip, number - first) if inside else (whole, number)
+            of, n = (clip, number - first) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
-                pictures[number] = of.stored(own).averaged(columns, rows)
-                shown = of.seen(own, columns, rows)
+                pictures[number] = of.stored(n).averaged(columns, rows)
+                shown = of.seen(n, columns, rows)
                 seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
         scale = max(clip.size) / max(columns, rows)
         return Proxy(tuple(pictures), (first, last), np.stack(list(pictures.values())), np.stack(seen), scale)
@@ -97,11 +92,6 @@ class Proxy:
         """Return the frames that belong to a clip's shot, and the frames of the file before and after a cut in it.
 
         At a cut most of the picture changes at once and for good, and little does before and after it.
-
-        Raises
-        ------
-        ClipError
-            If a frame cannot be read.
         """
         tiny = [small(picture) for picture in self.pictures]
         shares = [_alike(one, other) for one, other in pairwise(tiny)]
@@ -141,12 +131,6 @@ def proxy_size(width: int, height: int) -> tuple[int, int]:
     """Return width and height of the pictures of a proxy."""
     scale = max(1.0, max(width, height) / PROXY_SIDE)
     return max(1, round(width / scale)), max(1, round(height / scale))
-
-
-def proxy_frames(clip: Clip) -> list[int]:
-    """Return the numbers in its file of the frames of a clip that its proxy reads, ascending."""
-    own = {clip.first + number for number in clip.spread(OF_CLIP)}
-    return sorted(own | set(clip.whole().spread(OF_FILE)))
 
 
 def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> tuple[int, int]:

@@ -8,7 +8,6 @@ from smokelift.checks import Doubt, Remark
 from smokelift.footage.backdrop import Backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
-from smokelift.footage.quantiser import COARSE
 from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, unknown_part
 
 BLACK = 0.001
@@ -26,6 +25,11 @@ the course of time."""
 
 MIN_SAME_FRAMES = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
+
+COARSE_QUANTISER = 42.0
+"""Quantiser from which on faint smoke is taken for background, in front of one of more than one colour. Before a brick
+wall crf 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50
+(docs/experiments/disturbed-clips.md)."""
 
 LARGE_NOISE = 6 / 255
 """Noise in sRGB values from which on the background may be what moves (docs/experiments/background.md)."""
@@ -50,12 +54,8 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
     if found.source == "given":
         return ()
     if found.source == "picture":
-        numbers = (0,) if found.steadied is None else clip.spread(SAMPLE_FRAMES)
-        unknown = float(np.mean([unknown_part(plates, clip, number) for number in numbers]))
-        known = Remark("background partly seen", {"unknown": unknown}) if unknown else Remark("background seen")
-        if found.steadied is None:
-            return (known,)
-        return Remark("turning camera", {"pixels": found.steadied[0].turns.farthest}), known
+        unknown = float(unknown_part(plates, clip, 0).mean())
+        return (Remark("background partly seen", {"unknown": unknown}) if unknown else Remark("background seen"),)
     image = plates.at(0).image
     red, green, blue = map(float, image[0, 0] if found.colour is None else found.colour)
     other = float((image != np.array((red, green, blue), np.float32)).any(-1).mean())
@@ -90,7 +90,7 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
         said.append(Doubt("background never seen"))
     if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
         said.append(Doubt("background of few frames", {"frames": found.frames}))
-    if found.quantiser is not None and found.quantiser >= COARSE:
+    if found.quantiser is not None and found.quantiser >= COARSE_QUANTISER:
         said.append(Doubt("strong compression", {"quantiser": found.quantiser}))
     in_plate = samples.unknown.sum() / max((samples.unknown | samples.covered).sum(), 1)
     if in_plate >= MOSTLY:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import largest_change, small
@@ -17,7 +16,6 @@ from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates
 from smokelift.footage.steady import exposures, steady
-from smokelift.footage.turning import Turns
 from smokelift.scene import Background, Camera
 from smokelift.scene.checks import Vector
 from smokelift.setup.thickness import seen_texture
@@ -37,8 +35,6 @@ class SmokeSamples:
     ----------
     scale
         Full pixels to a reduced one.
-    bounds
-        Left, top, right and bottom of ``covered`` in pixels of the camera's full picture.
     covered : (rows, columns) bool
         Pixels with smoke in at least one sample.
     unknown : (rows, columns) bool
@@ -56,7 +52,6 @@ class SmokeSamples:
     """
 
     scale: float
-    bounds: tuple[float, float, float, float]
     covered: NDArray[np.bool_]
     unknown: NDArray[np.bool_]
     colours: NDArray[np.float32]
@@ -110,7 +105,7 @@ class FirstEstimate:
     clip
         The footage at its background's exposure, without fire and without the brightness that noise adds.
     found
-        What stands behind the smoke, and how the camera turns before it.
+        What stands behind the smoke.
     samples
         Its smoke.
     fire
@@ -122,26 +117,18 @@ class FirstEstimate:
     samples: SmokeSamples
     fire: Fire | None
 
-    @property
-    def turns(self) -> Turns | None:
-        """How the camera turned, if it was found to."""
-        return None if self.found.steadied is None else self.found.steadied[0].turns
 
-
-def first_estimate(
-    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Doubles]
-) -> FirstEstimate:
+def first_estimate(clip: Clip, camera: Camera | None, background: Background | None) -> FirstEstimate:
     """Estimate what a clip shows; the parameters and errors are those of `find_backdrop`."""
-    found = find_backdrop(clip, camera, background, lenses)
-    corner = (0, 0) if found.steadied is None else found.steadied[0].corner
-    samples = sample_smoke(*found.still(found.clip), corner)
+    found = find_backdrop(clip, camera, background)
+    samples = sample_smoke(found.clip, found.plates)
     exposed = steady(found.clip, found.plates, samples.gains)
     fire, share = None, fire_share(samples.colours, samples.behind)
     if share:
         doused = without_fire(exposed, found.plates)
         light = firelight(exposed, doused)
         fire, exposed = Fire(share, light, fire_colour(exposed, light)), doused
-        samples = replace(sample_smoke(*found.still(doused), corner), gains=samples.gains)
+        samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
     return FirstEstimate(exposed, found, samples, fire)
 
 
@@ -152,16 +139,8 @@ def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
     return unknown if seen is None else unknown & seen
 
 
-def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -> SmokeSamples:
-    """Find the smoke in frames spread over a clip, whose exposure may change.
-
-    Parameters
-    ----------
-    clip, plates
-        The footage, and what is behind the smoke.
-    corner
-        Left and top of its pictures in pixels of the camera's.
-    """
+def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
+    """Find the smoke in frames spread over a clip, whose exposure may change."""
     width, height = clip.size
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = (max(1, round(side / scale)) for side in (width, height))
@@ -185,7 +164,5 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
             amounts[number] = int(mask.sum())
             textures.append(seen_texture(picture, plate, mask))
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
-    left, top = corner
-    bounds = (float(left), float(top), float(left + width), float(top + height))
     radiance = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures))
+    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, tuple(textures))

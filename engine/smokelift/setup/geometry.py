@@ -13,7 +13,6 @@ from smokelift.checks import Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
-from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
@@ -26,13 +25,13 @@ PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
 a person."""
 
+FILM_WIDTH = 36.0
+FILM_DIAGONAL = math.hypot(FILM_WIDTH, 24)
+"""Millimetres of 35 mm film."""
+
 LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
 lens."""
-
-OTHER_LENSES = (0.6, 2.0)
-"""Other focal lengths over the usual one that a camera which turns may have: that of phones, 26 to 30 mm, and 100 mm.
-Either is right within a factor of one and a half for all lenses from 20 to 150 mm."""
 
 BOX_MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side."""
@@ -55,7 +54,7 @@ class Geometry:
     Attributes
     ----------
     camera
-        Of the clip's full pictures; with a matrix for every frame if it was found to turn.
+        Of the clip's full pictures.
     domain
         With its final resolution.
     resolution
@@ -82,10 +81,10 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
         looks steeply up or down, or is orthographic.
     """
-    clip, samples, turns, box = estimate.clip, estimate.samples, estimate.turns, scene.domain
+    clip, samples, box = estimate.clip, estimate.samples, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
     _require_place(scene, known)
-    focal = _focal(clip.size, clip.lens) if turns is None else float(turns.lens[0, 0])
+    focal = _focal(clip.size, clip.lens)
     camera = known or _level(clip.size, focal, settings.distance)
     metres, multiple = 0.0, 1
     if box is None:
@@ -93,7 +92,6 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         (floor, size, metres), multiple = _around(camera, samples, settings.distance), 4
     else:
         floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
-    camera = camera if turns is None else turns.carried(camera)
     still = camera.at(next(iter(samples.smoky), 0))
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
@@ -134,25 +132,6 @@ def _require_place(scene: Scene, known: Camera | None) -> None:
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
-
-
-def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
-    """Return what may turn directions into pixels (3, 3): that of a clip's camera, or usual ones; none of a camera that
-    is orthographic or given as moving.
-
-    Raises
-    ------
-    ValueError
-        If the camera's picture has another shape than the clip's.
-    """
-    scales = (1.0, *OTHER_LENSES) if clip.lens is None else (1.0,)
-    focal = _focal(clip.size, clip.lens)
-    cameras = [_level(clip.size, scale * focal) for scale in scales] if camera is None else [fitting(camera, clip)]
-    return tuple(
-        np.array([[each.fx, 0, each.cx], [0, each.fy, each.cy], [0, 0, 1.0]])
-        for each in cameras
-        if each.type == "perspective" and not each.moves
-    )
 
 
 def _focal(size: tuple[int, int], lens: float | None) -> float:
@@ -238,7 +217,7 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
     distance = camera.fy * metres
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]
-    left, right, top, bottom = _covered(samples)
+    left, right, top, bottom = _covered(samples, *camera.size)
     ways = _ways(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
     ways *= metres * (camera.fy / (ways @ along))[:, None]
     aside, height = ways @ lateral, ways[:, 2]
@@ -281,20 +260,14 @@ def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     )
 
 
-def _covered(samples: SmokeSamples) -> tuple[float, float, float, float]:
+def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
     """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
-    rows, columns = np.nonzero(samples.covered)
-    if rows.size == 0:  # no smoke: any box will do
-        rows, columns = np.array([0, samples.covered.shape[0] - 1]), np.array([0, samples.covered.shape[1] - 1])
-    # a hundredth of the smoke's pixels on each side may be noise or the last wisps
-    left, right = np.percentile(columns, [1, 99]) + np.array([0, 1])
-    top, bottom = np.percentile(rows, [1, 99]) + np.array([0, 1])
-    first_x, first_y, last_x, last_y = samples.bounds
-    left, right = (float(v) * samples.scale + first_x for v in (left, right))
-    top, bottom = (float(v) * samples.scale + first_y for v in (top, bottom))
+    # a hundredth of the smoke's pixels on each side may be noise or the last wisps; without smoke any box will do
+    rows, columns = np.nonzero(samples.covered if samples.covered.any() else ~samples.covered)
+    left, right = (float(v) * samples.scale for v in np.percentile(columns, [1, 99]) + np.array([0, 1]))
+    top, bottom = (float(v) * samples.scale for v in np.percentile(rows, [1, 99]) + np.array([0, 1]))
     margin = BOX_MARGIN * max(right - left, bottom - top)
-    left, right = max(left - margin, first_x), min(right + margin, last_x)
-    return left, right, max(top - margin, first_y), min(bottom + margin, last_y)
+    return max(left - margin, 0), min(right + margin, width), max(top - margin, 0), min(bottom + margin, height)
 
 
 def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:

@@ -11,15 +11,14 @@ from functools import partial
 from smokelift.checks import counted, require_kind
 from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
-from smokelift.footage.proxy import proxy_frames
 from smokelift.render import scene_optics
 from smokelift.scene import Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_remarks import first_remarks
 from smokelift.setup.coarse import coarse_frame, coarse_frames
 from smokelift.setup.estimate import Estimate, given, measured, undetermined
-from smokelift.setup.first_estimate import SAMPLE_FRAMES, first_estimate
+from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.further_views import disagreement, open_views
-from smokelift.setup.geometry import clip_lenses, find_geometry
+from smokelift.setup.geometry import find_geometry
 from smokelift.setup.illumination import first_light, light_remarks, measured_light
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
@@ -48,10 +47,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
-    _expect(clip, scene)
-    # a search for the lens finds turns of a camera; several cameras are calibrated, so they stand still where given
-    lenses = () if scene.views else clip_lenses(scene.camera, clip)
-    estimate = first_estimate(clip, scene.camera, scene.background, lenses)
+    estimate = first_estimate(clip, scene.camera, scene.background)
     plates, samples = estimate.found.plates, estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
@@ -81,7 +77,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     if settings.selection.measure:
         coarsening = (velocity_coarsening(domain, settings),)
         settings = replace(settings, velocity=replace(settings.velocity, coarsening=coarsening[0].value))
-    clip.expect()  # lets go of frames that are kept as they were decoded
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
@@ -146,11 +141,3 @@ def _check(length: int, scene: Scene, settings: Settings) -> None:
         raise ValueError(
             f"The camera's matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
         )
-
-
-def _expect(clip: Clip, scene: Scene) -> None:
-    """Say which frames are examined, so that each of them is decoded once."""
-    examined, estimates = clip.spread(SAMPLE_FRAMES), scene.background is None
-    # a velocity needs the frame after one with smoke, and a background more frames than the smoke
-    others = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect([*examined, *sorted(n for n in others.difference(examined) if n >= 0)])

@@ -20,9 +20,7 @@ from tests.engine.footage.films import coded, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True
-SEEN = SmokeSamples(
-    1.0, (0, 0, 50, 100), COVERED, np.zeros_like(COVERED), *np.zeros((2, 0, 3), np.float32), (0,), {}, ()
-)
+SEEN = SmokeSamples(1.0, COVERED, np.zeros_like(COVERED), *np.zeros((2, 0, 3), np.float32), (0,), {}, ())
 """Frames that show smoke, in the middle of the picture."""
 
 

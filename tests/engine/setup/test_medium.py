@@ -21,9 +21,7 @@ def samples(source, behind, thickest=0.9):
     opacity = rng.random((500, 1)) * thickest
     behind = np.broadcast_to(behind, (500, 3))
     colours = (1 - opacity) * behind + opacity * source + 0.002 * rng.standard_normal((500, 3))
-    return SmokeSamples(
-        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,), {}
-    )
+    return SmokeSamples(1.0, *np.ones((2, 1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,), {})
 
 
 def apart(one, other):
@@ -107,7 +105,7 @@ def two_kinds(one, other, behind=BLACK):
     """Smoke of two colours, as much of each."""
     parts = samples(one, behind), samples(other, behind)
     colours, grounds = (np.concatenate([getattr(part, name) for part in parts]) for name in ("colours", "behind"))
-    return SmokeSamples(1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours, grounds, (0,), {})
+    return SmokeSamples(1.0, *np.ones((2, 1, 1), bool), colours, grounds, (0,), {})
 
 
 def test_smoke_of_more_than_one_colour_is_said():
