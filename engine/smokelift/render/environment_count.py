@@ -63,9 +63,8 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
 
 def _coarse(domain: Domain) -> Domain:
     """The domain in few cubic voxels; where they do not fit its edges, to the nearest."""
-    edges = [high - low for low, high in zip(domain.min, domain.max, strict=True)]
-    voxel = max(edges) / REFERENCE_VOXELS
-    x, y, z = (max(round(edge / voxel), 1) for edge in edges)
+    voxel = max(domain.size) / REFERENCE_VOXELS
+    x, y, z = (max(round(edge / voxel), 1) for edge in domain.size)
     return domain.about_centre((x, y, z), voxel)
 
 

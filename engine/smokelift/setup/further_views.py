@@ -75,9 +75,9 @@ def open_views(
     estimates: list[Estimate[str]] = []
     for number in range(len(scene.views)):
         view, noticed = _open_view(number, first.clip, scene)
-        if settings.selection.measure:
-            gain, found = _exposure(number + 1, first, view, scene, numbers, lit, settings)
-            view, estimates = view if gain is None else _over(view, gain), [*estimates, *found]
+        if settings.selection.measure and scene.scattering != "absorption":
+            view, found = _evened(number + 1, first, view, scene, numbers, lit, settings)
+            estimates += found
         views.append(view)
         remarks += noticed
     return tuple(views), tuple(estimates), tuple(remarks)
@@ -136,7 +136,7 @@ def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
     return Clip.open(source, fps=fps, frames=(first, last))
 
 
-def _exposure(
+def _evened(
     number: int,
     front: ShotView,
     view: ShotView,
@@ -144,11 +144,11 @@ def _exposure(
     numbers: Sequence[int],
     lit: bool,
     settings: Settings,
-) -> tuple[Gain | None, tuple[Estimate[str], ...]]:
-    """The gain (3,) of view ``number``, from 1, over the input; None where no gain is better than none."""
+) -> tuple[ShotView, tuple[Estimate[str], ...]]:
+    """View ``number``, from 1, over its gain; as it is where no gain is better."""
     frames = coarse_frames((front, view), numbers, scene)
-    if not frames or scene.scattering == "absorption":
-        return None, ()
+    if not frames:
+        return view, ()
 
     def tried(gain: Gain) -> HeldOut:
         evened = [replace(frame, views=(frame.views[0], frame.views[1].over(gain))) for frame in frames]
@@ -170,13 +170,9 @@ def _exposure(
     gain = (scalar * colour).astype(np.float32)
     error = as_it_is if (gain == 1).all() else tried(gain).error
     if error >= as_it_is - tolerance:
-        return None, ()
+        return view, ()
     named = ", ".join(f"{value:.2f}" for value in gain)
     figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
-    return gain, (measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance),)
-
-
-def _over(view: ShotView, gain: Gain) -> ShotView:
-    """The view with its pictures and backgrounds over a gain."""
     clip = view.clip.changed(lambda _, picture: picture / gain)
-    return replace(view, clip=clip, plates=view.plates.through(lambda part: part / gain if part.ndim == 3 else part))
+    view = replace(view, clip=clip, plates=view.plates.through(lambda part: part / gain if part.ndim == 3 else part))
+    return view, (measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance),)

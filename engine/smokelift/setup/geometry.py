@@ -91,7 +91,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         # multiples of four, so that pyramids halve them evenly
         (floor, size, metres), multiple = _around(camera, samples, settings.distance), 4
     else:
-        floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
+        floor, size = np.array([*box.centre[:2], box.min[2]]), np.array(box.size)
     still = camera.at(next(iter(samples.smoky), 0))
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
@@ -114,7 +114,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         around = "box around the smoke" if samples.smoky else "box over the picture"
         remarks = (
             _assumed(known, clip.lens, focal / max(clip.size), metres * camera.size[1]),
-            Remark(around, {"size": _size(domain), "resolution": domain.resolution}),
+            Remark(around, {"size": domain.size, "resolution": domain.resolution}),
         )
     else:
         remarks = _grown(box, domain)
@@ -166,11 +166,6 @@ def _assumed(given: Camera | None, lens: float | None, focal: float, height: flo
     if lens is not None:
         return Remark("assumed camera with the file's lens", {"height": height, "lens": lens})
     return Remark("assumed camera", {"height": height, "lens": FILM_WIDTH * focal, "film": FILM_WIDTH})
-
-
-def _size(box: Box) -> tuple[float, ...]:
-    """Lengths of the sides of a box in metres."""
-    return tuple(high - low for low, high in zip(box.min, box.max, strict=True))
 
 
 def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
@@ -247,7 +242,7 @@ def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
     """A remark where a box that is given without a resolution grows to whole voxels."""
     if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
         return ()
-    return (Remark("grown box", {"size": _size(domain)}),)
+    return (Remark("grown box", {"size": domain.size}),)
 
 
 def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:

@@ -61,7 +61,7 @@ def find_medium(
     estimates: list[Estimate[Any]] = []
     remarks: list[Remark] = []
     if medium is None:
-        medium = Medium(extinction=OPTICAL_DEPTH_AT_ONE / min(np.subtract(domain.max, domain.min).tolist()))
+        medium = Medium(extinction=OPTICAL_DEPTH_AT_ONE / min(domain.size))
         remarks.append(Remark("assumed medium", {"extinction": medium.extinction, "albedo": medium.albedo}))
         color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
         medium = replace(medium, color=color)
