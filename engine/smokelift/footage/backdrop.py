@@ -50,9 +50,6 @@ MIN_KNOWN = 0.1
 """Share of a picture that is ever seen clear, or of all that shows one colour, below which it tells nothing: of public
 clips it is .2 and more (docs/clips.md), of one colour in texture that passes by .05."""
 
-TEXTURE = np.float32(6 / 255)
-"""White noise in sRGB values from which on it is texture that a moving camera sees."""
-
 NO_ERRORS = np.zeros((3, 3), np.float32)
 """Covariance of the errors of what is known."""
 
@@ -80,8 +77,6 @@ class Backdrop:
         Of the full pictures.
     background
         As a scene would give it; None where it was estimated, unless the camera is known to move.
-    colour
-        Linear, where one was found; black counts as such below half a step of 8 bit video.
     frames
         Number of the file's frames that decided on it: those up to the next cut.
     quantiser
@@ -94,7 +89,6 @@ class Backdrop:
     clip: Clip
     plates: Plates
     background: Background | None = None
-    colour: tuple[float, float, float] | None = None
     frames: int = 0
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
@@ -148,12 +142,11 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
     even, gains = part.evened()
     found = rank(even, white)
     if moves:
-        passes_by = found.clear < MOSTLY or white.max() > TEXTURE
-        if found.colour is None or found.objects.any() or passes_by:
+        if found.colour is None or found.objects.any() or found.clear < MOSTLY:
             raise ValueError(MOVING_CAMERA)
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))
-        return Backdrop("colour", clip, known_plate(found.colour, clip), behind, (red, green, blue), len(proxy.numbers))
+        return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut)
     # black, and a colour that is often seen, is the same wherever the camera looks; else texture may pass by
     plain = found.colour is not None and (found.clear > MIN_KNOWN or not found.colour.any())
@@ -162,23 +155,20 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
     colour, objects = found.colour, found.objects
     source: Source = "colour"
     if colour is None:
-        plate = _picture(clip, part, white)
+        plate = _picture(clip, part, even, gains, white)
         if plate.confidence.mean() >= MIN_KNOWN:
             return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
         # fog that drifts over all of the file: it is shown as it was made, before black
         colour, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    red, green, blue = (float(v) for v in colour)
-    plate = _of_one_colour(clip, part, even, gains, colour, objects, white)
-    return made(source, plates=plate, colour=(red, green, blue))
+    return made(source, plates=_of_one_colour(clip, part, even, gains, colour, objects, white))
 
 
-def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
+def _picture(clip: Clip, part: Proxy, even: Proxy, gains: Picture, white: Picture) -> Plate:
     """The plate of the picture that the clear frames show."""
-    even, gains = proxy.evened()
     noise = _noise(even, median_of_seen(even.pictures), white)
     picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale)
     return Plate(
-        whole_plate(clip, proxy, gains, picture),
+        whole_plate(clip, part, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),
         _noise(even, picture.image, white),
         picture.errors,

@@ -17,7 +17,15 @@ import numpy as np
 
 from smokelift.checks.array_types import Mask
 from smokelift.footage.behind_smoke import DETAIL
-from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import (
+    Picture,
+    area_average,
+    blurred,
+    channel_mean,
+    linear_to_srgb,
+    reduced_size,
+    srgb_to_linear,
+)
 from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, median_of_seen, spread_about
 from smokelift.footage.proxy import Proxy
 
@@ -154,8 +162,7 @@ def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
 def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
     """The colours of blocks (frames, blocks, 3), in sRGB values, and how many rows and columns of them there are."""
     rows, columns = proxy.seen.shape[1:]
-    scale = max(1.0, max(rows, columns) / BLOCKS)
-    high, wide = max(1, round(rows / scale)), max(1, round(columns / scale))
+    wide, high = reduced_size(columns, rows, BLOCKS)
     values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
     return values.reshape(len(values), -1, 3), (high, wide)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, reduced_size, srgb_to_linear
 
 DRIFT = 8 / 255
 """Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
@@ -148,9 +148,8 @@ def continuation_errors(image: Picture, known: npt.NDArray[np.bool_]) -> Picture
     """
     if known.all():
         return np.zeros((3, 3), np.float32)
-    height, width = known.shape
-    if max(height, width) > MAX_ERROR_SIDE:
-        height, width = (max(1, round(MAX_ERROR_SIDE * side / max(height, width))) for side in (height, width))
+    width, height = reduced_size(known.shape[1], known.shape[0], MAX_ERROR_SIDE)
+    if known.shape != (height, width):
         image, known = area_average(image, width, height), area_average(known.astype(np.float32), width, height) > 0.999
     encoded = linear_to_srgb(image)
     total, count = np.zeros((3, 3)), 0

@@ -12,10 +12,10 @@ from types import TracebackType
 import numpy as np
 
 from smokelift.checks import Remark
-from smokelift.footage.exposure import small_size
+from smokelift.footage.exposure import COMPARED_SIDE
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Wrapped
-from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import Picture, Transfer
+from smokelift.footage.image_sequence import ImageSequence, is_video
+from smokelift.footage.images import Picture, Transfer, reduced_size
 from smokelift.footage.mask import Mask, Masked, Seen
 from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
@@ -304,7 +304,9 @@ class _Changed(Wrapped):
 
     def read(self, n: int) -> StoredPicture:
         image, number = self.source.read(n), n - self._first
-        if self._keeps is not None and self._keeps(number, lambda: image.averaged(*small_size(*image.size))):
+        if self._keeps is not None and self._keeps(
+            number, lambda: image.averaged(*reduced_size(*image.size, COMPARED_SIDE))
+        ):
             return image
         return StoredPicture(self._change(number, image.linear()))
 
@@ -325,8 +327,3 @@ def numbered(frames: Sequence[int]) -> str:
         return f"frame {words[0]} is"
     last = f"{len(frames) - 5} more" if len(frames) > 5 else words.pop()
     return f"frames {', '.join(words)} and {last} are"
-
-
-def is_video(path: Path) -> bool:
-    """Return whether a path, to judge by its name, is that of a video, not of one or more pictures."""
-    return not ImageSequence.reads(path)

@@ -264,6 +264,12 @@ def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:
     raise ImageError(f"{path}: holds neither RGB nor Y channels, but {', '.join(names)}")
 
 
+def reduced_size(width: int, height: int, side: float) -> tuple[int, int]:
+    """Return width and height of a picture whose longer side is reduced to so many pixels at most."""
+    scale = max(1.0, max(width, height) / side)
+    return max(1, round(width / scale)), max(1, round(height / scale))
+
+
 def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
     """Resize a picture so that every new pixel is the mean of the area that it covers.
 
