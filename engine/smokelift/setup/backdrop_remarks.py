@@ -57,8 +57,11 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
         unknown = float(unknown_part(plates, clip, 0).mean())
         return (Remark("background partly seen", {"unknown": unknown}) if unknown else Remark("background seen"),)
     image = plates.at(0).image
-    red, green, blue = map(float, image[0, 0] if found.colour is None else found.colour)
-    other = float((image != np.array((red, green, blue), np.float32)).any(-1).mean())
+    colour = image[0, 0]
+    if not (image == colour).all():
+        colour = np.median(image.reshape(-1, 3), axis=0)
+    red, green, blue = map(float, colour)
+    other = float((image != colour).any(-1).mean())
     black = max(red, green, blue) < BLACK
     return (
         Remark("black background") if black else Remark("background of one colour", {"color": (red, green, blue)}),
