@@ -15,9 +15,8 @@ from scipy import ndimage
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import Visitor
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
-from smokelift.footage.stored_picture import LinearPicture
+from smokelift.footage.stored_picture import StoredPicture
 
 FPS = 24.0
 BRIGHT = 0.75
@@ -107,25 +106,18 @@ class Case:
     ----------
     clip
         As it was filmed.
-    plate : (rows, columns, 3) or (frames, rows, columns, 3)
-        The true background, linear; one a frame if the camera turns.
+    plate : (rows, columns, 3)
+        The true background, linear.
     clean : (frames, rows, columns, 3)
         The true pictures, linear.
     given
         Whether the background is given.
-    lens : (3, 3)
-        Of a camera that may turn, from directions to pixels.
     """
 
     clip: Clip
     plate: Picture
     clean: Picture
     given: bool
-    lens: npt.NDArray[np.float64] | None = None
-
-    def behind(self, number: int) -> Picture:
-        """The true background of a frame, linear (rows, columns, 3)."""
-        return self.plate if self.plate.ndim == 3 else self.plate[number]
 
 
 class Frames:
@@ -141,11 +133,11 @@ class Frames:
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)
 
-    def read(self, n: int) -> LinearPicture:
+    def read(self, n: int) -> StoredPicture:
         """Return a frame, linear."""
-        return LinearPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
+        return StoredPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """None."""
         return ()
 

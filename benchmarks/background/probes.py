@@ -22,8 +22,8 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
 from smokelift.setup.estimate import UNDETERMINED
-from smokelift.setup.smoke import sample_smoke
-from smokelift.setup.source import smoke_colour, source_radiance
+from smokelift.setup.first_estimate import sample_smoke
+from smokelift.setup.medium import smoke_colour, source_radiance
 from smokelift.setup.thickness import smoke_thickness
 
 Plates = Mapping[str, Picture]

@@ -55,17 +55,10 @@ class SmokeAxis:
 
     def at(self, heights: Doubles, laterals: Doubles | float = 0.0) -> Doubles:
         """Depths at some heights and lateral places."""
-        return self._read(self.depths, heights, laterals)
+        return self.read(self.depths, heights, laterals)
 
-    def spread_at(self, heights: Doubles, laterals: Doubles | float = 0.0) -> Doubles:
-        """Spreads at some heights and lateral places."""
-        return self._read(self.spreads, heights, laterals)
-
-    def width_at(self, heights: Doubles, laterals: Doubles | float = 0.0) -> Doubles:
-        """Widths at some heights and lateral places."""
-        return self._read(self.widths, heights, laterals)
-
-    def _read(self, values: Doubles, heights: Doubles, laterals: Doubles | float) -> Doubles:
+    def read(self, values: Doubles, heights: Doubles, laterals: Doubles | float) -> Doubles:
+        """Depths, spreads or widths (n, m) at some heights and lateral places."""
         if not self.several:
             return np.asarray(np.interp(heights, self.heights, values[:, 0]))
         rows = np.interp(heights, self.heights, np.arange(len(self.heights)))

@@ -102,7 +102,12 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
             return None
         first, domain = seen[0].camera, clip.optics.domain
         return estimate_axis([], first, domain, base=depth_at(distance, first, domain))
-    camera, optics = seen[len(seen) // 2].camera, replace(clip.optics, domain=_coarse(clip.optics.domain))
+    camera, domain = seen[len(seen) // 2].camera, clip.optics.domain
+    block = -(-max(domain.resolution) // MAX_VOXELS)
+    if block > 1:
+        x, y, z = (n // block for n in domain.resolution)
+        domain = domain.about_centre((x, y, z), block * domain.voxel_size)
+    optics = replace(clip.optics, domain=domain)
     amounts = [
         apparent_optical_depth(each.image, each.plate, matte(each.image, each.plate).mask, optics) for each in seen
     ]
@@ -114,7 +119,7 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
             seen_at(points, amount, each.camera).astype(np.float32) for amount, each in zip(amounts, seen, strict=True)
         ]
     base = None if distance is None else depth_at(distance, camera, clip.optics.domain)
-    return estimate_axis(amounts, camera, optics.domain, clip.inlets, base)
+    return estimate_axis(amounts, camera, domain, clip.inlets, base)
 
 
 def estimate_axis(
@@ -124,32 +129,24 @@ def estimate_axis(
     inlets: Sequence[Inlet] = (),
     base: float | None = None,
 ) -> AxisEstimate:
-    """The axis of the smoke in some frames.
+    """The axis of the smoke in some frames; the middle of the box where nothing else is known.
 
     Parameters
     ----------
     amounts : sequence of (rows, columns)
-        Optical depths, 0 where there is no smoke.
-    camera
-        A camera that stands still.
-    domain
-        The box.
+        Optical depths that a camera which stands still sees, 0 where there is no smoke.
+    camera, domain
+        The camera and the box.
     inlets
         Where smoke is known to enter; else a floor contact is searched for.
     base
         Depth (m) at which the one column is known to stand; then neither counts.
-
-    Returns
-    -------
-    AxisEstimate
-        The middle of the box where nothing else is known.
     """
     screens = [screen for amount in amounts if (screen := upright_screen(amount, camera, domain)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
-    cue: Cue
+    cue: Cue = "box" if base is None else "distance"
     if not screens:
-        cue, depth = ("box", 0.0) if base is None else ("distance", base)
-        return AxisEstimate(SmokeAxis.upright(depth), cue, depth, BOX_DEVIATION * reach)
+        return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, BOX_DEVIATION * reach)
     mean = replace(screens[0], values=np.mean([screen.values for screen in screens], 0))
     total = mean.values.sum(1)
     smoky = total > 0.02 * total.max()
@@ -161,20 +158,19 @@ def estimate_axis(
         lowest, widths = int(np.argmax(smoky)), np.zeros_like(middle)
         columns = [_Column(_at(depths, base), mean.heights[lowest], middle, widths, middle - middle[lowest])]
     elif inlets:
-        columns = _inlet_columns(inlets, mean, middle, depths, camera, domain)
+        cue, columns = "inlets", _inlet_columns(inlets, mean, middle, depths, camera, domain)
     else:
         columns = _floor_column(screens, len(amounts), middle, depths, camera, domain)
     if not columns:
-        return AxisEstimate(SmokeAxis.upright(), "box", 0.0, float(deviation))
+        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(deviation))
     # several columns lean towards one another
     leans = LEANING_PROBABILITY if len(columns) == 1 else 0.0
     known = [_posterior(column, depths, total, deviation, leans) for column in columns]
     error = np.sqrt(np.average(np.mean([variance for _, variance in known], 0), weights=total))
     axis = _axis(columns, [depth for depth, _ in known], mean)
     depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
-    cue = "floor contact" if error < MAX_KNOWN_DEVIATION * deviation else "box"
-    if base is not None or inlets:
-        cue = "inlets" if base is None else "distance"
+    if cue == "box" and error < MAX_KNOWN_DEVIATION * deviation:
+        cue = "floor contact"
     return AxisEstimate(axis, cue, depth, float(error))
 
 
@@ -188,10 +184,8 @@ class _Column:
         Log-likelihood of the depths of its base.
     begins
         Height (m above the domain's centre) of the base.
-    middles, widths : (n,)
-        By height, lateral place of its axis and lateral standard deviation (m).
-    drifts : (n,)
-        By height, lateral distance (m) of its axis from its base.
+    middles, widths, drifts : (n,)
+        By height, lateral place (m) of its axis, lateral standard deviation, and distance of its axis from its base.
     """
 
     base: Doubles
@@ -341,11 +335,3 @@ def _axis(columns: Sequence[_Column], known: Sequence[Doubles], mean: Screen) ->
         for values in (known, np.square(known), [column.widths for column in columns])
     )
     return SmokeAxis(mean.heights, mean.laterals, depths, np.sqrt(np.maximum(squares - depths**2, 0)), widths)
-
-
-def _coarse(domain: Domain) -> Domain:
-    """The domain, or a little more, in whole blocks of its voxels, `MAX_VOXELS` of them at most along a side."""
-    block = -(-max(domain.resolution) // MAX_VOXELS)
-    x, y, z = (-(-n // block) for n in domain.resolution)
-    a, b, c = (low + n * block * domain.voxel_size for low, n in zip(domain.min, (x, y, z), strict=True))
-    return Domain(domain.min, (a, b, c), (x, y, z))

@@ -217,10 +217,10 @@ class DepthProfile:
     ) -> NDArray[np.float64]:
         """Standard deviation (m) of the smoke in depth."""
         if self._axis.several:
-            across = self._axis.width_at(height, lateral)
+            across = self._axis.read(self._axis.widths, height, lateral)
         else:
             across = np.interp(height, self._heights, self._spread)
-        spread = np.sqrt(across * balls + (DISTANCE_SHARE * self._axis.spread_at(height, lateral)) ** 2)
+        spread = np.sqrt(across * balls + (DISTANCE_SHARE * self._axis.read(self._axis.spreads, height, lateral)) ** 2)
         return np.asarray(np.maximum(spread, self._domain.voxel_size))
 
     def _metres_aside(self, amount: NDArray[np.float32], scatter: Scatter) -> NDArray[np.float32]:

@@ -6,8 +6,7 @@ the negative logarithm of their probability with the likeliest states (Viterbi, 
 1967). One colour is behind all blocks, but for a few objects before it. A picture has a colour for each block. All
 colours are taken to be equally likely there, as they are after a jump, so each block's costs as much as a jump.
 
-A frame that is black everywhere says nothing against a picture, for clips fade. What is black, or another colour, at
-some time of the file counts for all of its frames up to the next cut, whatever part of it is used.
+What has a colour at some time of the file counts for all of its frames up to the next cut, whatever part is used.
 """
 
 from __future__ import annotations
@@ -18,10 +17,17 @@ import numpy as np
 
 from smokelift.checks.array_types import Mask
 from smokelift.footage.behind_smoke import DETAIL
-from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, spread_about
+from smokelift.footage.images import (
+    Picture,
+    area_average,
+    blurred,
+    channel_mean,
+    linear_to_srgb,
+    reduced_size,
+    srgb_to_linear,
+)
+from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, median_of_seen, spread_about
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.seen import median_of_seen
 
 BLOCKS = 64
 """Blocks along the longer side: means over some pixels, of which white noise is gone."""
@@ -53,9 +59,6 @@ MIN_SEEN_SHARE = 0.99
 CANDIDATES = 4
 """Colours that are tried: those that most of all blocks have."""
 
-MIN_BLACK_SHARE = 0.98
-"""Share of the blocks that are black in a frame that is black everywhere."""
-
 CLEAR_FRAMES = 8
 """Frames of which the clearest view of each pixel is taken."""
 
@@ -81,14 +84,11 @@ class Ranking:
         Pixels of the proxy that show something else before the colour all the time.
     clear
         Share of all blocks and frames that show the colour.
-    costs
-        Of the kinds that were compared, in nats a block, by the colour in codes of 8 bit; the least is the likeliest.
     """
 
     colour: Picture | None
     objects: Mask
     clear: float
-    costs: dict[str, float]
 
 
 def rank(proxy: Proxy, white: Picture) -> Ranking:
@@ -104,14 +104,13 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
 
     limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / np.prod(proxy.seen.shape[1:])) / proxy.scale))
     jump = -float(np.log(2 * limit.mean()))
-    goes_on = _goes_on(values, limit, jump)
-    empty = within(values, limit)
-    empty = empty & (empty.mean(1) > MIN_BLACK_SHARE)[:, None]
+    stays = within(np.diff(values, axis=0), np.float32(np.sqrt(2)) * limit)
+    goes_on = np.where(stays, -np.log(STAY_PROBABILITY), jump).astype(np.float32)
     picture = np.full(values.shape[1], np.inf)
     for value in values:
-        picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
+        picture = np.minimum(picture, _cost(within(values - value, limit), goes_on, jump))
     best = float(picture.mean()) + jump
-    costs, colour, found, share = {"picture": best}, None, np.zeros(values.shape[1], np.bool_), 0.0
+    colour, found, share = None, np.zeros(values.shape[1], np.bool_), 0.0
     still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
     for candidate in _candidates(values, limit):
         clear = within(values - candidate, limit)
@@ -125,12 +124,11 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
         brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
-        costs[", ".join(f"{255 * v:.0f}" for v in candidate)] = total
         if total < best and stands.mean() <= OBJECT and shows.mean() >= MIN_SHOWN_SHARE:
             best, found, share = total, stands & still, float(clear.mean())
             colour = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
             colour[linear_to_srgb(colour) < EIGHT_BIT_STEP / 2] = 0
-    return Ranking(colour, on_picture(found), share, costs)
+    return Ranking(colour, on_picture(found), share)
 
 
 def colour_around(picture: Picture) -> tuple[float, float, float] | None:
@@ -150,19 +148,6 @@ def colour_around(picture: Picture) -> tuple[float, float, float] | None:
     return red, green, blue
 
 
-def _goes_on(values: Picture, limit: Picture, jump: float) -> Picture:
-    """What it costs smoke to go on from one frame to the next (frames - 1, blocks), at most a jump.
-
-    It stays as it is within the noise, or changes as often by so much as smoke of the clip does: exponentially.
-    """
-    changes = np.diff(values, axis=0)
-    alike = within(changes, np.float32(np.sqrt(2)) * limit)
-    size = np.abs(changes).mean(-1)
-    usual = float(size[~alike].mean()) if not alike.all() else 1.0
-    change = np.log(max(usual / float(limit.mean()), 1)) + size / usual
-    return np.asarray(np.where(alike, -np.log(STAY_PROBABILITY), np.minimum(change, jump)), np.float32)
-
-
 def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
     """What blocks (n,) cost that may be clear in some frames (frames, n), with the likeliest states."""
     switch, leave = -np.log(SWITCH_PROBABILITY), -np.log(1 - SWITCH_PROBABILITY)
@@ -177,8 +162,7 @@ def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
 def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
     """The colours of blocks (frames, blocks, 3), in sRGB values, and how many rows and columns of them there are."""
     rows, columns = proxy.seen.shape[1:]
-    scale = max(1.0, max(rows, columns) / BLOCKS)
-    high, wide = max(1, round(rows / scale)), max(1, round(columns / scale))
+    wide, high = reduced_size(columns, rows, BLOCKS)
     values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
     return values.reshape(len(values), -1, 3), (high, wide)
 

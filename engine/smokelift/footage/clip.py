@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 
 from smokelift.checks import Remark
-from smokelift.footage.exposure import small_size
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Visitor
-from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import Picture, Transfer
-from smokelift.footage.kept_frames import KeptFrames, keep
-from smokelift.footage.mask import FrameMask, Mask, Masked, Seen
-from smokelift.footage.stored_picture import LinearPicture, StoredPicture
+from smokelift.footage.exposure import COMPARED_SIDE
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Wrapped
+from smokelift.footage.image_sequence import ImageSequence, is_video
+from smokelift.footage.images import Picture, Transfer, reduced_size
+from smokelift.footage.mask import Mask, Masked, Seen
+from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
-CACHE_BYTES = 64 * 2**20
-"""Memory for the linear frames of a clip that are kept: two of 1080p."""
+STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
+"""Memory for the frames of a file that are kept as they are stored, twenty of 1080p at 8 bits, for what reads the same
+ones spread over a clip; and for the linear frames of a clip that are kept: two of 1080p."""
 
 
 class Clip:
@@ -73,7 +73,7 @@ class Clip:
             raise ClipError(f"{path}: frames {first} to {last} were asked for; it has 0 to {source.count - 1}")
         self.first = first
         self._count = last - first + 1
-        self._cache: OrderedDict[int, LinearPicture] = OrderedDict()
+        self._cache: OrderedDict[int, StoredPicture] = OrderedDict()
         self.size = self.stored(0).size if size is None else size
 
     @classmethod
@@ -126,14 +126,12 @@ class Clip:
         path, fps, frames, transfer = said.path, said.fps, said.frames, said.transfer
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
+            clip = cls(path, _Kept(source), fps, frames)
             if said.mask is None:
-                return cls(path, KeptFrames(source), fps, frames)
-            first, last = (min(n, source.count - 1) for n in frames or (0, source.count - 1))
-            hides = Mask(said.mask, first, last)
-            masked = Masked(KeptFrames(source), hides)
-            clip = cls(path, KeptFrames(masked), fps, frames, masked=masked)
-            hides.check(*clip.size)
-            return clip
+                return clip
+            needed = range(clip.first, clip.first + len(clip))
+            masked = Masked(clip._source, Mask(said.mask, needed, clip.size))
+            return cls(path, _Kept(masked), fps, frames, clip.size, masked)
         except BaseException:
             source.close()
             raise
@@ -151,13 +149,7 @@ class Clip:
         return self._source.notes
 
     def remarks(self) -> tuple[Remark, ...]:
-        """Remarks on the clip: defects, frames that are replaced, how pictures are read.
-
-        Raises
-        ------
-        ClipError
-            If most frames are damaged.
-        """
+        """Remarks on the clip: defects, frames that are replaced, how pictures are read; ClipError as of `damaged`."""
         remarks = [self.warning] if self.warning else []
         if self.damaged:
             frames = numbered([self.first + n for n in self.damaged])
@@ -182,35 +174,25 @@ class Clip:
         return tuple(n - self.first for n in damaged)
 
     def frame(self, n: int) -> Picture:
-        """Return frame ``n``, counted from 0 at the start of the range.
-
-        Returns
-        -------
-        Linear float32 array of shape (height, width, 3), read-only because it is kept for the next caller.
+        """Return frame ``n``, counted from 0 at the start of the range: linear (height, width, 3), float32, read-only.
 
         Raises
         ------
         ClipError
             If there is no such frame, or most frames of the clip are damaged.
         """
-        return self._remembered(n, LinearPicture(self.stored(n).linear())).values
+        return _keep(self._cache, n, StoredPicture(self.stored(n).linear()), LINEAR_BYTES).values
 
     def stored(self, n: int) -> StoredPicture:
-        """Return frame ``n`` as it is stored, of which a part or means cost less than the linear frame.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
+        """Return frame ``n`` as it is stored, of which a part or means cost less than the linear `frame`."""
         if n in self._cache:
             self._cache.move_to_end(n)
             return self._cache[n]
         image = self._read(n)
-        return self._remembered(n, image) if isinstance(image, LinearPicture) else image
+        return _keep(self._cache, n, image, LINEAR_BYTES) if image.table is None else image
 
     @property
-    def mask(self) -> FrameMask | None:
+    def mask(self) -> Mask | None:
         """What hides a part of the frames, if anything does."""
         return None if self._masked is None else self._masked.mask
 
@@ -218,16 +200,10 @@ class Clip:
         """Return the clip with what a mask hides. The two share the open file."""
         if self._masked is None:
             return self
-        return Clip(self.path, self._masked.filmed, self.fps, (self.first, self.first + len(self) - 1), self.size)
+        return Clip(self.path, self._masked.source, self.fps, (self.first, self.first + len(self) - 1), self.size)
 
     def seen(self, n: int, width: int, height: int) -> Seen | None:
-        """Return which pixels of frame ``n`` no mask hides, at a size of (height, width); None of a clip without one.
-
-        Raises
-        ------
-        ClipError, ImageError
-            If the mask of the frame cannot be read.
-        """
+        """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask."""
         return None if self._masked is None else self._masked.mask.seen(self.first + n, width, height)
 
     def as_seen(self, n: int, picture: Picture) -> Picture:
@@ -235,18 +211,6 @@ class Clip:
         rows, columns = picture.shape[:2]
         seen = self.seen(n, columns, rows)
         return picture if seen is None else np.where(seen[..., None], picture, np.float32(np.nan))
-
-    def _remembered(self, n: int, image: LinearPicture) -> LinearPicture:
-        """A linear frame, kept for the next caller."""
-        keep(self._cache, n, image, CACHE_BYTES)
-        return image
-
-    def expect(self, numbers: Iterable[int] = ()) -> None:
-        """Say which frames are asked for next: those decoded while `damaged` is determined are kept, the first of these
-        numbers before the others. It has no effect on a clip whose frames are `changed`.
-        """
-        if isinstance(self._source, KeptFrames):
-            self._source.expect([self.first + n for n in numbers if n < len(self)])
 
     def _read(self, n: int) -> StoredPicture:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
@@ -287,27 +251,14 @@ class Clip:
         self,
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
-        *,
-        size: tuple[int, int] | None = None,
-        mask: FrameMask | None = None,
     ) -> Clip:
         """Return the clip with each frame, by its number, replaced by another. The two share the open file.
 
-        Parameters
-        ----------
-        change
-            Makes the new frame.
-        keeps
-            Says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
-        size
-            Width and height of the new frames; those of the old ones by default.
-        mask
-            What hides a part of the new frames; what hides the old ones by default.
+        ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
         last = self.first + len(self) - 1
         source = _Changed(self, self._source, change, keeps)
-        masked = self._masked if mask is None else Masked(self._source, mask)
-        return Clip(self.path, source, self.fps, (self.first, last), size or self.size, masked)
+        return Clip(self.path, source, self.fps, (self.first, last), self.size, self._masked)
 
     def close(self) -> None:
         """Close the file."""
@@ -322,7 +273,23 @@ class Clip:
         self.close()
 
 
-class _Changed:
+class _Kept(Wrapped):
+    """The frames of a source, of which the last ones read are kept for all clips that share it."""
+
+    def __init__(self, source: FrameSource) -> None:
+        super().__init__(source)
+        self._kept: OrderedDict[int, StoredPicture] = OrderedDict()
+        self._damaged = lru_cache(maxsize=None)(source.damaged)
+
+    def read(self, n: int) -> StoredPicture:
+        image = self._kept.pop(n) if n in self._kept else self.source.read(n)
+        return _keep(self._kept, n, image, STORED_BYTES)
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        return self._damaged(first, last)
+
+
+class _Changed(Wrapped):
     """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
     def __init__(
@@ -332,28 +299,25 @@ class _Changed:
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None,
     ) -> None:
-        self._clip, self._source, self._change, self._keeps = clip, source, change, keeps
-        self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files, self.lens, self.backdrop = source.files, clip.lens, clip.backdrop
-
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        return self._source.notes
+        super().__init__(source)
+        self._first, self._change, self._keeps = clip.first, change, keeps
 
     def read(self, n: int) -> StoredPicture:
-        image, number = self._source.read(n), n - self._clip.first
-        if self._keeps is not None and self._keeps(number, lambda: image.averaged(*small_size(*image.size))):
+        image, number = self.source.read(n), n - self._first
+        if self._keeps is not None and self._keeps(
+            number, lambda: image.averaged(*reduced_size(*image.size, COMPARED_SIDE))
+        ):
             return image
-        return LinearPicture(self._change(number, image.linear()))
+        return StoredPicture(self._change(number, image.linear()))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
-        clip = self._clip
-        if (first, last) == (clip.first, clip.first + len(clip) - 1):  # what the clip may know already
-            return tuple(clip.first + n for n in clip.damaged)
-        return self._source.damaged(first, last, visit)
 
-    def close(self) -> None:
-        self._source.close()
+def _keep(kept: OrderedDict[int, StoredPicture], n: int, image: StoredPicture, most: int) -> StoredPicture:
+    """A picture, read-only from now on, put beside the last ones in so many bytes."""
+    image.values.flags.writeable = False
+    kept[n] = image
+    while len(kept) > max(1, most // image.values.nbytes):
+        kept.popitem(last=False)
+    return image
 
 
 def numbered(frames: Sequence[int]) -> str:
@@ -363,8 +327,3 @@ def numbered(frames: Sequence[int]) -> str:
         return f"frame {words[0]} is"
     last = f"{len(frames) - 5} more" if len(frames) > 5 else words.pop()
     return f"frames {', '.join(words)} and {last} are"
-
-
-def is_video(path: Path) -> bool:
-    """Return whether a path, to judge by its name, is that of a video, not of one or more pictures."""
-    return not ImageSequence.reads(path)

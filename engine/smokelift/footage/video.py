@@ -14,9 +14,10 @@ A video whose rate varies by more than 1 % is read at its mean rate: frame n is 
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -30,26 +31,32 @@ from av.video.reformatter import ColorRange, Interpolation
 
 import smokelift._core as _core
 from smokelift.checks import Remark
-from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import lacks_index, open_container
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Visitor
+from smokelift.footage.frame_source import (
+    DEFAULT_FPS,
+    ClipError,
+    DamagedFrameError,
+    Layer,
+    backdrop_of,
+    believed_focal_length,
+    sample_numbers,
+    shown_before,
+)
 from smokelift.footage.images import (
     MAX_PIXELS,
-    Picture,
     Transfer,
-    area_average,
     code_values,
     decode_alpha,
     decode_integers,
     reduction,
     srgb_to_linear,
 )
-from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
-from smokelift.footage.stored_picture import CodedPicture, LinearPicture, StoredPicture
+from smokelift.footage.stored_picture import StoredPicture
 from smokelift.scene import LARGEST_PICTURE
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
+_FOCAL_LENGTH = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 """FFmpeg's own decoders of these leave the alpha channel out."""
 
@@ -99,7 +106,7 @@ class Video:
         self._premultiplied = False
         self.backdrop = self._matted()
         self._format = self._described()
-        self.lens = lens.of_tags({**self._container.metadata, **self._stream.metadata})
+        self.lens = believed_focal_length({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
 
     def _start(self) -> None:
         """Open the file at its beginning."""
@@ -244,41 +251,25 @@ class Video:
 
     def read(self, n: int) -> StoredPicture:
         """Return a frame, or raise `DamagedFrameError`."""
-        return self._shown_by(self._decode(self._shown[n]))
-
-    def _shown_by(self, frame: av.VideoFrame) -> StoredPicture:
-        """What a frame shows."""
-        if (
-            _has_alpha(frame)
-            or frame.interlaced_frame
-            or primaries_name(self._stream.codec_context.color_primaries) is not None
-        ):
-            return LinearPicture(self._layer(frame).before(self.backdrop))
+        frame = self._decode(self._shown[n])
+        if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
+            return StoredPicture(shown_before(self._layer(frame), self.backdrop))
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
-        return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
+        return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded; others go to ``visit``, some twice."""
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which frames from one to another cannot be decoded."""
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
         if not self._keys:
             return ()  # they were counted by decoding them
-        numbers: dict[int, list[int]] = {}
-        for n, time in enumerate(wanted, first):
-            numbers.setdefault(time, []).append(n)
-
-        def pass_on(time: int, frame: av.VideoFrame) -> None:
-            for n in numbers.get(time, ()):
-                if visit is not None:
-                    visit(n, lambda: self._shown_by(frame))
-
         from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._container.seek(wanted[0], stream=self._stream)
         self._decoded = self._frames()
-        good = self._good_times(wanted[-1], pass_on)
+        good = self._good_times(wanted[-1])
         if not (from_start or good.issuperset(wanted)):  # as in `_decode`
             self._rewind()
-            good |= self._good_times(wanted[-1], pass_on)
+            good |= self._good_times(wanted[-1])
         damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
         if damaged or self._failed:
             self._rewind()
@@ -287,25 +278,33 @@ class Video:
         self._lost.update(self._shown[n] for n in damaged)
         return damaged
 
-    def _good_times(self, last: int, pass_on: Callable[[int, av.VideoFrame], None]) -> set[int]:
-        """Times of the frames that can be decoded from where the container stands, up to one; each is passed on."""
+    def _good_times(self, last: int) -> set[int]:
+        """Times of the frames that can be decoded from where the container stands, up to one."""
         good = set()
         for frame in self._decoded:
             if frame.pts is not None and not frame.is_corrupt:
                 good.add(frame.pts)
-                pass_on(frame.pts, frame)
             if frame.pts is not None and frame.pts >= last:
                 break
         return good
 
     def _decode(self, index: int) -> av.VideoFrame:
         """Return the decoded frame at an index into ``_times``."""
+        frame = None
         if not self._keys:
-            return self._decode_by_count(index)
-        if index in self._lost:
+            frame = self._count_to(index)
+        elif index not in self._lost:
+            frame = self._seek(index)
+        if frame is None:
+            self._rewind()
+            self._lost.add(index)
             raise DamagedFrameError(
                 f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
             )
+        self._next = index + 1
+        return frame
+
+    def _seek(self, index: int) -> av.VideoFrame | None:
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
         key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
@@ -317,13 +316,6 @@ class Video:
             # A seek may land late (open groups of pictures); from the start nothing can be missed.
             self._rewind()
             frame = self._forward_to(wanted)
-        if frame is None:
-            self._rewind()
-            self._lost.add(index)
-            raise DamagedFrameError(
-                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
-            )
-        self._next = index + 1
         return frame
 
     def _forward_to(self, wanted: int) -> av.VideoFrame | None:
@@ -332,15 +324,10 @@ class Video:
                 return frame if frame.pts == wanted and not frame.is_corrupt else None
         return None
 
-    def _decode_by_count(self, index: int) -> av.VideoFrame:
+    def _count_to(self, index: int) -> av.VideoFrame | None:
         if index < self._next:
             self._rewind()
-        for frame in self._decoded:
-            self._next += 1
-            if self._next == index + 1:
-                return frame
-        self._rewind()
-        raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again")
+        return next(islice(self._decoded, index - self._next, None), None)
 
     def _pixel_shape(self) -> Fraction:
         """Return how many times as wide as high a pixel is, as stored."""
@@ -373,7 +360,7 @@ class Video:
         return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
 
     def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
-        """RGB, and alpha if there is any, in codes; of an interlaced frame the even lines."""
+        """RGB, and alpha if there is any, in codes."""
         wide = max(component.bits for component in frame.format.components) > 8
         alpha = _has_alpha(frame)
         # FFmpeg writes planes three times as fast as it writes pixels, of the same codes
@@ -386,12 +373,11 @@ class Video:
                 "export it in one size"
             )
         width, height = self._size()
-        interlaced = bool(frame.interlaced_frame)
-        shown = self._field(frame) if interlaced else frame
+        if frame.interlaced_frame:
+            self._interlaced, frame = True, self._of_one_moment(frame)
         way = _SHRINKING if width < size[0] else _GROWING
-        rows = shown.height if interlaced else height
         # in this thread: after a fork of a process that has read a video, the converter waits for its own for ever
-        converted = shown.reformat(width, rows, "gbrp" if planes else layout, interpolation=way, threads=1)
+        converted = frame.reformat(width, height, "gbrp" if planes else layout, interpolation=way, threads=1)
         if planes:
             green, blue, red = (_lines(plane) for plane in converted.planes)
             return _core.interleave((red, green, blue))
@@ -402,23 +388,19 @@ class Video:
         codes, white = self._codes(frame), _white(frame)
         linear = decode_integers(codes, self._encoding(), white, self._premultiplied)
         opacity = decode_alpha(codes, white)
-        if frame.interlaced_frame:
-            self._interlaced = True
-            width, height = self._size()
-            linear = area_average(_between_lines(linear, frame.height), width, height)
-            if opacity is not None:
-                opacity = area_average(_between_lines(opacity, frame.height), width, height)
         picture = to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
-        return Layer(picture, None if opacity is None else _upright(opacity, frame))
+        return picture, None if opacity is None else _upright(opacity, frame)
 
-    def _field(self, frame: av.VideoFrame) -> av.VideoFrame:
-        """Return the even lines of a frame: their colours too are of one moment."""
+    def _of_one_moment(self, frame: av.VideoFrame) -> av.VideoFrame:
+        """The even lines of an interlaced frame, with others between them."""
         graph = Graph()
-        graph.link_nodes(graph.add_buffer(self._stream), graph.add("field", "type=top"), graph.add("buffersink"))
+        nodes = graph.add_buffer(self._stream), graph.add("estdif", "mode=frame:parity=tff"), graph.add("buffersink")
+        graph.link_nodes(*nodes)
         graph.configure()
         graph.vpush(frame)
-        field: av.VideoFrame = graph.vpull()
-        return field
+        graph.vpush(None)
+        whole: av.VideoFrame = graph.vpull()
+        return whole
 
 
 def _has_alpha(frame: av.VideoFrame) -> bool:
@@ -439,14 +421,6 @@ def _white(frame: av.VideoFrame) -> float:
     grey = len(frame.format.components) < 3  # read as of full range, whatever it says
     limited = frame.color_range != ColorRange.JPEG and not grey
     return 255 / 256 if limited else (2**bits - 1) * 2 ** (16 - bits) / 65535
-
-
-def _between_lines(even: Picture, rows: int) -> Picture:
-    """Return the whole picture of its even rows: each other row is the mean of its neighbours."""
-    picture = np.repeat(even, 2, axis=0)[:rows]
-    odd = picture[1:-1:2]
-    odd += 0.5 * (picture[2::2] - odd)
-    return picture
 
 
 def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from smokelift.render.environment import EnvironmentCells
 from smokelift.render.renderer import Image, Renderer, Volume
-from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium
+from smokelift.scene import Camera, Domain, EnvironmentLight, Medium
 from smokelift.scene.projection import voxel_width
 
 MIN_LIGHTS, MAX_LIGHTS = 4, 256
@@ -49,54 +47,24 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
     small = _coarse(domain)
     view = _coarse_camera(camera, small)
     ball = _reference_density(small, medium)
-
-    def picture(lights: tuple[DirectionalLight, ...]) -> Image:
-        return Renderer(view, small, medium, lights, np.zeros(3, np.float32)).image(ball)
-
-    return lights_needed(light, picture)[0]
-
-
-def lights_needed(
-    light: EnvironmentLight, picture: Callable[[tuple[DirectionalLight, ...]], Image]
-) -> tuple[int, float]:
-    """Double the number of lights until that changes a picture by at most `TOLERANCE`, or there are 256.
-
-    Parameters
-    ----------
-    light
-        The environment.
-    picture
-        Shows something in some lights.
-
-    Returns
-    -------
-    count
-        The number of lights that doubling did not change any more.
-    change
-        By how much doubling still changes the picture (relative L2 norm).
-
-    Raises
-    ------
-    smokelift.footage.images.ImageError
-        As `smokelift.render.environment.environment_lights`.
-    """
     cells = EnvironmentCells(light)
-    count, image = MIN_LIGHTS, picture(cells.lights(MIN_LIGHTS))
-    while True:
-        finer = picture(cells.lights(2 * count))
-        bright = float(np.linalg.norm(finer))
-        change = float(np.linalg.norm(finer - image)) / bright if bright > 0 else 0.0
-        if change <= TOLERANCE or 2 * count >= MAX_LIGHTS:
+
+    def picture(lights: int) -> Image:
+        return Renderer(view, small, medium, cells.lights(lights), np.zeros(3, np.float32)).image(ball)
+
+    count, image = MIN_LIGHTS, picture(MIN_LIGHTS)
+    while count < MAX_LIGHTS:
+        finer = picture(2 * count)
+        if np.linalg.norm(finer - image) <= TOLERANCE * np.linalg.norm(finer):
             break
         count, image = 2 * count, finer
-    return (count if change <= TOLERANCE else MAX_LIGHTS), change
+    return count
 
 
 def _coarse(domain: Domain) -> Domain:
     """The domain in few cubic voxels; where they do not fit its edges, to the nearest."""
-    edges = [high - low for low, high in zip(domain.min, domain.max, strict=True)]
-    voxel = max(edges) / REFERENCE_VOXELS
-    x, y, z = (max(round(edge / voxel), 1) for edge in edges)
+    voxel = max(domain.size) / REFERENCE_VOXELS
+    x, y, z = (max(round(edge / voxel), 1) for edge in domain.size)
     return domain.about_centre((x, y, z), voxel)
 
 

@@ -13,10 +13,10 @@ from smokelift.report.sentences import sentence
 from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.backdrop_remarks import BLACK
 from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import unknown_part
 
 CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
 """Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
@@ -122,7 +122,8 @@ def _exposure(shot: Shot, plate: Plate) -> Fact:
     if not shows_exposure(small(plate.image)):
         how = "The background is too dark or too bright to show it, so what flickers is taken for smoke."
         return Fact("exposure", "taken to be steady", UNDETERMINED, how)
-    value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
+    changes = [remark.figures["change"] for remark in shot.remarks if remark.kind == "exposure"]
+    value = f"changes by up to {changes[0]:.0%}, evened out" if changes else "steady"
     return Fact("exposure", value, "measured", "Measured on what does not move, against the background.")
 
 
@@ -143,14 +144,6 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if strength is not None and given.lights:
         return (Fact("light", f"{strength.value} times as strong as given", "measured", sentence(strength)),)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    direction = _estimate(shot, "light direction")
-    if direction is not None and direction.value != UNDETERMINED:
-        return (
-            Fact("light strength", f"smoke of radiance {colour}", "measured", "Light strength: as the views show it."),
-            _chosen(shot, "light direction", "sun's direction", str(direction.value), False),
-            Fact("sun's colour", "that of all light", UNDETERMINED),
-            Fact("ambient share", f"{direction.figures['ambient_share']:.0%}", "measured"),
-        )
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
     hides, origin = "as the light asks for", UNDETERMINED
@@ -159,9 +152,9 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     return (
         Fact("light strength", f"smoke of radiance {colour}", origin, _said(shot, "light")),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
-        _chosen(shot, "light direction", "sun's direction", "no sun", False),
-        _chosen(shot, "light direction", "sun's colour", "that of all light", False),
-        _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
+        Fact("sun's direction", "no sun", UNDETERMINED, "Suns from many sides look the same. Give the lights."),
+        Fact("sun's colour", "that of all light", UNDETERMINED),
+        Fact("ambient share", "all light is from everywhere", UNDETERMINED),
     )
 
 

@@ -18,8 +18,8 @@ from smokelift.report.page import TILE, Fact, Page, Panel, fitted
 from smokelift.report.sentences import sentence
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project_points
+from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import unknown_part
 
 Tile = NDArray[np.uint8]
 

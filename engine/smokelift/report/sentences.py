@@ -72,10 +72,6 @@ SENTENCES: Mapping[str, str] = {
         "there is filled in from around it, so how thick the smoke is there is undetermined. Give a clean plate as "
         "background to show it."
     ),
-    "turning camera": (
-        "The camera moves, by up to {pixels:.0f} pixels. It is steadied against the background, as a camera that turns "
-        "in its place, and has a matrix for every frame."
-    ),
     "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is matched to the background.",
     "background of one frame": (
         "One frame alone does not show what moves: the color around it counts as background, and every other color as "
@@ -215,20 +211,6 @@ SENTENCES: Mapping[str, str] = {
         "Smoke thickness: undetermined, because the texture behind it shows it only to {spread:.0%} ({tolerance:.0%} "
         "or less is needed). Thinner smoke in stronger light looks the same. Give the lights if you know them."
     ),
-    "light direction": (
-        "Light direction: {value}, give or take 20 degrees, as the {views} views show together. {ambient_share:.0%} of "
-        "the light comes from everywhere."
-    ),
-    "light direction undetermined by one view": (
-        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. In one "
-        "view suns from many sides look the same. Give the lights if you know them."
-    ),
-    "light direction undetermined by several views": (
-        "Light direction: undetermined, and so are the color of a sun and the share of light from everywhere. "
-        "{ambient_share:.0%} of the light from everywhere explains the {views} views best, but leaves {shading:.0%} of "
-        "the smoke's light. A sun explains {explained:.0%} of that rest, and its direction is right to {spread:.0f} "
-        "degrees. Give the lights if you know them."
-    ),
     "scattering": "Scattering: {value}.",
     "compared scattering": (
         "Scattering: {value}; pixels that the fit leaves out differ by {error:.1%} of the smoke's contrast, with "
@@ -238,9 +220,6 @@ SENTENCES: Mapping[str, str] = {
         "Scattering: {value}, in light from everywhere, because no light is given; pixels that the fit leaves out "
         "differ by {error:.1%} of the smoke's contrast, with {other} by {other_error:.1%}."
     ),
-    "environment directions": (
-        "Environment: {value} directions; doubling them last changed the picture by {change:.1%}."
-    ),
     "gain of a view": (
         "It shows the smoke {value} times (red, green, blue) as bright as the input. This is evened out: the pictures "
         "differ by {error:.1%} of the smoke's contrast instead of {error_as_it_is:.1%}. If the cameras have the same "
@@ -248,19 +227,9 @@ SENTENCES: Mapping[str, str] = {
     ),
     # what a run needs besides
     "given": "{what} by hand: {value}.",
-    "domain": (
-        "Domain: only voxels in which the picture allows smoke are computed, {hull_share:.0%} of the box. Frames "
-        "without smoke cost nothing."
-    ),
-    "iterations": (
-        "Iterations: {value} at most, {iterations:.0f} on the coarse frames. They stop when one lowers the error by "
-        "less than {tolerance:.0%}, or when only noise is left."
-    ),
     "velocity grid coarsening": (
         "Velocity grid: {voxels:.0f} voxels along the longest side, because the depth of the smoke is uncertain."
     ),
-    "velocity levels": "Velocity grids: {value}, because the fastest smoke goes {voxels_a_frame:.1f} voxels a frame.",
-    "velocity levels without motion": "Velocity grids: {value}, since there is no motion to measure.",
     # where the parts of a result come from
     "replaced pictures": "Those of {frames} missing or damaged; a neighboring good one stands in.",
     "pictures that are fitted": (

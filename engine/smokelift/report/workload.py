@@ -8,9 +8,9 @@ from statistics import fmean
 
 from smokelift.density import RoundDepth, ViewSet
 from smokelift.scene import Domain
+from smokelift.setup.first_estimate import SAMPLE_FRAMES
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import SAMPLE_FRAMES
 
 MAX_SIDE_VOXELS = 96
 """Voxels along the longest side of the grid on which the smoke is found, at most: it takes a rim of one of them

@@ -48,6 +48,12 @@ class Box:
                 )
 
     @property
+    def size(self) -> Vector:
+        """Lengths of its sides (m)."""
+        x, y, z = (high - low for low, high in zip(self.min, self.max, strict=True))
+        return x, y, z
+
+    @property
     def centre(self) -> Vector:
         """Middle of the box in metres."""
         x, y, z = ((low + high) / 2 for low, high in zip(self.min, self.max, strict=True))

@@ -23,16 +23,15 @@ class Estimate(Remark, Generic[Value]):
     Attributes
     ----------
     what
-        ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"domain"``, ``"environment directions"``,
-        ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"``, ``"axis depth"``, ``"smoke colour"``,
-        ``"smoke thickness"``, ``"light direction"``, ``"gain of view 1"`` or ``"fire"``.
+        ``"scattering"``, ``"light strength"``, ``"resolution"``,
+        ``"velocity grid coarsening"``, ``"axis depth"``, ``"smoke colour"``, ``"smoke thickness"``,
+        ``"gain of view 1"`` or ``"fire"``.
     value
         What will be used, or `UNDETERMINED`.
     source
         The user gives it, the clip shows it, or nothing decides it and it is assumed.
     spread
-        Standard deviation of what was measured: metres of an axis depth, degrees of a light direction, a share of a
-        smoke thickness; None of others.
+        Standard deviation of what was measured: metres of an axis depth, a share of a smoke thickness; None of others.
     tolerance
         What the deciding figure was held against.
     """

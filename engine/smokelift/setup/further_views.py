@@ -1,10 +1,18 @@
-"""Further calibrated cameras: their clips in step with the input's, their backgrounds, and whether they agree."""
+"""Further calibrated cameras: their clips in step with the input's, their backgrounds and exposures, their agreement.
+
+Cameras have exposures and white balances of their own. Two pictures of one smoke bind each other: every slice across
+both cameras holds as much smoke in one as in the other. So a density is fitted to both, on coarse frames. How much
+brighter than the density the further one shows it, over how much brighter the input does, is the camera's gain; both
+are fitted again with that evened out, until little is left. Figures: docs/experiments/view-gain.md.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smokelift.checks import Doubt, Figures, Remark
 from smokelift.density import ViewSet
@@ -12,10 +20,14 @@ from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.steady import steady
-from smokelift.footage.working_picture import CameraError, working_picture
+from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.backdrop_remarks import backdrop_remarks, exposure_change, exposure_remarks
+from smokelift.setup.backdrop_remarks import backdrop_remarks
+from smokelift.setup.coarse import coarse_frames
+from smokelift.setup.estimate import Estimate, measured
 from smokelift.setup.geometry import fitting
+from smokelift.setup.held_out import HeldOut, held_out
+from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 
 AGREEMENT_SAMPLES = 4
@@ -26,54 +38,49 @@ MIN_AGREED_SHARE = 0.9
 cameras upside down on a tenth to nine tenths (docs/experiments/view-agreement.md)."""
 
 SAME_RATE = 0.01
-"""Relative difference of two frame rates that are the same."""
+"""Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""
+
+ROUNDS = 3
+"""Fits from which a gain is found, each with the one before evened out: a fourth changes it by .3 % at most
+(docs/experiments/view-gain.md)."""
+
+MAX_GAIN = 8.0
+"""Largest gain, and the inverse of the smallest: three stops."""
+
+RATIO, RATIO_UNLIT = 1.2, 1.35
+"""Ratio of brightness from which on it is the cameras', where light is known and where it is taken to come from
+everywhere. Cameras that are exposed alike are found to differ by up to 1.15 and 1.30 (docs/experiments/view-gain.md):
+coarse voxels cast other shadows, and light from one side is brighter there."""
+
+COLOUR_RATIO = 1.05
+"""Ratio of two colours from which on it is the cameras'; light and shadow do not change it
+(docs/experiments/view-gain.md)."""
+
+Gain = NDArray[np.float32]
 
 
-def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
-    """Open a further view of a complete scene and find its background; with remarks on it.
+def open_views(
+    first: ShotView, scene: CompleteScene, numbers: Sequence[int], lit: bool, settings: Settings
+) -> tuple[tuple[ShotView, ...], tuple[Estimate[str], ...], tuple[Remark, ...]]:
+    """Open the further views of a lit scene, at the input's exposure; with what was measured and noticed.
 
-    Parameters
-    ----------
-    number
-        Of the view among the further ones.
-    clip
-        The input.
-    scene
-        What both show.
+    Brightness is compared in frames of some numbers. It says more where lights are given (``lit``), not estimated.
 
     Raises
     ------
     ValueError
-        If its clip or its camera does not fit the input's.
+        If a clip or a camera does not fit the input's.
     """
-    view, name = scene.views[number], f"View {number + 1}"
-    opened = _opened(view.clip, clip, scene)
-    if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
-        raise ValueError(
-            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
-            "convert one, or give the frame rate of the clip whose file says it wrongly."
-        )
-    camera = fitting(view.camera, opened)
-    try:
-        working = working_picture(camera, scene.domain)
-    except CameraError as error:
-        raise ValueError(f"{name}: {error}") from error
-    background = view.background
-    if background is None and scene.background.color is not None:
-        background = scene.background
-    found = find_backdrop(opened, camera, background)
-    axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
-    angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
-    last = opened.first + len(opened) - 1
-    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
-    remarks = [
-        *opened.remarks(),
-        Remark("further view", which),
-        *backdrop_remarks(found),
-        *exposure_remarks(exposure_change(found.clip, found.plates)),
-    ]
-    of_view = [replace(remark, figures={**remark.figures, "view": number + 1}) for remark in remarks]
-    return ShotView(steady(found.clip, found.plates), camera, found.plates, working), of_view
+    views, remarks = [], []
+    estimates: list[Estimate[str]] = []
+    for number in range(len(scene.views)):
+        view, noticed = _open_view(number, first.clip, scene)
+        if settings.selection.measure and scene.scattering != "absorption":
+            view, found = _evened(number + 1, first, view, scene, numbers, lit, settings)
+            estimates += found
+        views.append(view)
+        remarks += noticed
+    return tuple(views), tuple(estimates), tuple(remarks)
 
 
 def disagreement(shot: Shot) -> tuple[Doubt, ...]:
@@ -84,6 +91,31 @@ def disagreement(shot: Shot) -> tuple[Doubt, ...]:
         shares.append(agreement([view.mask for view in views], [view.projection for view in views]))
     agreed = float(np.median(shares))
     return () if agreed >= MIN_AGREED_SHARE else (Doubt("disagreeing views", {"agreed": agreed}),)
+
+
+def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
+    """A further view of a complete scene before its background; with remarks on it."""
+    view = scene.views[number]
+    opened = _opened(view.clip, clip, scene)
+    if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
+        raise ValueError(
+            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
+            "convert one, or give the frame rate of the clip whose file says it wrongly."
+        )
+    camera, background = fitting(view.camera, opened), view.background
+    if background is None and scene.background.color is not None:
+        background = scene.background
+    found = find_backdrop(opened, camera, background)
+    try:
+        shown = ShotView.before(scene.domain, steady(found.clip, found.plates), camera, found.plates)
+    except CameraError as error:
+        raise ValueError(f"View {number + 1}: {error}") from error
+    axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
+    angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
+    last = opened.first + len(opened) - 1
+    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
+    remarks = (*opened.remarks(), Remark("further view", which), *backdrop_remarks(found))
+    return shown, [replace(remark, figures={**remark.figures, "view": number + 1}) for remark in remarks]
 
 
 def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
@@ -102,3 +134,45 @@ def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
             "fewer frames of the input, or say which frames of the view belong to them."
         )
     return Clip.open(source, fps=fps, frames=(first, last))
+
+
+def _evened(
+    number: int,
+    front: ShotView,
+    view: ShotView,
+    scene: CompleteScene,
+    numbers: Sequence[int],
+    lit: bool,
+    settings: Settings,
+) -> tuple[ShotView, tuple[Estimate[str], ...]]:
+    """View ``number``, from 1, over its gain; as it is where no gain is better."""
+    frames = coarse_frames((front, view), numbers, scene)
+    if not frames:
+        return view, ()
+
+    def tried(gain: Gain) -> HeldOut:
+        evened = [replace(frame, views=(frame.views[0], frame.views[1].over(gain))) for frame in frames]
+        return held_out(evened, scene.scattering, scene.scattering, settings.density)
+
+    errors: list[float] = []
+    ratio = np.ones(3)
+    for _ in range(ROUNDS):
+        found = tried(ratio.astype(np.float32))
+        own, other = np.maximum(found.colours, 1e-6)
+        errors, ratio = [*errors, found.error], np.clip(ratio * other / own, 1 / MAX_GAIN, MAX_GAIN)
+    as_it_is, tolerance = errors[0], settings.selection.scattering_error
+    scalar = float(np.exp(np.mean(np.log(ratio))))
+    colour = ratio / scalar
+    if max(scalar, 1 / scalar) < (RATIO if lit else RATIO_UNLIT):
+        scalar = 1.0
+    if colour.max() / colour.min() < COLOUR_RATIO:
+        colour = np.ones(3)
+    gain = (scalar * colour).astype(np.float32)
+    error = as_it_is if (gain == 1).all() else tried(gain).error
+    if error >= as_it_is - tolerance:
+        return view, ()
+    named = ", ".join(f"{value:.2f}" for value in gain)
+    figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
+    clip = view.clip.changed(lambda _, picture: picture / gain)
+    view = replace(view, clip=clip, plates=view.plates.through(lambda part: part / gain if part.ndim == 3 else part))
+    return view, (measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance),)

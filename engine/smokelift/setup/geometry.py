@@ -1,42 +1,37 @@
-"""Camera, domain and resolution: as the scene gives them, or estimated from where the smoke is in the picture."""
+"""Camera, box and resolution: as the scene gives them, or estimated from where the smoke is in the picture."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smokelift.checks import Figures, Remark
+from smokelift.checks import Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
-from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
-from smokelift.footage.plate import Plates
-from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.detail import DetailSpectrum, smoke_detail
-from smokelift.setup.estimate import Estimate, Grid, given, measured
-from smokelift.setup.settings import LIMITS, LOST_DETAIL, QUALITIES, Quality, Settings
-from smokelift.setup.smoke import SmokeSamples
-
-Shape = tuple[int, int, int]
+from smokelift.setup.estimate import Estimate, Grid, given
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
+from smokelift.setup.resolution import DetailSpectrum, Shape, choose_grid, smoke_detail
+from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 
 PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
 a person."""
 
+FILM_WIDTH = 36.0
+FILM_DIAGONAL = math.hypot(FILM_WIDTH, 24)
+"""Millimetres of 35 mm film."""
+
 LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
 lens."""
-
-OTHER_LENSES = (0.6, 2.0)
-"""Other focal lengths over the usual one that a camera which turns may have: that of phones, 26 to 30 mm, and 100 mm.
-Either is right within a factor of one and a half for all lenses from 20 to 150 mm."""
 
 BOX_MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side."""
@@ -45,10 +40,11 @@ NARROWEST = 0.25
 """Width over height of an estimated box at least, and the reverse."""
 
 MIN_SIDE_VOXELS = 32
-"""Voxels along the longest side at least: with fewer there is nothing more to save."""
+"""Voxels along the longest side at least: with fewer there is nothing more to save
+(docs/experiments/resolution-selection.md)."""
 
 DETAIL_FRAMES = 3
-"""Frames whose detail decides the resolution: those with the most smoke."""
+"""Frames whose detail decides the resolution: those with the most smoke (docs/selection.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,29 +58,22 @@ class Geometry:
     domain
         With its final resolution.
     resolution
-        Why it has that resolution; None for the finest grid of a quality that nothing was measured for.
+        Why it has that resolution.
+    qualities
+        The grid that each quality would take of this clip.
     remarks
         What was assumed.
-    qualities
-        The grid that each quality would take of this clip; empty where nothing was measured.
     """
 
     camera: Camera
     domain: Domain
-    resolution: Estimate[Shape] | None
-    remarks: tuple[Remark, ...] = ()
-    qualities: Mapping[Quality, Grid] = field(default_factory=dict)
-
-    @property
-    def estimates(self) -> tuple[Estimate[Shape], ...]:
-        """What was measured for it."""
-        return () if self.resolution is None else (self.resolution,)
+    resolution: Estimate[Shape]
+    qualities: Mapping[Quality, Grid]
+    remarks: tuple[Remark, ...]
 
 
-def find_geometry(
-    clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples, turns: Turns | None = None
-) -> Geometry:
-    """Complete camera and domain; a camera that was found to turn gets a matrix for every frame.
+def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> Geometry:
+    """Complete camera and domain.
 
     Raises
     ------
@@ -92,98 +81,62 @@ def find_geometry(
         If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
         looks steeply up or down, or is orthographic.
     """
+    clip, samples, box = estimate.clip, estimate.samples, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
-    if known is not None and scene.domain is not None:
-        camera = _turning(known, turns)
-        box, division, qualities = _divided(scene.domain, clip, camera, settings, plates, samples)
-        return Geometry(camera, box, division, _grown(scene.domain, box), qualities)
-    if scene.domain is not None:
+    _require_place(scene, known)
+    focal = _focal(clip.size, clip.lens)
+    camera = known or _level(clip.size, focal, settings.distance)
+    metres, multiple = 0.0, 1
+    if box is None:
+        # multiples of four, so that pyramids halve them evenly
+        (floor, size, metres), multiple = _around(camera, samples, settings.distance), 4
+    else:
+        floor, size = np.array([*box.centre[:2], box.min[2]]), np.array(box.size)
+    still = camera.at(next(iter(samples.smoky), 0))
+
+    def grids(quality: Quality) -> tuple[Domain, ...]:
+        limit = LIMITS[quality]
+        if isinstance(box, Domain):
+            return _same_shape(box, limit.voxels(_pixels(still, box)))
+        pixels = max(size) / metres if box is None else _pixels(still, _grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
+        return _grids(floor, size, limit.voxels(pixels), multiple)
+
+    qualities: Mapping[Quality, Grid]
+    remarks: tuple[Remark, ...]
+    asked = box.resolution if isinstance(box, Domain) and settings.resolution is None else settings.resolution
+    if isinstance(asked, tuple):
+        voxel = float((size / asked).max())
+        domain = replace(box, resolution=asked) if isinstance(box, Domain) else _standing_on(floor, voxel, asked)
+        resolution, qualities = given("resolution", asked), dict.fromkeys(QUALITIES, Grid(asked, None))
+    else:
+        domain, resolution, qualities = choose_grid(grids, lambda whole: _detail(estimate, camera, whole), settings)
+    if box is None:
+        around = "box around the smoke" if samples.smoky else "box over the picture"
+        remarks = (
+            _assumed(known, clip.lens, focal / max(clip.size), metres * camera.size[1]),
+            Remark(around, {"size": domain.size, "resolution": domain.resolution}),
+        )
+    else:
+        remarks = _grown(box, domain)
+    return Geometry(camera, domain, resolution, qualities, remarks)
+
+
+def _require_place(scene: Scene, known: Camera | None) -> None:
+    """Refuse a scene whose camera and box do not go together."""
+    if scene.domain is not None and known is None:
         raise ValueError("The scene gives a box but no camera; give the camera that filmed it.")
-    if scene.inlets:
+    if scene.domain is None and scene.inlets:
         raise ValueError("The scene marks an inlet but gives no box; give camera and box to say where it is.")
-    if known is not None and not _boxes(known):
+    if scene.domain is None and known is not None and not _boxes(known):
         raise ValueError(
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
-    focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
-    camera = known or _level(clip, focal, settings.distance)
-    base, size, metres = _around(camera, samples, settings.distance)
-    camera = _turning(camera, turns)
-
-    def grids(quality: Quality) -> tuple[Domain, ...]:
-        # multiples of four, so that pyramids halve them evenly
-        return _grids(base, size, LIMITS[quality].voxels(max(size) / metres), 4)
-
-    estimate: Estimate[Shape] | None = None
-    by_quality: Mapping[Quality, Grid] = {}
-    if isinstance(settings.resolution, tuple):
-        domain = _filled(base, size, settings.resolution)
-        estimate = given("resolution", domain.resolution)
-    elif settings.selection.measure:
-        domain, estimate, by_quality = _resolved(clip, camera, grids, plates, samples.smoky, settings)
-    else:
-        domain = grids(settings.quality)[-1]
-    around = Remark(
-        "box around the smoke" if samples.smoky else "box over the picture",
-        {"size": _size(domain), "resolution": domain.resolution},
-    )
-    return Geometry(
-        camera, domain, estimate, (_assumed(known, clip, focal, metres * camera.size[1]), around), by_quality
-    )
 
 
-def _divided(
-    box: Box, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
-) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
-    """A box that is given, with as many voxels as are asked for, and why; and the grid of each quality."""
-    floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
-    if isinstance(settings.resolution, tuple):
-        if isinstance(box, Domain):
-            domain = replace(box, resolution=settings.resolution)
-        else:
-            domain = _filled(floor, size, settings.resolution)
-        return domain, given("resolution", domain.resolution), {}
-    if isinstance(box, Domain) and settings.resolution is None:
-        return box, given("resolution", box.resolution), {}
-    still = camera.at(next(iter(samples.smoky), 0))
-
-    def grids(quality: Quality) -> tuple[Domain, ...]:
-        if isinstance(box, Domain):
-            return _same_shape(box, LIMITS[quality].voxels(_pixels(still, box)))
-        (coarsest,) = _grids(floor, size, MIN_SIDE_VOXELS, 1)
-        return _grids(floor, size, LIMITS[quality].voxels(_pixels(still, coarsest)), 1)
-
-    return _resolved(clip, camera, grids, plates, samples.smoky, settings)
-
-
-def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
-    """Return what may turn directions into pixels (3, 3): that of a clip's camera, or usual ones; none of a camera that
-    is orthographic or given as moving.
-
-    Raises
-    ------
-    ValueError
-        If the camera's picture has another shape than the clip's.
-    """
-    scales = (1.0, *OTHER_LENSES) if clip.lens is None else (1.0,)
-    cameras = [_level(clip, scale * _focal(clip)) for scale in scales] if camera is None else [fitting(camera, clip)]
-    return tuple(
-        np.array([[each.fx, 0, each.cx], [0, each.fy, each.cy], [0, 0, 1.0]])
-        for each in cameras
-        if each.type == "perspective" and not each.moves
-    )
-
-
-def _focal(clip: Clip) -> float:
-    """Focal length in pixels of a clip without a camera: the file's, or that of the usual lens."""
-    width, height = clip.size
-    return LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
-
-
-def _turning(camera: Camera, turns: Turns | None) -> Camera:
-    """The camera, with a matrix for every frame if it was found to turn."""
-    return camera if turns is None else turns.carried(camera)
+def _focal(size: tuple[int, int], lens: float | None) -> float:
+    """Focal length in pixels where no camera is given: that of the file's lens (mm), or of the usual one."""
+    return LENS * max(size) if lens is None else lens / FILM_DIAGONAL * math.hypot(*size)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -202,27 +155,22 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _assumed(given: Camera | None, clip: Clip, focal: float, height: float) -> Remark:
-    """What is assumed of a camera, with its focal length in pixels, or of the scale where that alone is unknown.
+def _assumed(given: Camera | None, lens: float | None, focal: float, height: float) -> Remark:
+    """What is assumed of a camera, or of the scale where that alone is unknown.
 
-    The picture is so many metres high where the smoke is.
+    The file says its lens (mm), or its focal length is so many times the longer side of the picture, which is so many
+    metres high where the smoke is.
     """
     if given is not None:
         return Remark("assumed scale", {"height": height})
-    if clip.lens is not None:
-        return Remark("assumed camera with the file's lens", {"height": height, "lens": clip.lens})
-    lens = FILM_WIDTH * focal / max(clip.size)
-    return Remark("assumed camera", {"height": height, "lens": lens, "film": FILM_WIDTH})
+    if lens is not None:
+        return Remark("assumed camera with the file's lens", {"height": height, "lens": lens})
+    return Remark("assumed camera", {"height": height, "lens": FILM_WIDTH * focal, "film": FILM_WIDTH})
 
 
-def _size(box: Box) -> tuple[float, ...]:
-    """Lengths of the sides of a box in metres."""
-    return tuple(high - low for low, high in zip(box.min, box.max, strict=True))
-
-
-def _level(clip: Clip, focal: float, distance: float | None = None) -> Camera:
+def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
     """A level camera of a focal length in pixels that looks along +Y at the smoke above the world's origin."""
-    width, height = clip.size
+    width, height = size
     metres = _pixel_at(distance, height, focal)
     up = metres * height / 2
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * metres], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
@@ -264,7 +212,7 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
     distance = camera.fy * metres
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]
-    left, right, top, bottom = _covered(samples)
+    left, right, top, bottom = _covered(samples, *camera.size)
     ways = _ways(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
     ways *= metres * (camera.fy / (ways @ along))[:, None]
     aside, height = ways @ lateral, ways[:, 2]
@@ -275,11 +223,6 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
     base = eye + distance * along + (aside.min() + aside.max()) / 2 * lateral
     base[2] = eye[2] + height.min()
     return base, np.array([across, across, up]), metres
-
-
-def _filled(floor: Doubles, size: Doubles, resolution: Shape) -> Domain:
-    """The box of so many voxels that holds one of a size in metres about the middle of its floor."""
-    return _standing_on(floor, float((size / resolution).max()), resolution)
 
 
 def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
@@ -299,7 +242,7 @@ def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
     """A remark where a box that is given without a resolution grows to whole voxels."""
     if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
         return ()
-    return (Remark("grown box", {"size": _size(domain)}),)
+    return (Remark("grown box", {"size": domain.size}),)
 
 
 def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
@@ -312,20 +255,14 @@ def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     )
 
 
-def _covered(samples: SmokeSamples) -> tuple[float, float, float, float]:
+def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
     """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
-    rows, columns = np.nonzero(samples.covered)
-    if rows.size == 0:  # no smoke: any box will do
-        rows, columns = np.array([0, samples.covered.shape[0] - 1]), np.array([0, samples.covered.shape[1] - 1])
-    # a hundredth of the smoke's pixels on each side may be noise or the last wisps
-    left, right = np.percentile(columns, [1, 99]) + np.array([0, 1])
-    top, bottom = np.percentile(rows, [1, 99]) + np.array([0, 1])
-    first_x, first_y, last_x, last_y = samples.bounds
-    left, right = (float(v) * samples.scale + first_x for v in (left, right))
-    top, bottom = (float(v) * samples.scale + first_y for v in (top, bottom))
+    # a hundredth of the smoke's pixels on each side may be noise or the last wisps; without smoke any box will do
+    rows, columns = np.nonzero(samples.covered if samples.covered.any() else ~samples.covered)
+    left, right = (float(v) * samples.scale for v in np.percentile(columns, [1, 99]) + np.array([0, 1]))
+    top, bottom = (float(v) * samples.scale for v in np.percentile(rows, [1, 99]) + np.array([0, 1]))
     margin = BOX_MARGIN * max(right - left, bottom - top)
-    left, right = max(left - margin, first_x), min(right + margin, last_x)
-    return left, right, max(top - margin, first_y), min(bottom + margin, last_y)
+    return max(left - margin, 0), min(right + margin, width), max(top - margin, 0), min(bottom + margin, height)
 
 
 def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
@@ -340,53 +277,14 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
     )
 
 
-def _resolved(
-    clip: Clip,
-    camera: Camera,
-    grids: Callable[[Quality], tuple[Domain, ...]],
-    plates: Plates,
-    smoky: tuple[int, ...],
-    settings: Settings,
-) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
-    """The coarsest of a quality's grids that loses no more of what the finest shows than tolerated, and why.
-
-    The clip's detail is measured once, and says what each quality would take.
-    """
-    own = grids(settings.quality)
-    if not smoky:
-        shape = own[0].resolution
-        return own[0], Estimate("resolution without smoke", what="resolution", value=shape, source="assumed"), {}
-    detail = _detail(clip, camera, own[-1], plates, smoky)
-
-    def coarsest(allowed: tuple[Domain, ...], tolerance: float) -> Domain:
-        finest = max(allowed[-1].resolution)
-        return next((grid for grid in allowed if detail.lost(max(grid.resolution), finest) <= tolerance), allowed[-1])
-
-    tolerance = settings.selection.lost_detail
-    domain = coarsest(own, tolerance)
-    longest, finest = max(domain.resolution), max(own[-1].resolution)
-    lost = detail.lost(longest)
-    figures: Figures = {
-        "lost": lost,
-        "lost_beside_finest": detail.lost(longest, finest),
-        "pixels": detail.pixels,
-        "quality": settings.quality,
-    }
-    estimate = measured("resolution", domain.resolution, figures, tolerance=tolerance)
-    others = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
-    taken = {**others, settings.quality: domain}
-    by_quality = {name: Grid(grid.resolution, detail.lost(max(grid.resolution))) for name, grid in taken.items()}
-    return domain, estimate, by_quality
-
-
-def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> DetailSpectrum:
-    """The detail of the smoke in some frames, at the clip's own pixels."""
-    frames = []
+def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
+    """The detail of the smoke in some frames, at the clip's own pixels; None without smoke."""
+    smoky, frames = estimate.samples.smoky, []
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
-            frames.append((part(clip.frame(number)), plates.at(number).through(part)))
-    return smoke_detail(frames, _pixels(camera.at(smoky[0]), box))
+            frames.append((part(estimate.clip.frame(number)), estimate.found.plates.at(number).through(part)))
+    return smoke_detail(frames, _pixels(camera.at(smoky[0]), box)) if smoky else None
 
 
 def _pixels(camera: Camera, box: Domain) -> float:

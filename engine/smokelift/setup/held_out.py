@@ -2,36 +2,34 @@
 
 A wrong light can still reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
 shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels. What they let through of the
-background is taken away from the other half, and the rest is light that the smoke scatters. That is linear in the
-lights: each adds its own picture of the same densities. How strong all together have to be is the least-squares
-factor, zero at least.
+background is taken away from the other half, and the rest is light that the smoke scatters. How strong the lights have
+to be for that is the least-squares factor, zero at least.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Doubles
-from smokelift.density import DensitySettings, FittedDensity, Observation, reconstruct_density
+from smokelift.density import DensitySettings, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
-from smokelift.render import Image, Optics, scene_optics
-from smokelift.scene import FiniteLight, Scattering
-from smokelift.setup.coarse import CoarseFrame, CoarseView
+from smokelift.render import Optics, scene_optics
+from smokelift.scene import Scattering
+from smokelift.setup.coarse import CoarseFrame
 
 MIN_CHANNEL_POWER = 1e-3
-"""Power of a channel's light over that of the brightest one, below which the channel has no strength of its own."""
+"""Power of a channel's light over that of the brightest one, below which the channel has no strength of its own: its
+light is lost in 8 bits."""
 
 BLACK = np.zeros(3, np.float32)
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What a judge shows of densities, beside the other half of the pixels.
+    """What densities show beside the other half of the pixels.
 
     Attributes
     ----------
@@ -50,91 +48,36 @@ class HeldOut:
     colours: Doubles = field(default_factory=lambda: np.ones((1, 3)))
 
 
-@dataclass(frozen=True, eq=False)
-class HalfFit:
-    """Densities that were fitted to one half of the pixels.
-
-    Attributes
-    ----------
-    frames
-        What the cameras saw.
-    densities
-        One of each frame.
-    """
-
-    frames: Sequence[CoarseFrame]
-    densities: Sequence[FittedDensity]
-
-    def lit(self, lights: tuple[FiniteLight, ...], scattering: Scattering) -> list[Doubles]:
-        """Light (n, 3) that the densities scatter to the pixels that they reach, of each camera."""
-
-        def shown(frame: CoarseFrame, view: CoarseView, fitted: FittedDensity) -> Image:
-            optics = Optics(frame.scene.domain, frame.scene.medium, lights, scattering)
-            return optics.renderer(view.camera, BLACK, fitted.hull).image(fitted.density)
-
-        return self._pixels(shown)
-
-    @cached_property
-    def added(self) -> list[Doubles]:
-        """Light (n, 3) of each camera's held-out pixels beside the background that the smoke lets through."""
-
-        def rest(frame: CoarseFrame, view: CoarseView, fitted: FittedDensity) -> Image:
-            optics = Optics(frame.scene.domain, frame.scene.medium, (), "absorption")
-            behind = optics.renderer(view.camera, view.plate.image, fitted.hull).image(fitted.density)
-            return view.held_out - behind
-
-        return self._pixels(rest)
-
-    @cached_property
-    def contrast(self) -> list[float]:
-        """Sum of squares of what the smoke changes in the held-out pixels, of each camera."""
-        changed = self._pixels(lambda _, view, __: view.held_out - view.plate.image)
-        return [max(float(np.sum(np.square(pixels))), 1e-30) for pixels in changed]
-
-    def beside(self, scattering: Scattering) -> HeldOut:
-        """What the densities show in the light of their scenes, beside the held-out pixels."""
-        own = self.lit(scene_optics(self.frames[0].scene).lights, scattering)
-        wrong = [float(np.sum(np.square(shown - seen))) for shown, seen in zip(own, self.added, strict=True)]
-        error = float(np.sqrt(np.mean(np.divide(wrong, self.contrast))))
-        power = np.array([np.sum(np.square(shown), 0) for shown in own])
-        product = np.array([np.sum(shown * seen, 0) for shown, seen in zip(own, self.added, strict=True)])
-        if not power.sum() > 0:
-            return HeldOut(error, 1.0, np.ones_like(power))
-        whole = np.maximum(product.sum(1, keepdims=True) / np.maximum(power.sum(1, keepdims=True), 1e-30), 0)
-        lit = power > MIN_CHANNEL_POWER * power.max(1, keepdims=True)
-        colours = np.where(lit, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
-        return HeldOut(error, float(product.sum() / power.sum()), colours)
-
-    def _pixels(self, picture: Callable[[CoarseFrame, CoarseView, FittedDensity], Image]) -> list[Doubles]:
-        """Pixels (n, 3) of pictures that the smoke's voxels can change, of each camera, all moments in a row."""
-        return [
-            np.concatenate(
-                [
-                    picture(frame, frame.views[camera], fitted)[reach[camera]].astype(np.float64)
-                    for frame, fitted, reach in zip(self.frames, self.densities, self._reach, strict=True)
-                ]
-            )
-            for camera in range(len(self.frames[0].views))
-        ]
-
-    @cached_property
-    def _reach(self) -> list[list[NDArray[np.bool_]]]:
-        return [
-            [reached(view.smoke, project_voxels(view.camera, frame.scene.domain)) for view in frame.views]
-            for frame in self.frames
-        ]
-
-
-def fit_half(frames: Sequence[CoarseFrame], settings: DensitySettings) -> HalfFit:
-    """Fit densities to one half of the pixels of all cameras, in the light and by the model of each frame's scene."""
-
-    def fitted(frame: CoarseFrame) -> FittedDensity:
-        own, *others = (Observation(view.camera, view.fitted, view.plate) for view in frame.views)
-        return reconstruct_density(own.image, frame.scene, settings=settings, plate=own.plate, views=others)
-
-    return HalfFit(frames, [fitted(frame) for frame in frames])
-
-
 def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:
-    """Fit a model's densities to one half of the pixels, and let the judge show them to the other half."""
-    return fit_half([frame.scattered_by(model) for frame in frames], settings).beside(judge)
+    """Fit a model's densities to one half of the pixels of all cameras, and let the judge show them to the other half.
+
+    Only pixels that the smoke's voxels can change count.
+    """
+    pixels: list[list[Doubles]] = [[] for _ in frames[0].views]
+    for frame in frames:
+        scene = replace(frame.scene, scattering=model)
+        own, *others = (Observation(view.camera, view.fitted, view.plate) for view in frame.views)
+        fitted = reconstruct_density(own.image, scene, settings=settings, plate=own.plate, views=others)
+        clear = Optics(scene.domain, scene.medium, (), "absorption")
+        lit = replace(scene_optics(scene), scattering=judge)
+        for view, of_camera in zip(frame.views, pixels, strict=True):
+            behind, shown = (
+                optics.renderer(view.camera, picture, fitted.hull).image(fitted.density)
+                for optics, picture in ((clear, view.plate.image), (lit, BLACK))
+            )
+            reach = reached(view.smoke, project_voxels(view.camera, scene.domain))
+            parts = shown, view.held_out - behind, view.held_out - view.plate.image
+            of_camera.append(np.stack([part[reach].astype(np.float64) for part in parts]))
+    # of each camera and channel: squares of the light that is shown and its products with what is seen
+    power, product, wrong, contrast = (np.zeros((len(pixels), 3)) for _ in range(4))
+    for camera, parts_of in enumerate(pixels):
+        shown, seen, changed = np.concatenate(parts_of, 1)
+        power[camera], product[camera] = np.sum(shown**2, 0), np.sum(shown * seen, 0)
+        wrong[camera], contrast[camera] = np.sum((shown - seen) ** 2, 0), np.sum(changed**2, 0)
+    error = float(np.sqrt(np.mean(wrong.sum(1) / np.maximum(contrast.sum(1), 1e-30))))
+    if not power.sum() > 0:
+        return HeldOut(error, 1.0, np.ones_like(power))
+    whole = np.maximum(product.sum(1, keepdims=True) / np.maximum(power.sum(1, keepdims=True), 1e-30), 0)
+    bright = power > MIN_CHANNEL_POWER * power.max(1, keepdims=True)
+    colours = np.where(bright, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
+    return HeldOut(error, float(product.sum() / power.sum()), colours)

@@ -2,35 +2,44 @@
 
     what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   first_light
     coarse densities in it -> its strength, the model of scattering, shadows without a known light      measured_light
-    cameras around the smoke -> a sun where no light is given                                           sunlight
 
-All but the first are judged by `smokelift.setup.held_out`. Figures: docs/selection.md.
+The second is judged by `smokelift.setup.held_out`. Figures: docs/selection.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smokelift.checks import Doubt, Figures, Remark
+from smokelift.checks.array_types import Doubles
 from smokelift.density import DensitySettings
 from smokelift.footage.noise import Noise
-from smokelift.render import Image
-from smokelift.render.environment_count import MIN_LIGHTS, TOLERANCE, lights_needed
+from smokelift.render.environment_count import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
-from smokelift.setup.coarse import CoarseClip, CoarseFrame
-from smokelift.setup.estimate import UNDETERMINED, Estimate, given, measured, undetermined
-from smokelift.setup.held_out import HalfFit, HeldOut, fit_half, held_out
-from smokelift.setup.scattering import MAX_ERROR_RATIO, choose_scattering, tries_multiple
+from smokelift.setup.coarse import CoarseFrame
+from smokelift.setup.estimate import Estimate, given, measured
+from smokelift.setup.first_estimate import SmokeSamples
+from smokelift.setup.geometry import Geometry
+from smokelift.setup.held_out import HeldOut, held_out
+from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
-from smokelift.setup.sky import AMBIENT, directional, find_sky, light_around
-from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.source import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.thickness import smoke_thickness
+
+MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
+"""Models of scattering, from the cheapest to the richest."""
+
+MAX_ERROR_RATIO = 0.75
+"""Error of one model over that of another of which it is no special case, below which it is taken. Multiple over single
+scattering: 0.01 to 0.63 where paths were traced, but for smoke that either model fits, and 0.82 and more where light
+is scattered once (docs/experiments/scattering-selection.md)."""
+
+MAX_DESCENT_STEPS = 64
+"""Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
+by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
 STEP = 1.25
 """Ratio of one strength of given lights to the next that is tried: smoke nearly as bright as its light allows differs
@@ -52,7 +61,11 @@ MAX_COLOUR_SPREAD = 0.1
 """Spread of a background of one colour at most, as a share of its mean."""
 
 MAX_QUIET_NOISE = 2 / 255
-"""Noise up to which what is left is not the noise's."""
+"""Noise up to which what is left is not the noise's (docs/experiments/surroundings.md)."""
+
+
+AXES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
+"""Directions of travel that stand for all: 14 find no other density (docs/experiments/surroundings.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,65 +79,68 @@ class Illumination:
     scattering
         The chosen model; until it is measured the richest that the light allows.
     origin
-        Of the lights: the scene gives them (or none is needed), the clip shows how strong they are, or it does not.
+        Of the lights: the scene gives them (or none is needed), texture behind the smoke shows how strong they are, or
+        nothing does.
     by_hand
         Whether the user gives the model of scattering.
     measured
         What was chosen on coarse densities.
-    thickness, direction
-        What is known of a light that is not given; None of a light that is.
+    thickness
+        What is known of the smoke's, where no light is given.
     """
 
     lights: tuple[Light, ...]
     scattering: Scattering
-    origin: Literal["given", "measured", "assumed"]
+    origin: Literal["given", "texture", "assumed"]
     by_hand: bool
     measured: tuple[Estimate[Any], ...] = ()
-    thickness: Estimate[str] | None = None
-    direction: Estimate[str] | None = None
-
-    @property
-    def sunny(self) -> bool:
-        """Whether the lights are those of a sun that was found."""
-        return self.direction is not None and self.direction.value != UNDETERMINED
+    thickness: tuple[Estimate[str], ...] = ()
 
     @property
     def estimates(self) -> tuple[Estimate[Any], ...]:
         """All that was measured of it, if its model of scattering asks for light."""
-        if self.thickness is None or self.direction is None or self.scattering == "absorption":
-            return self.measured
-        return (*self.measured, *(() if self.sunny else (self.thickness,)), self.direction)
+        return self.measured if self.scattering == "absorption" else (*self.measured, *self.thickness)
 
 
 def first_light(
-    given: tuple[Light, ...], scattering: Scattering | None, medium: Medium, samples: SmokeSamples
+    lights: tuple[Light, ...], scattering: Scattering | None, geometry: Geometry, medium: Medium, samples: SmokeSamples
 ) -> Illumination:
-    """The light of a scene, or one from everywhere without shadows as strong as the clip shows.
+    """Return the light of a scene, or one from everywhere without shadows as strong as the clip shows.
+
+    Every environment gets the number of directions that stand for it.
 
     Raises
     ------
     ValueError
         If the user wants shadows without a light to cast them.
     """
-    if scattering in SHADOWED and not given:
+    if scattering in SHADOWED and not lights:
         raise ValueError(
             f'Scattering "{scattering}" needs a light that casts the shadows; give one, or leave scattering to "auto".'
         )
-    richest = scattering or ("absorption" if medium.albedo == 0 else "single" if given else "unshadowed")
+    richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     by_hand = scattering is not None
-    if given or richest == "absorption":
-        return Illumination(given, richest, "given", by_hand)
+    if lights or richest == "absorption":
+        return Illumination(tuple(_countable(each, geometry, medium) for each in lights), richest, "given", by_hand)
     source, thickness = smoke_thickness(samples.textures)
-    radiance = source_radiance(samples, source)
     share = np.array(medium.albedos) / (4 * np.pi)
-    sun = directional(np.array((0.0, 0.0, 1.0)), np.divide(radiance, share, out=np.zeros(3), where=share > 0))
-    unknown = undetermined("light direction undetermined by one view", "light direction")
-    origin: Literal["measured", "assumed"] = "assumed" if source is None else "measured"
-    return Illumination((sun,), richest, origin, by_hand, (), thickness, unknown)
+    red, green, blue = np.divide(source_radiance(samples, source), share, out=np.zeros(3), where=share > 0).tolist()
+    sun = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
+    return Illumination((sun,), richest, "assumed" if source is None else "texture", by_hand, (), (thickness,))
+
+
+def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
+    """The light, as so many directions if it is an environment."""
+    if not isinstance(light, EnvironmentLight) or light.directions is not None:
+        return light
+    return replace(light, directions=environment_count(light, geometry.camera.at(0), geometry.domain, medium))
 
 
 def measured_light(
-    light: Illumination, clip: CoarseClip, frames: dict[int, CoarseFrame], settings: Settings
+    light: Illumination,
+    frames: Sequence[CoarseFrame],
+    finer: Callable[[], CoarseFrame | None],
+    settings: Settings,
 ) -> Illumination:
     """Measure on coarse densities how strong the lights are and how they are scattered.
 
@@ -132,70 +148,33 @@ def measured_light(
     ----------
     light
         With the richest model that is allowed, or the one that the user gives.
-    clip
-        With the scene's camera and medium.
     frames
-        Those that models are tried on by their numbers, one at least.
+        Those that models are tried on, one at least.
+    finer
+        Returns one of them on twice the voxels, for models that are nearly alike on these; None if there is none.
     settings
         How to fit, and what errors a cheaper model may have.
     """
-    fit, tolerance = settings.density, settings.selection.scattering_error
     richest, lights = light.scattering, light.lights
-    seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames.values()]
-    lights, found = _with_directions(lights, seen, fit)
-    known: dict[Scattering, float] = {}
+    seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames]
+    found: tuple[Estimate[Any], ...] = ()
     # what single scattering lacks would be taken for light that is missing
-    if richest == "multiple" or (richest == "single" and tries_multiple(clip.scene) and not light.by_hand):
-        lights, known["multiple"], strength = _strengthened(lights, seen, fit)
-        found += strength
+    if richest == "multiple" or (_tries_multiple(richest, frames) and not light.by_hand):
+        lights, found = _strengthened(lights, seen, settings.density)
     if light.by_hand:
         return replace(light, lights=lights, measured=(*found, given("scattering", richest)))
     seen = [frame.lit_by(lights) for frame in seen]
-
-    def finer() -> CoarseFrame | None:
-        return clip.frame(next(iter(frames)), times=2)
-
-    chosen, scattered = choose_scattering(seen, richest, fit, tolerance, known, finer)
-    around = _surroundings(seen, scattered, fit) if light.origin == "assumed" else None
+    chosen, scattered = _cheapest(seen, richest, finer, settings)
+    around = _surroundings(seen, scattered, settings.density) if light.origin == "assumed" else None
     if around is not None:
-        lights, scattered = around
-        chosen = "single"
+        (lights, scattered), chosen = around, "single"
     return replace(light, lights=lights, scattering=chosen, measured=(*found, scattered))
 
 
-def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], settings: Settings) -> Illumination:
-    """The light with what several cameras around the smoke show of a sun, whose scattering is to be measured then.
-
-    Parameters
-    ----------
-    light
-        As it is measured.
-    clip
-        Of all cameras, none of which moves, at one exposure; in that light.
-    numbers
-        Of frames with smoke.
-    settings
-        How to fit.
-    """
-    if light.origin == "given" or light.by_hand or light.scattering == "absorption" or len(clip.views) < 2:
-        return light
-    frames = list(clip.smoky(numbers).values())
-    sky = find_sky(frames, clip.scene, settings.density) if frames else None
-    if sky is None:
-        return light
-    figures = {
-        "views": len(clip.views),
-        "ambient_share": sky.ambient_share,
-        "shading": sky.shading,
-        "explained": sky.explained,
-    }
-    if not sky.determined:
-        kind = "light direction undetermined by several views"
-        unknown = undetermined(kind, "light direction", figures, spread=sky.spread, tolerance=AMBIENT)
-        return replace(light, direction=unknown)
-    named = ", ".join(f"{value:.2f}" for value in -sky.towards)
-    direction = measured("light direction", named, figures, spread=sky.spread, tolerance=AMBIENT)
-    return Illumination(sky.lights(), "single", "measured", False, (), light.thickness, direction)
+def light_around(radiance: Doubles) -> tuple[DirectionalLight, ...]:
+    """Return light from everywhere of a radiance (3,), in W/m^2/sr."""
+    red, green, blue = (4 * np.pi * radiance / len(AXES)).tolist()
+    return tuple(DirectionalLight(way, (red, green, blue)) for way in AXES)
 
 
 def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
@@ -204,11 +183,11 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
     the light leaves unexplained is its own fault.
     """
-    if light.thickness is None or light.sunny:
+    if light.origin == "given":
         return ()
     if light.scattering in SHADOWED:
         kind = "light as behind the smoke"
-    elif light.origin == "measured":
+    elif light.origin == "texture":
         kind = "light as the smoke hides"
     else:
         kind = "light as the thickest smoke" if samples.smoky else "light without smoke"
@@ -225,40 +204,10 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     return taken, Doubt("likely wrong light", {"error": error})
 
 
-def _with_directions(
-    lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], tuple[Estimate[Any], ...]]:
-    """Give every environment as many directions as change the picture of the clip's own smoke."""
-    if not any(isinstance(light, EnvironmentLight) for light in lights):
-        return lights, ()
-    # without shadows the fewest do, since only the sum of the light counts
-    few = tuple(
-        replace(light, directions=light.directions or MIN_LIGHTS) if isinstance(light, EnvironmentLight) else light
-        for light in lights
-    )
-    fitted = fit_half([frame.lit_by(few).scattered_by("unshadowed") for frame in frames], settings)
-    scattering = frames[0].scene.scattering
-    found = {light: _directions(light, fitted, scattering) for light in lights if isinstance(light, EnvironmentLight)}
-    taken = (replace(light, directions=found[light].value) if light in found else light for light in lights)
-    return tuple(taken), tuple(found.values())
-
-
-def _directions(light: EnvironmentLight, fitted: HalfFit, scattering: Scattering) -> Estimate[int]:
-    """How many directions stand for an environment: their number doubles until the picture hardly changes."""
-    if light.directions is not None:
-        return given("environment directions", light.directions)
-
-    def picture(lights: tuple[DirectionalLight, ...]) -> Image:
-        return np.concatenate(fitted.lit(lights, scattering)).astype(np.float32)
-
-    count, change = lights_needed(light, picture)
-    return measured("environment directions", count, {"change": change}, tolerance=TOLERANCE)
-
-
 def _strengthened(
     lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], float, tuple[Estimate[Any], ...]]:
-    """Given lights as strong as the clip needs, and what multiple scattering leaves in them.
+) -> tuple[tuple[Light, ...], tuple[Estimate[Any], ...]]:
+    """Given lights as strong as the clip needs.
 
     Given lights are measured or tracked, and a picture hardly contradicts them: stronger light with thinner smoke fits
     it as well or better, since thin smoke is the simpler one to fit. So lights are too weak only where even the
@@ -279,10 +228,56 @@ def _strengthened(
             break
         factor, found = factor * STEP, stronger
     if factor == 1.0:
-        return lights, as_given.error, ()
+        return lights, ()
     figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
     strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MAX_MISSING_LIGHT)
-    return tuple(light.scaled(factor) for light in lights), found.error, (strength,)
+    return tuple(light.scaled(factor) for light in lights), (strength,)
+
+
+def _tries_multiple(richest: Scattering, frames: Sequence[CoarseFrame]) -> bool:
+    """Whether multiple scattering is tried as well: beside single scattering, by smoke that is isotropic."""
+    return richest == "single" and frames[0].scene.medium.anisotropy == 0.0
+
+
+def _cheapest(
+    frames: Sequence[CoarseFrame],
+    richest: Scattering,
+    finer: Callable[[], CoarseFrame | None],
+    settings: Settings,
+) -> tuple[Scattering, Estimate[str]]:
+    """The cheapest model of scattering that finds as good a density as the richest, which judges all.
+
+    Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Of these two
+    multiple scattering is the richest only where its own picture of its own density is clearly nearer: smoke whose
+    picture both models fit is twice as dense in one as in the other (docs/experiments/multiple-scattering.md). Neither
+    is the cheaper answer, so that the tolerance of cheaper models says nothing here: errors are compared as a ratio, in
+    which what no model fits counts for both.
+    """
+    fit, tolerance = settings.density, settings.selection.scattering_error
+    rivals: tuple[Scattering, ...] = ("single", "multiple") if _tries_multiple(richest, frames) else (richest,)
+    errors = {each: held_out(frames, each, each, fit).error for each in rivals}
+    if len(rivals) > 1:
+        alike = errors["multiple"] >= MAX_ERROR_RATIO * errors["single"]
+        # the errors may be those of the coarse grid: either model seems to fit the smoke, or neither does
+        if alike and (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
+            frames = [larger.lit_by(frames[0].scene.lights)]
+            fit = replace(fit, descent_iterations=max(MAX_DESCENT_STEPS, fit.descent_iterations))
+            errors = {each: held_out(frames, each, each, fit).error for each in rivals}
+        if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:
+            richest = "multiple"
+    chosen = richest
+    for model in MODELS[: MODELS.index(richest)]:
+        errors[model] = min(held_out(frames, model, richest, fit).error, 1.0)  # which no smoke at all leaves
+        if errors[model] <= errors[richest] + tolerance:
+            chosen = model
+            break
+    figures: Figures = {f"error_{name}": value for name, value in errors.items()}
+    if len(errors) == 1:
+        return chosen, measured("scattering", chosen, figures, tolerance=tolerance)
+    # beside the one that it is compared with: the richest, or of that the next cheaper one
+    other = MODELS[MODELS.index(richest) - 1] if chosen == richest else richest
+    figures = {**figures, "error": errors[chosen], "other": other, "other_error": errors[other]}
+    return chosen, measured("compared scattering", chosen, figures, what="scattering", tolerance=tolerance)
 
 
 def _surroundings(
@@ -304,7 +299,7 @@ def _surroundings(
     if error <= tolerance or behind.max() < MIN_SOURCE_VALUE:
         return None
 
-    def left(radiance: NDArray[np.float64]) -> HeldOut:
+    def left(radiance: Doubles) -> HeldOut:
         return held_out([frame.lit_by(light_around(radiance)) for frame in frames], "single", "single", settings)
 
     radiance = behind / max(frames[0].scene.medium.albedos)

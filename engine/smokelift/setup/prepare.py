@@ -5,29 +5,24 @@ What a scene leaves out is estimated from the clip or defaulted; remarks and est
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
-from smokelift.checks import Remark, counted, require_kind
-from smokelift.density.axis import depth_at
+from smokelift.checks import counted, require_kind
+from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
-from smokelift.footage.proxy import proxy_frames
-from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
-from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
-from smokelift.setup.coarse import CoarseClip
-from smokelift.setup.estimate import Estimate
-from smokelift.setup.first_estimate import FirstEstimate, first_estimate
-from smokelift.setup.further_views import disagreement, open_view
-from smokelift.setup.geometry import Geometry, clip_lenses, find_geometry
-from smokelift.setup.illumination import Illumination, first_light, light_remarks, measured_light, sunlight
-from smokelift.setup.medium_estimate import find_medium
-from smokelift.setup.model import choose_model, tried_frames
-from smokelift.setup.place import placed
+from smokelift.scene import Background, CompleteScene, Domain, Scene
+from smokelift.setup.backdrop_remarks import first_remarks
+from smokelift.setup.coarse import coarse_frame, coarse_frames
+from smokelift.setup.estimate import Estimate, given, measured, undetermined
+from smokelift.setup.first_estimate import first_estimate
+from smokelift.setup.further_views import disagreement, open_views
+from smokelift.setup.geometry import find_geometry
+from smokelift.setup.illumination import first_light, light_remarks, measured_light
+from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.smoke import SAMPLE_FRAMES
-from smokelift.setup.view_gain import balanced
 
 
 def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
@@ -51,86 +46,84 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
-    _check(clip, scene, settings)
-    _expect(clip, scene)
-    remarks = clip.remarks()
-    # a search for the lens finds turns of a camera; several cameras are calibrated, so they stand still where given
-    lenses = () if scene.views else clip_lenses(scene.camera, clip)
-    estimate = first_estimate(clip, scene.camera, scene.background, lenses)
-    steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples
-    geometry = find_geometry(steadied, scene, settings, plates, samples, estimate.turns)
+    _check(len(clip), scene, settings)
+    estimate = first_estimate(clip, scene.camera, scene.background)
+    plates, samples = estimate.found.plates, estimate.samples
+    geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
-    if settings.distance is not None:
-        depth_at(settings.distance, camera, domain)  # refuse early what cannot be
-    medium, coloured, taken = find_medium(scene.medium, estimate, scene.lights, camera, domain)
+    medium, of_medium, medium_remarks = find_medium(scene, estimate, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    light = first_light(scene.lights, asked, medium, samples)
-    complete = _complete(scene, estimate, geometry, medium, light)
-    first = ShotView(steadied, camera, plates, _working(camera, domain))
-    measure, tried = settings.selection.measure, tried_frames(samples.smoky)
-    coarse = CoarseClip((first,), complete)
-    frames = coarse.smoky(tried) if measure else {}
-    if frames:
-        light = measured_light(light, coarse, frames, settings)
-        complete = replace(complete, lights=light.lights, scattering=light.scattering)
-    others, gains, said = _further_views(first, complete, estimate, settings, bool(scene.lights))
-    if frames and estimate.fire is None:
-        light = sunlight(light, CoarseClip((first, *others), complete), tried, settings)
-        if light.sunny:
-            light = measured_light(light, coarse, frames, settings)
-        complete = replace(complete, lights=light.lights, scattering=light.scattering)
-    model = choose_model(complete, coarse, frames, settings) if measure else None
-    clip.expect()  # lets go of frames that are kept as they were decoded
-    shot = Shot(
-        scene=complete,
-        optics=scene_optics(complete),
-        views=(first, *others),
-        settings=settings if model is None else replace(settings, velocity=model.velocity),
-        estimated_background=estimate.picture,
-        remarks=(
-            *remarks,
-            *estimate.remarks,
-            *geometry.remarks,
-            *taken,
-            *light_remarks(light, samples, plates.noise),
-            *said,
-        ),
-        estimates=(
-            *geometry.estimates,
-            *coloured,
-            *light.estimates,
-            *(() if model is None else model.estimates),
-            *gains,
-        ),
-        qualities=geometry.qualities,
-        exposure=samples.exposure,
-        smoky=samples.smoky,
-        place=None,
-        fire=None if estimate.fire is None else replace(first, clip=estimate.fire.light),
-    )
-    return replace(shot, remarks=(*shot.remarks, *disagreement(shot))) if scene.views else placed(shot)
-
-
-def _complete(
-    scene: Scene, estimate: FirstEstimate, geometry: Geometry, medium: Medium, light: Illumination
-) -> CompleteScene:
-    """The scene with all that it left open."""
-    return CompleteScene(
-        camera=geometry.camera,
-        domain=geometry.domain,
+    light = first_light(scene.lights, asked, geometry, medium, samples)
+    complete = CompleteScene(
+        camera=camera,
+        domain=domain,
         medium=medium,
         lights=light.lights,
         background=estimate.found.background or Background(),
         scattering=light.scattering,
-        clip=None if scene.clip is None else replace(scene.clip, fps=estimate.clip.fps),
+        clip=None if scene.clip is None else replace(scene.clip, fps=clip.fps),
         views=scene.views,
         closed=scene.closed,
         inlets=scene.inlets,
     )
+    first = ShotView.before(domain, estimate.clip, camera, plates)
+    coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
+    if coarse:
+        finer = partial(coarse_frame, (first,), coarse[0].number, complete, times=2)
+        light = measured_light(light, coarse, finer, settings)
+        complete = replace(complete, lights=light.lights, scattering=light.scattering)
+    others, gains, view_remarks = open_views(first, complete, samples.typical, bool(scene.lights), settings)
+    coarsening: tuple[Estimate[int], ...] = ()
+    if settings.selection.measure:
+        coarsening = (velocity_coarsening(domain, settings),)
+        settings = replace(settings, velocity=replace(settings.velocity, coarsening=coarsening[0].value))
+    shot = Shot(
+        scene=complete,
+        optics=scene_optics(complete),
+        views=(first, *others),
+        settings=settings,
+        remarks=(
+            *clip.remarks(),
+            *first_remarks(estimate, scene.background is not None),
+            *geometry.remarks,
+            *medium_remarks,
+            *light_remarks(light, samples, plates.noise),
+            *view_remarks,
+        ),
+        estimates=(geometry.resolution, *of_medium, *light.estimates, *coarsening, *gains),
+        qualities=geometry.qualities,
+        smoky=samples.smoky,
+        place=None,
+        fire=None if estimate.fire is None else replace(first, clip=estimate.fire.light),
+    )
+    if scene.views:
+        return replace(shot, remarks=(*shot.remarks, *disagreement(shot)))
+    place = clip_axis(shot, settings.distance) if settings.method == "default" else None
+    return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
 
 
-def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
-    """Refuse what can be seen to be wrong before anything is examined."""
+def place_estimate(place: AxisEstimate) -> Estimate[str]:
+    """Return where in depth the smoke stands as an estimate by one of the cues."""
+    kind, figures, spread = f"axis depth by {place.cue}", {"depth": place.depth}, place.deviation
+    if place.cue == "box":
+        return undetermined(kind, "axis depth", figures, spread=spread)
+    found = measured(kind, place.cue, figures, what="axis depth", spread=spread)
+    return replace(found, source="given") if place.cue == "distance" else found
+
+
+def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
+    """Return how much coarser than the densities the grid of the velocity is; a side keeps eight voxels at least."""
+    if settings.velocity.coarsening is not None:
+        return given("velocity grid coarsening", settings.velocity.coarsening)
+    finest = settings.selection.velocity_side
+    coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
+    while longest > finest and shortest >= 16:
+        coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
+    return measured("velocity grid coarsening", coarsening, {"voxels": float(longest)}, tolerance=finest)
+
+
+def _check(length: int, scene: Scene, settings: Settings) -> None:
+    """Refuse what can be seen to be wrong before any of so many frames is examined."""
     if settings.distance is not None and (scene.views or scene.inlets):
         known = "further views show" if scene.views else "inlets say"
         raise ValueError(f"The {known} where the smoke stands; leave the distance out.")
@@ -143,43 +136,8 @@ def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
                 camera.require_outside(scene.domain)
     if scene.views and (moves or any(view.camera.moves for view in scene.views)):
         raise ValueError("With further views no camera may move; give one matrix a camera, or one view only.")
-    if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
-        given, used = counted(len(scene.camera.matrices), "frame"), counted(len(clip), "frame")
+    if scene.camera is not None and moves and len(scene.camera.matrices) != length:
+        given, used = counted(len(scene.camera.matrices), "frame"), counted(length, "frame")
         raise ValueError(
             f"The camera's matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
         )
-
-
-def _expect(clip: Clip, scene: Scene) -> None:
-    """Say which frames are examined, so that each of them is decoded once."""
-    examined, estimates = clip.spread(SAMPLE_FRAMES), scene.background is None
-    # a velocity needs the frame after one with smoke, and a background more frames than the smoke
-    others = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect([*examined, *sorted(n for n in others.difference(examined) if n >= 0)])
-
-
-def _further_views(
-    first: ShotView, scene: CompleteScene, estimate: FirstEstimate, settings: Settings, lit: bool
-) -> tuple[list[ShotView], list[Estimate[str]], list[Remark]]:
-    """The further views of a scene, at the first one's exposure; with what was measured and noticed."""
-    views, remarks = [], []
-    gains: list[Estimate[str]] = []
-    smoky = estimate.samples.smoky
-    for number in range(len(scene.views)):
-        view, said = open_view(number, first.clip, scene)
-        remarks += said
-        if settings.selection.measure:
-            shows = tried_frames(smoky)
-            tolerance = settings.selection.scattering_error
-            view, gain = balanced(number + 1, first, view, scene, lit, shows, settings.density, tolerance)
-            gains += gain
-        views.append(view)
-    return views, gains, remarks
-
-
-def _working(camera: Camera, domain: Domain) -> WorkingPicture:
-    """The small picture of the first frame that shows the domain."""
-    for frame in range(len(camera.matrices)):
-        with suppress(CameraError):
-            return working_picture(camera.at(frame), domain)
-    return working_picture(camera, domain)

@@ -22,17 +22,7 @@ QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine", "final")
 
 @dataclass(frozen=True)
 class GridLimit:
-    """How many voxels a quality allows along the domain's longest side, where they are chosen.
-
-    Attributes
-    ----------
-    share
-        Of the clip's pixels along that side, between the bounds; 0 for a number of voxels whatever the clip has.
-    least
-        Voxels that are allowed in any case, if the clip has as many pixels.
-    most
-        Voxels that are allowed whatever the clip has.
-    """
+    """How many voxels a quality allows along the domain's longest side: a share of the clip's pixels within bounds."""
 
     share: float
     least: int
@@ -69,8 +59,8 @@ class SelectionSettings:
     Attributes
     ----------
     measure
-        Measure open choices on the clip. Without it an estimated box gets the finest grid of the quality, and the
-        richest model of scattering that the known light allows is taken.
+        Measure open choices but the resolution on the clip. Without it the richest model of scattering that the known
+        light allows is taken.
     lost_detail
         Share of the smoke's contrast that a grid may lose of what the finest of the quality shows; a preset has that
         of `LOST_DETAIL`.

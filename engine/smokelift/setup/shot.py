@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,10 +11,10 @@ from typing import Any
 from smokelift.checks import Remark
 from smokelift.density import AxisEstimate, Observation
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plates
+from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
-from smokelift.scene import Camera, CompleteScene, Domain, Inlet
+from smokelift.scene import Background, Camera, CompleteScene, Domain, Inlet
 from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.settings import Quality, Settings
 
@@ -38,6 +39,14 @@ class ShotView:
     camera: Camera
     plates: Plates
     working: WorkingPicture
+
+    @staticmethod
+    def before(domain: Domain, clip: Clip, camera: Camera, plates: Plates) -> ShotView:
+        """Return the view of a domain; CameraError if no frame shows it."""
+        for frame in range(len(camera.matrices)):
+            with suppress(CameraError):
+                return ShotView(clip, camera, plates, working_picture(camera.at(frame), domain))
+        return ShotView(clip, camera, plates, working_picture(camera, domain))
 
     def observe(self, frame: int, domain: Domain) -> Observation | None:
         """What the camera saw in a frame, from 0, as a small picture; None if nothing of the domain is in it."""
@@ -80,16 +89,12 @@ class Shot:
         The cameras, the input first.
     settings
         With all that was left open decided.
-    estimated_background : (rows, columns, 3), optional
-        Full picture behind the smoke where the scene does not give one.
     remarks
         What was assumed or noticed, with the doubts: why the result may be nothing, or wrong.
     estimates
         What was decided, with the figures that decided it.
     qualities
-        The grid that each quality would take of this clip; empty where the resolution was not measured.
-    exposure
-        Largest relative change of exposure, which is evened out; 0 where it is steady.
+        The grid that each quality would take of this clip.
     smoky
         Numbers of the frames, of those examined, that show smoke, those with the most first.
     place
@@ -103,19 +108,23 @@ class Shot:
     optics: Optics
     views: tuple[ShotView, ...]
     settings: Settings
-    estimated_background: Image | None
     remarks: tuple[Remark, ...]
     estimates: tuple[Estimate[Any], ...]
     qualities: Mapping[Quality, Grid]
-    exposure: float
     smoky: tuple[int, ...]
     place: AxisEstimate | None
-    fire: ShotView | None = None
+    fire: ShotView | None
 
     @property
     def clip(self) -> Clip:
         """The input."""
         return self.views[0].clip
+
+    @property
+    def estimated_background(self) -> Image | None:
+        """Full picture (rows, columns, 3) behind the smoke; None where the scene has one, or one for every frame."""
+        plates = self.views[0].plates
+        return plates.image if self.scene.background == Background() and isinstance(plates, Plate) else None
 
     @property
     def inlets(self) -> tuple[Inlet, ...]:

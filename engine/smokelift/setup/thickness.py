@@ -13,8 +13,6 @@ background may be smoke, says how well that is known. Figures: docs/experiments/
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,24 +35,12 @@ ERROR = 0.15
 """Largest relative error (standard deviation) of the source radiance that counts as measured: half of the 30 % within
 which it has to be right."""
 
-LARGEST_ERROR = 9.99
-"""Largest error that is said: further figures say nothing more."""
-
 FRAMES = 3
 """Smallest number of frames that their deviation is estimated from."""
 
 
 def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Doubles:
-    """Compare the texture of a frame with that of its background.
-
-    Parameters
-    ----------
-    picture : (rows, columns, 3)
-        Linear radiance.
-    plate
-        The background, of the same size.
-    smoke : (rows, columns) bool
-        Pixels that show smoke.
+    """Compare the texture of a linear frame (rows, columns, 3) with that of its background, where it shows smoke.
 
     Returns
     -------
@@ -63,16 +49,19 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
         a background that may be smoke itself. Of those without: their weight, how much of the texture is missing from
         them, where all should be seen. Of those with smoke again: the radiance (3) that it adds.
     """
-    behind = _behind(plate)
-    covered, before = _blocks(smoke.astype(np.float64)), np.asarray(picture, np.float64)
-    smoky, clear = behind.known & (covered > 0.5), behind.known & (covered == 0)
+    seen, behind = np.asarray(picture, np.float64), np.asarray(plate.image, np.float64)
+    confidence, covered = _blocks(plate.confidence.astype(np.float64)), _blocks(smoke.astype(np.float64))
+    power = _texture(behind, behind)
+    # the noise of two neighbours, down and across
+    noise = 4 * _blocks(np.sum(np.square(noise_at(plate.image, plate), dtype=np.float64), -1))
+    known = (power > CONTRAST**2 * noise) & (confidence > CONFIDENCE)
+    smoky, clear = known & (covered > 0.5), known & (covered == 0)
     # one sharp edge would outweigh all else
-    usual = float(np.median(behind.power[smoky])) if smoky.any() else 0.0
-    weight = behind.power / (behind.power + max(usual, 1e-12))
-    shared = _texture(_differences(before), behind.differences)
-    passed = np.divide(shared, behind.power, out=np.ones_like(shared), where=behind.power > 0)
-    hidden, unsure = weight * (1 - passed), weight * (1 - behind.confidence)
-    added = weight[..., None] * (_blocks(before) - passed[..., None] * behind.light)
+    usual = float(np.median(power[smoky])) if smoky.any() else 0.0
+    weight = power / (power + max(usual, 1e-12))
+    passed = np.divide(_texture(seen, behind), power, out=np.ones_like(power), where=power > 0)
+    hidden, unsure = weight * (1 - passed), weight * (1 - confidence)
+    added = weight[..., None] * (_blocks(seen) - passed[..., None] * _blocks(behind))
     sums = [part[smoky].sum() for part in (hidden, weight, unsure)] + [part[clear].sum() for part in (weight, hidden)]
     return np.array([*sums, *added[smoky].sum(0)])
 
@@ -92,49 +81,19 @@ def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate
     # what a background of smoke hides is missing from what the smoke before it seems to hide
     error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
-        known = min(error, LARGEST_ERROR)
-        kind = "uncertain smoke thickness"
-        return None, undetermined(kind, "smoke thickness", spread=known, tolerance=ERROR)
+        # more than all of it says nothing more
+        kind, spread = "uncertain smoke thickness", min(error, 1.0)
+        return None, undetermined(kind, "smoke thickness", spread=spread, tolerance=ERROR)
     share = hidden / smoke
     thickness = measured("smoke thickness", f"{share:.3f}", {"hidden": share}, spread=error, tolerance=ERROR)
     return np.maximum(np.array(added) / hidden, 0), thickness
 
 
-class _Behind(NamedTuple):
-    """What is needed of a background: differences of its pixels, down and across; and of its blocks the mean radiance,
-    the power of the texture, the mean confidence, and whether the texture is its own and stands out from noise.
-    """
-
-    differences: tuple[Doubles, Doubles]
-    light: Doubles
-    power: Doubles
-    confidence: Doubles
-    known: NDArray[np.bool_]
-
-
-@lru_cache(maxsize=1)
-def _behind(plate: Plate) -> _Behind:
-    """The background of a plate, which is that of all frames while the camera stands still."""
-    behind, confidence = np.asarray(plate.image, np.float64), _blocks(plate.confidence.astype(np.float64))
-    differences = _differences(behind)
-    power = _texture(differences, differences)
-    # the noise of two neighbours, down and across
-    noise = 4 * _blocks(np.sum(np.square(noise_at(plate.image, plate), dtype=np.float64), -1))
-    known = (power > CONTRAST**2 * noise) & (confidence > CONFIDENCE)
-    return _Behind(differences, _blocks(behind), power, confidence, known)
-
-
-def _differences(picture: Doubles) -> tuple[Doubles, Doubles]:
-    """Differences of neighbouring pixels, down and across."""
-    return np.diff(picture, axis=0), np.diff(picture, axis=1)
-
-
-def _texture(one: tuple[Doubles, Doubles], other: tuple[Doubles, Doubles]) -> Doubles:
-    """Products of the differences of neighbouring pixels, the mean over each block and the channels."""
-    (down, across), (other_down, other_across) = one, other
-    products = np.zeros((len(across), down.shape[1]))
-    products[:-1] += np.einsum("ijc,ijc->ij", down, other_down)
-    products[:, :-1] += np.einsum("ijc,ijc->ij", across, other_across)
+def _texture(one: Doubles, other: Doubles) -> Doubles:
+    """Products of differences of neighbouring pixels, down and across, the mean over each block and all channels."""
+    products = np.zeros(one.shape[:2])
+    for axis, part in enumerate((products[:-1], products[:, :-1])):
+        part += np.einsum("ijc,ijc->ij", np.diff(one, axis=axis), np.diff(other, axis=axis))
     return _blocks(products)
 
 

@@ -137,7 +137,7 @@ class _Estimation:
         self._guided = self._first is not None
         self._prediction = prediction if self._guided else None
         self._finest = finest if self._guided else replace(finest, past=None)
-        self._levels = [self._finest] if self._guided else pyramid(self._finest, settings.grids)
+        self._levels = [self._finest] if self._guided else pyramid(self._finest, settings.levels)
         self._coarsest = self._levels[0].coarseness
         if self._prediction is None:
             self._u = StaggeredGrid.zero(self._levels[0].after.shape, 1.0, closed)

@@ -8,9 +8,6 @@ from smokelift.scene.checks import integer
 from smokelift.velocity.solver import ProjectedCG, Solver
 from smokelift.velocity.source_detection import SourceDetection
 
-LEVELS = 3
-"""Grids by default. They reach several voxels a frame (docs/experiments/velocity-pyramid.md)."""
-
 
 @dataclass(frozen=True)
 class VelocitySettings:
@@ -26,9 +23,8 @@ class VelocitySettings:
         None takes as many in a clip as what its pictures show asks for (see `smokelift.setup`);
         between two densities alone there are none.
     levels
-        Grids, each half as fine as the one before, for an estimate without a prediction. None takes as many as the
-        motion in a clip asks for (see `smokelift.setup`), and three between two densities alone. With a prediction
-        there is one, because fine detail aliases on coarse grids (velocity-pyramid.md).
+        Grids, each half as fine as the one before, for an estimate without a prediction: they reach several voxels a
+        frame. With a prediction there is one, because fine detail aliases on coarse grids (velocity-pyramid.md).
     linearisations
         Linearisations on each grid (velocity-pyramid.md).
     large_grid
@@ -76,7 +72,7 @@ class VelocitySettings:
     """
 
     coarsening: int | None = None
-    levels: int | None = None
+    levels: int = 3
     linearisations: int = 2
     large_grid: int = 500_000
     small_step: float = 0.08
@@ -99,11 +95,6 @@ class VelocitySettings:
     def __post_init__(self) -> None:
         """Check the counts; ValueError."""
         integer(self.linearisations, "linearisations", "a whole number from 1", least=1)
-        for name, least in (("coarsening", 0), ("levels", 1)):
-            if getattr(self, name) is not None:
-                integer(getattr(self, name), name, f"a whole number from {least}, or None", least=least)
-
-    @property
-    def grids(self) -> int:
-        """The number of grids, the usual one where it was left open."""
-        return LEVELS if self.levels is None else self.levels
+        integer(self.levels, "levels", "a whole number from 1", least=1)
+        if self.coarsening is not None:
+            integer(self.coarsening, "coarsening", "a whole number from 0, or None", least=0)

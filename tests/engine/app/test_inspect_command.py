@@ -19,7 +19,7 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
     """The same from inspect, as sentences and as JSON, and with the sequence, each with its figures."""
     kept = Sequence.open(finished).choices
     assert [choice["what"] for choice in kept] == [
-        "resolution", "scattering", "domain", "iterations", "velocity grid coarsening", "velocity levels",
+        "resolution", "scattering", "velocity grid coarsening",
         "axis depth",
     ]  # fmt: skip
     assert json.loads((finished / "sequence.json").read_text())["choices"] == list(kept)

@@ -100,7 +100,7 @@ def test_known_inlets_need_no_contact() -> None:
     sources = [Inlet((0.2, -0.05, 1.0), 0.2), Inlet((0.2, 0.25, 0.2), 0.2)]
     two, places = axis_of(smoke, FRONT, BOX, sources), (np.array([-1.3, 0.2]), np.full(2, 0.2))
     np.testing.assert_allclose(two.at(*places), (0.25, 0.1), atol=0.02)
-    np.testing.assert_allclose(two.spread_at(*places), (0.0, 0.15), atol=0.02)
+    np.testing.assert_allclose(two.read(two.spreads, *places), (0.0, 0.15), atol=0.02)
 
 
 @pytest.mark.parametrize("depth", [-0.3, 0.0, 0.3])
@@ -139,8 +139,8 @@ def test_columns_beside_one_another_have_depths_of_their_own() -> None:
     heights, right, left = np.array([-0.9, 0.0, 0.4]), np.full(3, 0.45), np.full(3, -0.35)
     np.testing.assert_allclose(found.at(heights, right), -0.3, atol=0.03)
     np.testing.assert_allclose(found.at(heights, left), 0.3, atol=0.03)
-    np.testing.assert_allclose(found.spread_at(heights, left), 0.0, atol=0.1)
-    assert (found.width_at(heights, left) < 0.27).all()  # the row of both has 0.42
+    np.testing.assert_allclose(found.read(found.spreads, heights, left), 0.0, atol=0.1)
+    assert (found.read(found.widths, heights, left) < 0.27).all()  # the row of both has 0.42
     # before the far one begins there is only the near one
     np.testing.assert_allclose(found.at(np.array([-1.4, -1.4]), np.array([-0.35, 0.45])), -0.3, atol=0.03)
 

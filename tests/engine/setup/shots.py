@@ -1,12 +1,9 @@
 """Shots that the tests of `setup` look at."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 
 from smokelift.footage.clip import Clip
-from smokelift.scene import Light, Scene, View, orbit
+from smokelift.scene import Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -17,20 +14,6 @@ def shot_of(scene: Scene, settings: Settings) -> Shot:
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return prepare_shot(clip, scene, settings)
-
-
-AROUND = (0.0, 45.0, 90.0, 135.0)
-"""Degrees about the smoke at which four cameras stand that see it from all sides."""
-
-
-def filmed_around(plume, folder: Path, lights: tuple[Light, ...], angles: tuple[float, ...] = AROUND) -> Scene:
-    """A scene without a light, of smoke that cameras at some angles filmed in one."""
-    views = []
-    for angle in angles:
-        camera = orbit(plume.scene.camera, plume.scene.domain, angle)
-        own = replace(plume.scene, camera=camera, lights=lights)
-        views.append(View(camera, plume.write(folder / f"{angle:g}", plume.densities, own).clip))
-    return replace(plume.scene, clip=views[0].clip, views=tuple(views[1:]), lights=())
 
 
 def burning(number: int, picture: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.checks import Doubt
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
@@ -14,17 +14,30 @@ from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
-from smokelift.setup.backdrop_remarks import (
-    backdrop_doubts,
-    backdrop_remarks,
-    between_bars,
-    cut_doubts,
-    nothing_seen,
-    smoke_in_plate,
-    what_helps,
-)
-from smokelift.setup.smoke import SmokeSamples, sample_smoke
+from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, what_helps
+from smokelift.setup.first_estimate import SmokeSamples, sample_smoke
 from tests.engine.footage.films import coded, puff, wall
+
+COVERED = np.zeros((100, 50), np.bool_)
+COVERED[10:80] = True
+SEEN = SmokeSamples(1.0, COVERED, np.zeros_like(COVERED), *np.zeros((2, 0, 3), np.float32), (0,), {}, ())
+"""Frames that show smoke, in the middle of the picture."""
+
+
+def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) -> list[str]:
+    """What is doubted of a background and frames before it."""
+    return [doubt.kind for doubt in doubts(found, samples, given)]
+
+
+@pytest.fixture
+def grey(tmp_path):
+    """A clip of four frames of a grey wall, and its background."""
+    picture = np.full((24, 32, 3), 0.2, np.float32)
+    for n in range(4):
+        write_image(tmp_path / f"wall_{n}.png", picture)
+    with Clip.open(tmp_path / "wall_#.png") as clip:
+        plate = Plate(clip.frame(0), np.ones((24, 32), np.float32), lasting_noise(1 / 255))
+        yield Backdrop("picture", clip, plate, frames=4)
 
 
 def puff_at(row: int) -> np.ndarray:
@@ -43,13 +56,11 @@ def before(floor: float, folder) -> Clip:
 
 
 @pytest.mark.parametrize(("unknown_rows", "said"), [(0, False), (20, False), (60, True)])
-def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
-    unknown, covered = np.zeros((2, 100, 50), np.bool_)
+def test_smoke_that_may_be_in_the_plate_is_said(grey, unknown_rows, said) -> None:
+    unknown = np.zeros_like(COVERED)
     unknown[:unknown_rows] = True
-    covered[10:80] = True
-    colours = np.zeros((0, 3), np.float32)
-    doubts = smoke_in_plate(SmokeSamples(1.0, (0, 0, 50, 100), covered, unknown, colours, colours, (0,), {}))
-    assert doubts == (Doubt("smoke in the background", {"share": 0.75}),) * said
+    found = doubts(grey, replace(SEEN, unknown=unknown), given=False)
+    assert found == (Doubt("smoke in the background", {"share": 0.75}),) * said
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
@@ -75,9 +86,8 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -
     for plate, doubted in ((wall(0.2, 0.5), said), (np.zeros((72, 56, 3)), False)):
         path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantiser)
         with Clip.open(path) as clip:
-            doubts = backdrop_doubts(find_backdrop(clip, None, None))
-            assert [doubt.kind for doubt in doubts] == ["strong compression"] * doubted
-            assert not backdrop_doubts(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
+            assert kinds(find_backdrop(clip, None, None)) == ["strong compression"] * doubted
+            assert not kinds(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
 
 
 def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
@@ -93,10 +103,10 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
         smoke = puff_at(60 - 4 * n)
         write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
-        (doubt,) = cut_doubts(find_backdrop(clip, None, None))
+        (doubt,) = doubts(find_backdrop(clip, None, None), SEEN, given=False)
     assert doubt == Doubt("cut", {"before": 6, "after": 7, "first": 2, "last": 12})
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
-        assert cut_doubts(find_backdrop(clip, None, None)) == ()
+        assert kinds(find_backdrop(clip, None, None)) == []
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
@@ -113,7 +123,7 @@ def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> N
         masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
         assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
         assert (masks[0] != masks[1]).mean() < 0.01
-    assert backdrop_doubts(found) == (Doubt("background of one frame"),)
+        assert kinds(found) == ["background of one frame"]
     assert backdrop_remarks(found)[0].kind == ("background of one colour" if colour else "black background")
 
 
@@ -124,8 +134,10 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
         smoke = puff_at(60 - 8 * n)
         write_image(tmp_path / f"frame_{n}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_#.png") as clip:
-        doubts = backdrop_doubts(find_backdrop(clip, None, None))
-    assert doubts == (Doubt("background of few frames", {"frames": count}),) * doubted
+        found = doubts(find_backdrop(clip, None, None), SEEN, given=False)
+    assert [doubt for doubt in found if doubt.kind == "background of few frames"] == (
+        [Doubt("background of few frames", {"frames": count})] * doubted
+    )
 
 
 @pytest.mark.parametrize(
@@ -140,29 +152,19 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
     ids=["bars", "ragged", "bank of fog", "from above", "a puff that passes"],
 )
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(rows, missing, at_a_time, said, turned) -> None:
+def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(grey, rows, missing, at_a_time, said, turned) -> None:
     covered = np.zeros((50, 80), np.bool_)
     covered[slice(*rows)] = np.random.default_rng(0).random((rows[1] - rows[0], 80)) >= missing
     covered = covered.T if turned else covered
     seen = np.zeros((round(2 * at_a_time * covered.sum()), 3), np.float32)  # in two samples
     gains = dict.fromkeys(range(2), np.ones(3, np.float32))
-    doubts = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, seen, seen, (0,), gains))
-    assert doubts == (Doubt("bars"),) * said
-
-
-@pytest.fixture
-def grey(tmp_path):
-    """A clip of four frames of a grey wall, and its plate."""
-    picture = np.full((24, 32, 3), 0.2, np.float32)
-    for n in range(4):
-        write_image(tmp_path / f"wall_{n}.png", picture)
-    with Clip.open(tmp_path / "wall_#.png") as clip:
-        yield clip, Plate(clip.frame(0), np.ones((24, 32), np.float32), lasting_noise(1 / 255))
+    nowhere = np.zeros_like(covered)
+    samples = replace(SEEN, covered=covered, unknown=nowhere, colours=seen, behind=seen, gains=gains)
+    assert kinds(grey, samples) == ["bars"] * said
 
 
 def test_how_many_frames_were_examined_is_said(grey) -> None:
-    clip, plate = grey
-    assert nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=()) == (
+    assert doubts(grey, sample_smoke(grey.clip, grey.plates), given=False) == (
         Doubt("no smoke examined", {"frames": 4}),
         Doubt("no smoke before an estimated background"),
     )
@@ -170,7 +172,6 @@ def test_how_many_frames_were_examined_is_said(grey) -> None:
 
 @pytest.mark.parametrize(("codes", "moves"), [(5, False), (20, True)])
 def test_a_background_that_changes_may_be_that_of_a_camera_that_moves(grey, codes, moves) -> None:
-    clip, plate = grey
-    doubt = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False)
+    doubt = what_helps(grey.clip, replace(grey.plates, noise=lasting_noise(codes / 255)), given=False)
     assert (doubt.kind == "no smoke before a changing background") is moves
     assert not moves or doubt.figures["codes"] == pytest.approx(codes, rel=1e-3)

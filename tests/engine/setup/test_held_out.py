@@ -8,10 +8,9 @@ import pytest
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import known_plate
 from smokelift.footage.working_picture import working_picture
-from smokelift.render import scene_optics
-from smokelift.scene import DirectionalLight, completed
+from smokelift.scene import completed
 from smokelift.setup.coarse import CoarseFrame, coarse_frame
-from smokelift.setup.held_out import fit_half, held_out
+from smokelift.setup.held_out import held_out
 from smokelift.setup.shot import ShotView
 
 
@@ -40,13 +39,6 @@ def test_a_light_of_another_colour_is_asked_to_change(frame, draft) -> None:
     tinted = frame.lit_by((replace(sun, irradiance=(red, green, 2 * blue)),))
     (colour,) = held_out([tinted], "single", "single", draft.density).colours
     assert colour[2] / colour[0] == pytest.approx(0.5, rel=0.05)
-
-
-def test_pictures_of_lights_add(frame, draft) -> None:
-    fit = fit_half([frame], draft.density)
-    one, other = scene_optics(frame.scene).lights[0], DirectionalLight((1.0, 0.0, 0.0), (3.0, 3.0, 3.0))
-    together, alone = fit.lit((one, other), "single"), [fit.lit((light,), "single") for light in (one, other)]
-    np.testing.assert_allclose(together[0], alone[0][0] + alone[1][0], rtol=1e-4, atol=1e-6)
 
 
 def test_absorption_asks_for_no_light(frame, draft) -> None:

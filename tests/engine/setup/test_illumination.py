@@ -1,6 +1,7 @@
 """The light of a shot: what is given stays unless the clip contradicts it, and what is not is taken from the clip."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,14 +10,14 @@ import pytest
 from smokelift.checks import Doubt
 from smokelift.footage.clip import Clip
 from smokelift.footage.noise import lasting_noise
-from smokelift.scene import Background, DirectionalLight, Medium, Scene
+from smokelift.output.images import write_image
+from smokelift.scene import Background, DirectionalLight, EnvironmentLight, Medium, Scene, SceneError
 from smokelift.setup import illumination
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.illumination import Illumination, light_remarks
+from smokelift.setup.illumination import Illumination, light_around, light_remarks
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.setup.sky import light_around
 from tests.engine.setup.shots import shot_of
 
 # a light that is not given
@@ -119,12 +120,16 @@ def scattering_of(shot: Shot) -> Estimate[str]:
 def leaves(monkeypatch):
     """Makes light from everywhere leave a given error; returns its strengths over that of what is behind the smoke."""
 
+    held_out = illumination.held_out
+
     def of(error: float) -> list[float]:
         tried = []
 
-        def known(frames, _, judge, __) -> HeldOut:
+        def known(frames, model, judge, settings) -> HeldOut:
             if judge == "multiple":  # of given lights
                 return HeldOut(1.0)
+            if judge == "unshadowed":  # of the light that is assumed
+                return held_out(frames, model, judge, settings)
             lights = frames[0].scene.lights
             radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
             tried.append(round(float(radiance.mean()) / BEHIND, 2))
@@ -147,8 +152,13 @@ def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(li
     assert choice.kind == "scattering in light from everywhere"
     radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
     assert radiance == pytest.approx(BEHIND * np.array([1.2, 1.0, 0.8]), rel=0.01)
-    assert next(found.value for found in shot.estimates if found.what == "light direction") == "undetermined"
     assert "light as behind the smoke" in [remark.kind for remark in shot.remarks]
+
+
+def test_light_around_has_its_radiance_and_no_direction() -> None:
+    lights = light_around(np.array([0.2, 0.3, 0.4]))
+    assert np.allclose(np.sum([light.irradiance for light in lights], 0) / (4 * np.pi), (0.2, 0.3, 0.4))
+    assert np.allclose(np.sum([light.direction for light in lights], 0), 0)
 
 
 def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
@@ -164,9 +174,8 @@ def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
 
 
 def test_a_light_that_is_given_stays(lit, draft, leaves) -> None:
-    tried = leaves(1.0)
+    leaves(1.0)
     assert shot_of(lit, draft).scene.lights == lit.lights
-    assert not tried
 
 
 @pytest.mark.parametrize(
@@ -187,6 +196,151 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
         "scattering", {"error_absorption": error}, what="scattering", value="absorption", source="measured"
     )
     unknown = Estimate("unknown", what="smoke thickness", value="undetermined", source="assumed")
-    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), unknown, unknown)
+    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), (unknown,))
     _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255))
     assert doubts == [Doubt("likely wrong light", {"error": error})] * said
+
+
+def chosen(shot: Shot, what: str) -> Estimate:
+    (choice,) = (choice for choice in shot.estimates if choice.what == what)
+    return choice
+
+
+def with_scattering(settings: Settings, model: str) -> Settings:
+    return replace(settings, scattering=model)
+
+
+@pytest.fixture(scope="module")
+def silhouette(plume, tmp_path_factory) -> Scene:
+    """The blob, dense and unlit, before a bright sky."""
+    dark = replace(plume.scene, medium=Medium(25.0, 0.9), lights=(), background=Background(color=(0.8, 0.9, 1.0)))
+    return plume.write(tmp_path_factory.mktemp("silhouette"), plume.densities, dark)
+
+
+@pytest.fixture(scope="module")
+def thin(plume, tmp_path_factory) -> Scene:
+    """The blob as a haze in strong light."""
+    (sun,) = plume.scene.lights
+    haze = replace(plume.scene, medium=Medium(0.2, 0.9), lights=(replace(sun, irradiance=(80.0, 80.0, 80.0)),))
+    return plume.write(tmp_path_factory.mktemp("thin"), plume.densities, haze)
+
+
+@pytest.fixture(scope="module")
+def white(plume, tmp_path_factory) -> Scene:
+    """The blob as thick white smoke, in light that is scattered any number of times."""
+    (sun,) = plume.scene.lights
+    dim = replace(sun, irradiance=(5.0, 5.0, 5.0))  # nothing is brighter than a picture can be
+    white = replace(plume.scene, medium=Medium(20.0, 0.98), lights=(dim,), scattering="multiple")
+    return replace(plume.write(tmp_path_factory.mktemp("white"), plume.densities, white), scattering=None)
+
+
+# scattering
+
+
+def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
+    """Dark smoke before a bright sky only absorbs, and the figures say that more would not be better."""
+    shot = shot_of(silhouette, draft)
+    choice = chosen(shot, "scattering")
+    assert shot.scene.scattering == choice.value == "absorption"
+    assert choice.figures["error_absorption"] <= choice.figures["error_unshadowed"] + choice.tolerance
+    assert (choice.kind, choice.figures["other"]) == ("compared scattering", "unshadowed")
+
+
+def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
+    shot = shot_of(plume.scene, draft)
+    choice = chosen(shot, "scattering")
+    assert shot.scene.scattering == choice.value == "single"
+    assert choice.figures["error_unshadowed"] > choice.figures["error_single"] + 2 * choice.tolerance
+    assert choice.figures["error_absorption"] > 0.9
+
+
+def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> None:
+    shot = shot_of(white, draft)
+    choice = chosen(shot, "scattering")
+    assert shot.scene.scattering == choice.value == "multiple"
+    assert choice.figures["error_multiple"] < choice.figures["error_single"] - choice.tolerance
+    assert (choice.kind, choice.figures["other"]) == ("compared scattering", "single")
+    forward = replace(plume.scene, medium=replace(plume.scene.medium, anisotropy=0.3))
+    assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").figures
+
+
+def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
+    """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
+    own = {"single": 0.028, "multiple": 0.026}
+    monkeypatch.setattr(
+        illumination, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4)
+    )
+    choice = chosen(shot_of(plume.scene, draft), "scattering")
+    assert choice.value == "single"
+    own["single"] = 0.035  # by less than a cheaper model may add, which is no question here
+    assert chosen(shot_of(plume.scene, draft), "scattering").value == "multiple"
+
+
+@pytest.mark.parametrize(("near", "asked"), [(0.05, {(8, 4), (16, 64)}), (0.01, {(8, 4)})])
+def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
+    plume, draft, monkeypatch, near, asked
+) -> None:
+    """The errors of a coarse grid, and of few steps, hide the medium's; where they do not, nothing more is spent."""
+    fitted_on = set()
+
+    def known(frames, fitted, judge, settings) -> HeldOut:
+        voxels = max(frames[0].scene.domain.resolution)
+        fitted_on.add((voxels, settings.descent_iterations))
+        errors = {"single": 0.05, "multiple": near if voxels == 8 else 0.01}
+        return HeldOut(errors[judge] if fitted == judge else 0.4)
+
+    monkeypatch.setattr("smokelift.setup.coarse.COARSE_SIDE", 8)
+    monkeypatch.setattr(illumination, "held_out", known)
+    choice = chosen(shot_of(plume.scene, draft), "scattering")
+    assert fitted_on == asked
+    assert choice.value == "multiple"
+    assert choice.figures["error_multiple"] == 0.01
+
+
+def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
+    choice = chosen(shot_of(thin, draft), "scattering")
+    assert choice.value == "unshadowed"
+    assert {"error_absorption", "error_unshadowed", "error_single", "error_multiple"} < set(choice.figures)
+
+
+@pytest.mark.parametrize("model", ["absorption", "unshadowed", "single", "multiple"])
+def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
+    for scene in (plume.scene, thin):
+        shot = shot_of(scene, with_scattering(draft, model))
+        choice = chosen(shot, "scattering")
+        assert (shot.scene.scattering, choice.source, choice.figures) == (model, "given", {})
+
+
+def test_shadows_need_a_light(silhouette, draft) -> None:
+    for model in ("single", "multiple"):
+        with pytest.raises(ValueError, match=rf'"{model}" needs a light'):
+            shot_of(silhouette, with_scattering(draft, model))
+
+
+def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
+    shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
+    assert shot.scene.scattering == "single"
+    assert [choice.what for choice in shot.estimates] == ["resolution", "velocity grid coarsening"]
+
+
+# environments
+
+
+def environment(folder: Path, radiance: np.ndarray, **options: int) -> EnvironmentLight:
+    write_image(folder / "sky.exr", radiance, half=False)
+    return EnvironmentLight(folder / "sky.exr", **options)
+
+
+def test_an_environment_gets_its_directions(plume, draft, tmp_path) -> None:
+    """The number is part of the scene from then on; by hand it is what is said."""
+    sky = environment(tmp_path, np.full((8, 16, 3), 0.5, np.float32))
+    scene = plume.write(tmp_path / "clip", plume.densities[1:3], replace(plume.scene, lights=(sky,)))
+    (light,) = shot_of(scene, draft).scene.lights
+    assert light == replace(sky, directions=light.directions) and light.directions >= 4
+    scene = replace(plume.scene, lights=(replace(sky, directions=6),))
+    scene.save(tmp_path / "scene.toml")
+    assert Scene.load(tmp_path / "scene.toml") == scene
+    shot = shot_of(scene, draft)
+    assert shot.scene.lights == scene.lights and len(shot.optics.lights) == 6
+    with pytest.raises(SceneError, match="directions must be a whole number from 1 to 4096, not 0"):
+        replace(sky, directions=0)

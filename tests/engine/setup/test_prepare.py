@@ -8,14 +8,26 @@ from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from smokelift.checks import Remark
+from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
+from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
-from smokelift.scene import Background, Camera, ClipSource, Domain, Inlet, Scene, as_matrix, completed, look_at_matrix
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    Domain,
+    Inlet,
+    Scene,
+    as_matrix,
+    completed,
+    look_at_matrix,
+)
 from smokelift.scene.projection import project_points
 from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.geometry import MIN_SIDE_VOXELS
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import LIMITS
+from smokelift.setup.prepare import place_estimate, prepare_shot, velocity_coarsening
+from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
 
@@ -68,10 +80,9 @@ def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
 
 
 def test_the_light_that_nothing_tells_is_called_undetermined(estimated) -> None:
-    """Before black neither its strength nor where it comes from, in estimates that are said and kept."""
-    known = {estimate.what: estimate for estimate in estimated.estimates}
-    assert known["smoke thickness"].value == known["light direction"].value == UNDETERMINED
-    assert known["light direction"].kind == "light direction undetermined by one view"
+    """Before black, with how thick the smoke is, in an estimate that is said and kept."""
+    (thickness,) = [estimate for estimate in estimated.estimates if estimate.what == "smoke thickness"]
+    assert thickness.value == UNDETERMINED
 
 
 def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
@@ -183,8 +194,7 @@ def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, given) -> Non
     assert np.isfinite(shot.scene.lights[0].irradiance).all()
 
 
-def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
-    """The volume stands still: the camera turns in its place, a matrix for every frame, and smoke alone is smoke."""
+def test_a_camera_that_shakes_before_texture_is_refused(draft, tmp_path) -> None:
     random = np.random.default_rng(0)
     wall = ndimage.gaussian_filter(random.standard_normal((140, 180)), 1.5)
     wall = 0.3 + 0.1 * wall / wall.std()
@@ -194,11 +204,96 @@ def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
         smoke = 0.8 * np.exp(-((rows - 95 + 6 * n) ** 2 + (columns - 90) ** 2) / 200)
         seen = (wall * (1 - smoke) + 0.9 * smoke)[down : down + 120, right : right + 160]
         write_image(tmp_path / f"shaken_{n}.png", np.repeat(np.clip(seen, 0, 1)[..., None], 3, 2).astype(np.float32))
-    shot = shot_of(Scene(clip=ClipSource(tmp_path / "shaken_#.png", fps=24), scattering="absorption"), draft)
-    camera = shot.scene.camera
-    assert len(camera.matrices) == len(shot.clip)
-    assert {tuple(row[3] for row in matrix) for matrix in camera.matrices} == {tuple(row[3] for row in camera.matrix)}
-    where = np.array([project_points(camera.at(n), np.array([shot.scene.domain.centre]))[0][0] for n in range(8)])
-    np.testing.assert_allclose(where - where.mean(0), (offsets.mean(0) - offsets)[:, ::-1], atol=0.3)
-    assert "turning camera" in [remark.kind for remark in shot.remarks]
-    assert shot.estimated_background is None
+    with pytest.raises(ValueError, match=r"^The camera moves, .* Stabilize the clip .* clean plate .* as background"):
+        shot_of(Scene(clip=ClipSource(tmp_path / "shaken_#.png", fps=24), scattering="absorption"), draft)
+
+
+def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
+    """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
+    shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
+    choices = [velocity_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), draft) for shape in shapes]
+    assert [choice.value for choice in choices] == [0, 1, 2, 3, 4, 1]
+    assert [choice.figures["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
+    by_hand = replace(draft, velocity=replace(draft.velocity, coarsening=0))
+    choice = velocity_coarsening(plume.scene.domain, by_hand)
+    assert (choice.value, choice.source) == (0, "given")
+
+
+def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
+    first = shot_of(plume.scene, draft)
+    assert shot_of(plume.scene, first.settings).settings == first.settings
+
+
+def test_a_camera_is_alone_where_no_other_sees_the_smoke_and_it_stands_still(plume, tracked, two_views, draft) -> None:
+    shots = [shot_of(scene, draft) for scene in (plume.scene, two_views, tracked)]
+    assert [shot.alone for shot in shots] == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("cue", "depth", "kind"),
+    [
+        ("box", 0.0, "axis depth by box"),
+        ("floor contact", -0.25, "axis depth by floor contact"),
+        ("inlets", 0.1, "axis depth by inlets"),
+        ("distance", 0.1, "axis depth by distance"),
+    ],
+)
+def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, depth: float, kind: str) -> None:
+    estimate = place_estimate(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
+    assert (estimate.kind, estimate.figures, estimate.spread) == (kind, {"depth": depth}, 0.123)
+    assert (estimate.value == "undetermined") == (estimate.source == "assumed") == (cue == "box")
+    assert (estimate.source == "given") == (cue == "distance")
+
+
+def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
+    blind = replace(plume.scene, inlets=())
+    found = shot_of(blind, draft)
+    assert found.place is not None and found.estimates[-1] == place_estimate(found.place)
+    marked = shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), draft)
+    assert marked.place is not None and marked.place.cue == "inlets"
+    along = view_frame(blind.camera)[1]
+    middle = (np.array(blind.domain.centre) - blind.camera.position) @ along
+    given = replace(draft, distance=float(middle) + 0.1)
+    known = shot_of(blind, given)
+    assert known.place is not None and known.place.cue == "distance"
+    assert known.place.depth == pytest.approx(0.1, abs=0.05)
+    assert known.estimates[-1].source == "given"
+    blank = shot_of(blind, Settings.preset(draft.quality, method="paper"))
+    assert blank.place is None
+    assert "axis depth" not in [choice.what for choice in blank.estimates]
+    with pytest.raises(ValueError, match="The inlets say where the smoke stands; leave the distance out"):
+        shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), given)
+
+
+def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings) -> None:
+    """Of a camera that is not given, and of a box that is not; the smoke stands in the middle of that."""
+    for camera in (None, plume.scene.camera):
+        near, far = (
+            shot_of(replace(plume.scene, inlets=(), camera=camera, domain=None), replace(draft, distance=distance))
+            for distance in (3.0, 6.0)
+        )
+        for shot, distance in ((near, 3.0), (far, 6.0)):
+            ahead = (np.array(shot.scene.domain.centre) - shot.scene.camera.position) @ view_frame(shot.scene.camera)[1]
+            assert ahead == pytest.approx(distance, rel=1e-3)
+            assert shot.place is not None and shot.place.depth == pytest.approx(0, abs=0.02 * distance)
+        sizes = [np.subtract(shot.scene.domain.max, shot.scene.domain.min) for shot in (near, far)]
+        np.testing.assert_allclose(sizes[1], 2 * sizes[0], rtol=0.05)
+
+
+def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(plume, draft: Settings) -> None:
+    blind = replace(plume.scene, inlets=())
+    count = len(plume.densities)
+    still = shot_of(blind, draft).place
+    assert still is not None
+    turning = replace(blind.camera, matrices=(blind.camera.matrix,) * count)
+    found = shot_of(replace(blind, camera=turning), draft).place
+    assert found is not None
+    assert found.cue == still.cue
+    assert found.depth == pytest.approx(still.depth, abs=0.1 * still.deviation)
+    matrices = np.repeat(np.array(blind.camera.matrix)[None], count, axis=0)
+    matrices[:, 0, 3] += np.linspace(0, 0.1, count)
+    travelling = replace(blind.camera, matrix=as_matrix(matrices[0]), matrices=tuple(map(as_matrix, matrices)))
+    assert shot_of(replace(blind, camera=travelling), draft).place is None
+    middle = (np.array(blind.domain.centre) - blind.camera.position) @ view_frame(blind.camera)[1]
+    given = shot_of(replace(blind, camera=travelling), replace(draft, distance=float(middle) + 0.1)).place
+    assert given is not None and given.depth == pytest.approx(0.1)

@@ -6,8 +6,8 @@ import pytest
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.setup.estimate import UNDETERMINED
-from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.source import source_radiance
+from smokelift.setup.first_estimate import SmokeSamples
+from smokelift.setup.medium import source_radiance
 from smokelift.setup.thickness import seen_texture, smoke_thickness
 
 SIZE = (80, 96)
@@ -81,7 +81,7 @@ def test_thin_smoke_is_lit_as_strongly_as_it_hides() -> None:
     smoky = clear[..., 0] < 0.95
     behind = backdrop(0.0)
     colours, hidden = (clear * behind + (1 - clear) * SOURCE)[smoky], behind[smoky]
-    samples = SmokeSamples(1.0, (0, 0, 1, 1), smoky, ~smoky, colours.astype("f4"), hidden, (0,), {})
+    samples = SmokeSamples(1.0, smoky, ~smoky, colours.astype("f4"), hidden, (0,), {})
     assert source_radiance(samples).max() < 0.6 * SOURCE.max()
     assert source_radiance(samples, SOURCE) == pytest.approx(SOURCE)
     assert (source_radiance(samples, 0.1 * SOURCE) >= colours.max(0) * 0.97).all()  # what is there is reached

@@ -1,4 +1,4 @@
-"""What the smoke's pixels say of its source radiance: how bright smoke of any thickness is, and of what colour.
+"""The smoke as a medium: of the scene, or the usual one in the colour that its pixels show; and its source radiance.
 
 A pixel shows T behind + (1 - T) source: it lies between its background and the source radiance, which is the light
 times the smoke's colour. So the source lies on the line from the background through the smoke, beyond the thickest
@@ -9,15 +9,24 @@ the smoke, which stands in the same light. Figures: docs/experiments/smoke-colou
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
-from smokelift.checks import Doubt
+from smokelift.checks import Doubt, Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.fire import CLIPPED_VALUE
 from smokelift.footage.images import brightest_channel
+from smokelift.render import scene_optics
+from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
 from smokelift.scene.checks import Vector
 from smokelift.setup.estimate import Estimate, measured, undetermined
-from smokelift.setup.smoke import SmokeSamples
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
+
+OPTICAL_DEPTH_AT_ONE = 5.0
+"""Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid. A convention,
+since a picture shows density times extinction."""
 
 SOURCE_EXCESS = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
@@ -40,22 +49,48 @@ MIN_SOURCE_VALUE = 0.01
 WHITE: Vector = (1.0, 1.0, 1.0)
 """Colour of grey smoke."""
 
-PLACES = 256
-"""Points of the line that are compared with the light."""
+
+def find_medium(
+    scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain
+) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
+    """Complete the medium, with the colour of its flame where fire burns; with what was measured and assumed for it.
+
+    Smoke has the colour of the lights in the middle of the box times its own.
+    """
+    medium, samples, fire = scene.medium, estimate.samples, estimate.fire
+    estimates: list[Estimate[Any]] = []
+    remarks: list[Remark] = []
+    if medium is None:
+        medium = Medium(extinction=OPTICAL_DEPTH_AT_ONE / min(domain.size))
+        remarks.append(Remark("assumed medium", {"extinction": medium.extinction, "albedo": medium.albedo}))
+        color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
+        medium = replace(medium, color=color)
+        estimates.append(coloured)
+    off = degrees_off_one_colour(samples)
+    if off >= COLOURED:
+        remarks.append(Doubt("smoke of several colours", {"degrees": off}))
+    if fire is not None:
+        red, green, blue = color = medium.flame_color or fire.color
+        figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
+        estimates.append(measured("fire", f"{fire.share:.3f}", figures))
+        medium = replace(medium, flame_color=color)
+    return medium, tuple(estimates), tuple(remarks)
+
+
+def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, grey: Medium) -> Doubles:
+    """Colour (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
+    # only the sum of an environment's directions counts, so one stands for all
+    few = tuple(replace(each, directions=1) if isinstance(each, EnvironmentLight) else each for each in lights)
+    source = scene_optics(CompleteScene(camera, domain, grey, few, Background(), "single")).unshadowed_source()
+    return source / source.max() if source.max() > 0 else np.ones(3)
 
 
 def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> Doubles:
     """Return the source radiance (3,) of the smoke; white where the clip shows none.
 
-    Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it.
-
-    Parameters
-    ----------
-    samples
-        Smoke pixels of the clip and what is behind them.
-    measured : (3,), optional
-        The same for the mean of the smoke, if a texture behind it shows it (`thickness`). Smoke that is brighter than
-        that, or darker where it darkens, is still fitted.
+    Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it. If
+    a texture behind the smoke shows that of its mean, ``measured`` (3,), smoke that is brighter, or darker where it
+    darkens, is still fitted.
     """
     if len(samples.colours) == 0:
         return np.ones(3)
@@ -74,21 +109,9 @@ def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> D
 
 
 def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimate[str]]:
-    """Find the smoke's own colour.
+    """Return the smoke's own colour, and what decided it, in light of a colour (3,), ones where that is unknown.
 
-    Parameters
-    ----------
-    samples
-        Smoke pixels of the clip and what is behind them.
-    light : (3,)
-        Colour of the light, ones where it is unknown.
-
-    Returns
-    -------
-    color
-        Red, green and blue, the largest 1; white where nothing says that the smoke is not grey.
-    estimate
-        The same with what decided it.
+    The largest of red, green and blue is 1; the colour is white where nothing says that the smoke is not grey.
     """
     line = _thickest(samples)
     if line is None:
@@ -108,32 +131,23 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
     return (red, green, blue), measured("smoke colour", named, figures, tolerance=COLOURED)
 
 
-def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
-    """Return a doubt about smoke of more than one colour before black.
+def degrees_off_one_colour(samples: SmokeSamples) -> float:
+    """Return by how much the light of smoke differs from one colour; 0 before anything but black, or if too faint.
 
     Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
     explains the most of the light is another colour's. White that is clipped has none.
     """
     shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
     if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
-        return ()
+        return 0.0
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
-        return ()
+        return 0.0
     along = np.linalg.eigvalsh(shown.T @ shown)
-    off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
-    if off < COLOURED:
-        return ()
-    return (Doubt("smoke of several colours", {"degrees": off}),)
+    return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
 
 
 def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
-    """Direction (3,), of length 1, in which smoke changes what is behind it: the one that explains most of the change.
-
-    Parameters
-    ----------
-    colours, behind : (n, 3)
-        Radiance of at least one pixel with smoke, and without.
-    """
+    """Direction (3,), of length 1, that explains most of what smoke (n, 3) changes of what is behind it."""
     change = colours - behind
     axis = np.linalg.eigh(change.T @ change)[1][:, -1]
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
@@ -159,7 +173,7 @@ def _sources(behind: Doubles, seen: Doubles) -> Doubles:
     change = seen - behind
     falling = change < 0
     most = min((behind[falling] / -change[falling]).min(), 1e3) if falling.any() else 1e3
-    return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), PLACES)[:, None] * change, 0))
+    return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), 256)[:, None] * change, 0))
 
 
 def _degrees(colours: Doubles, other: Doubles) -> Doubles:

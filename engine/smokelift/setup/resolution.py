@@ -1,13 +1,14 @@
-"""How much of the smoke's detail in a clip a grid loses, in so far as that detail stands out from the noise.
+"""How many voxels the smoke's detail in a clip asks for, in so far as that detail stands out from the noise.
 
 The spectrum of what the smoke changes in the picture (cosine transform, in sRGB values, where a clip's noise is even)
-is compared with that of the noise, which is measured in pixels without smoke. A grid shows
-what is coarser than two of its voxels; the share of the smoke's contrast that is finer is what it loses.
+is compared with that of the noise, which is measured in pixels without smoke. A grid shows what is coarser than two of
+its voxels; the share of the smoke's contrast that is finer is what it loses. Figures:
+docs/experiments/resolution-selection.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,12 +20,19 @@ from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
+from smokelift.scene import Domain
+from smokelift.setup.estimate import Estimate, Grid, measured
+from smokelift.setup.settings import LOST_DETAIL, QUALITIES, Quality, Settings
+
+Shape = tuple[int, int, int]
 
 OUTLINE = 320
-"""Pixels along the longer side of the picture, at most, in which the smoke is found. Noise is measured beside it."""
+"""Pixels along the longer side of the picture, at most, in which the smoke is found. Noise is measured beside it
+(docs/experiments/resolution-selection.md)."""
 
 EDGE = 3
-"""Width of the margin around the smoke, in these pixels, in which there may be some that is too thin to be found."""
+"""Width of the margin around the smoke, in these pixels, in which there may be some that is too thin to be found
+(docs/experiments/resolution-selection.md)."""
 
 MIN_STILL_SHARE = 0.05
 """Share of the picture without smoke from which its noise is measured there."""
@@ -67,15 +75,54 @@ class DetailSpectrum:
         return round(float(np.clip(RINGS + RINGS_AN_OCTAVE * np.log2(longest / self.pixels), 0, RINGS)))
 
 
-def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> DetailSpectrum:
-    """Measure the detail in some frames.
+def choose_grid(
+    grids: Callable[[Quality], Sequence[Domain]], detail: Callable[[Domain], DetailSpectrum | None], settings: Settings
+) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
+    """Choose the coarsest of a quality's grids that loses no more of what the finest shows than tolerated.
 
     Parameters
     ----------
-    frames
-        Of each: the part of the picture (rows, columns, 3) where the box is, linear; and the plate behind it.
-    pixels
-        Along the longest side of the box.
+    grids
+        Returns those that a quality allows, the coarsest first.
+    detail
+        Returns the detail of the smoke in a box; None without smoke.
+    settings
+        With the quality and the tolerance.
+
+    Returns
+    -------
+    The grid, why it is that one, and what each quality would take of this clip.
+    """
+    own = grids(settings.quality)
+    spectrum = detail(own[-1])
+    if spectrum is None:
+        shape = own[0].resolution
+        unseen = Estimate("resolution without smoke", what="resolution", value=shape, source="assumed")
+        return own[0], unseen, dict.fromkeys(QUALITIES, Grid(shape, None))
+
+    def coarsest(allowed: Sequence[Domain], tolerance: float) -> Domain:
+        finest = max(allowed[-1].resolution)
+        return next((grid for grid in allowed if spectrum.lost(max(grid.resolution), finest) <= tolerance), allowed[-1])
+
+    tolerance = settings.selection.lost_detail
+    domain = coarsest(own, tolerance)
+    longest = max(domain.resolution)
+    figures = {
+        "lost": spectrum.lost(longest),
+        "lost_beside_finest": spectrum.lost(longest, max(own[-1].resolution)),
+        "pixels": spectrum.pixels,
+        "quality": settings.quality,
+    }
+    taken = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
+    taken[settings.quality] = domain
+    qualities = {name: Grid(grid.resolution, spectrum.lost(max(grid.resolution))) for name, grid in taken.items()}
+    return domain, measured("resolution", domain.resolution, figures, tolerance=tolerance), qualities
+
+
+def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> DetailSpectrum:
+    """Measure the detail in parts of linear pictures (rows, columns, 3) where the box is, and the plates behind them.
+
+    So many pixels lie along the longest side of the box.
     """
     energy = np.zeros(RINGS)
     for picture, plate in frames:

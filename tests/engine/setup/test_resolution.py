@@ -14,8 +14,8 @@ from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.detail import DetailSpectrum, smoke_detail
 from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.resolution import DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
 
