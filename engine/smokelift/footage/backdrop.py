@@ -47,8 +47,15 @@ MOSTLY = 0.5
 passes by."""
 
 MIN_KNOWN = 0.1
-"""Share of a picture that is ever seen clear, or of all that shows one colour, below which it tells nothing: of public
-clips it is .2 and more (docs/clips.md), of one colour in texture that passes by .05."""
+"""Share of a picture that is ever seen clear, below which it tells nothing: of public clips before something it is .2
+and more (docs/clips.md)."""
+
+SEEN_OFTEN = 0.15
+"""Share of the blocks of all frames that shows one colour, from which on it is none of a texture that passes by: .2 and
+more of public clips, .05 and .12 of two walls before which a camera moves (docs/experiments/turning-camera.md)."""
+
+TEXTURE = np.float32(6 / 255)
+"""White noise in sRGB values from which on it is texture that a moving camera sees."""
 
 NO_ERRORS = np.zeros((3, 3), np.float32)
 """Covariance of the errors of what is known."""
@@ -142,14 +149,15 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
     even, gains = part.evened()
     found = rank(even, white)
     if moves:
-        if found.colour is None or found.objects.any() or found.clear < MOSTLY:
+        passes_by = found.clear < MOSTLY or white.max() > TEXTURE
+        if found.colour is None or found.objects.any() or passes_by:
             raise ValueError(MOVING_CAMERA)
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))
         return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut)
     # black, and a colour that is often seen, is the same wherever the camera looks; else texture may pass by
-    plain = found.colour is not None and (found.clear > MIN_KNOWN or not found.colour.any())
+    plain = found.colour is not None and (found.clear > SEEN_OFTEN or not found.colour.any())
     if not plain and camera_motion.moves(proxy.between(*proxy.clip).pictures):
         raise ValueError(MOVING_CAMERA)
     colour, objects = found.colour, found.objects

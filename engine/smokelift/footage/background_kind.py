@@ -6,7 +6,8 @@ the negative logarithm of their probability with the likeliest states (Viterbi, 
 1967). One colour is behind all blocks, but for a few objects before it. A picture has a colour for each block. All
 colours are taken to be equally likely there, as they are after a jump, so each block's costs as much as a jump.
 
-What has a colour at some time of the file counts for all of its frames up to the next cut, whatever part is used.
+A frame that is black everywhere says nothing against a picture, for clips fade. What is black, or another colour, at
+some time of the file counts for all of its frames up to the next cut, whatever part of it is used.
 """
 
 from __future__ import annotations
@@ -59,6 +60,9 @@ MIN_SEEN_SHARE = 0.99
 CANDIDATES = 4
 """Colours that are tried: those that most of all blocks have."""
 
+MIN_BLACK_SHARE = 0.98
+"""Share of the blocks that are black in a frame that is black everywhere."""
+
 CLEAR_FRAMES = 8
 """Frames of which the clearest view of each pixel is taken."""
 
@@ -104,11 +108,12 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
 
     limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / np.prod(proxy.seen.shape[1:])) / proxy.scale))
     jump = -float(np.log(2 * limit.mean()))
-    stays = within(np.diff(values, axis=0), np.float32(np.sqrt(2)) * limit)
-    goes_on = np.where(stays, -np.log(STAY_PROBABILITY), jump).astype(np.float32)
+    goes_on = _goes_on(values, limit, jump)
+    empty = within(values, limit)
+    empty = empty & (empty.mean(1) > MIN_BLACK_SHARE)[:, None]
     picture = np.full(values.shape[1], np.inf)
     for value in values:
-        picture = np.minimum(picture, _cost(within(values - value, limit), goes_on, jump))
+        picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
     best = float(picture.mean()) + jump
     colour, found, share = None, np.zeros(values.shape[1], np.bool_), 0.0
     still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
@@ -146,6 +151,19 @@ def colour_around(picture: Picture) -> tuple[float, float, float] | None:
         return None
     red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
     return red, green, blue
+
+
+def _goes_on(values: Picture, limit: Picture, jump: float) -> Picture:
+    """What it costs smoke to go on from one frame to the next (frames - 1, blocks), at most a jump.
+
+    It stays as it is within the noise, or changes as often by so much as smoke of the clip does: exponentially.
+    """
+    changes = np.diff(values, axis=0)
+    alike = within(changes, np.float32(np.sqrt(2)) * limit)
+    size = np.abs(changes).mean(-1)
+    usual = float(size[~alike].mean()) if not alike.all() else 1.0
+    change = np.log(max(usual / float(limit.mean()), 1)) + size / usual
+    return np.asarray(np.where(alike, -np.log(STAY_PROBABILITY), np.minimum(change, jump)), np.float32)
 
 
 def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:

@@ -300,6 +300,7 @@ class _Changed(Wrapped):
         keeps: Callable[[int, Callable[[], Picture]], bool] | None,
     ) -> None:
         super().__init__(source)
+        self.lens = clip.lens
         self._first, self._change, self._keeps = clip.first, change, keeps
 
     def read(self, n: int) -> StoredPicture:
