@@ -7,15 +7,13 @@ A scene is a folder that `benchmarks.truth.picture` filled.
 
 import argparse
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.background.clips import Case, Smoke, cases
+from benchmarks.background.clips import Smoke, cases
 from benchmarks.background.score import score
-from benchmarks.background.turning import panned, shaken
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.plate import Plates, known_plate
 from smokelift.footage.steady import without_noise_light
@@ -32,19 +30,19 @@ def main() -> None:
     smokes = [Smoke.load(folder) for folder in options.scenes]
     print("| case | plate error (codes) | smoke's light lost | smoke missed | clear pixels masked | unknown | s |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
-    for name in _cases(smokes[0]):
+    for name in cases(smokes[0]):
         if options.only and not any(name.startswith(start) for start in options.only):
             continue
         rows = []
         seconds = 0.0
         for smoke in smokes:
-            case = _cases(smoke)[name]()
+            case = cases(smoke)[name]()
             began = time.process_time()
             if case.given:
                 plates: Plates = known_plate(case.plate, case.clip)
                 clip = without_noise_light(case.clip, plates.noise)
             else:
-                found = find_backdrop(case.clip, None, None, () if case.lens is None else (case.lens,))
+                found = find_backdrop(case.clip, None, None)
                 plates, clip = found.plates, found.clip
             seconds += time.process_time() - began
             rows.append(score(replace(case, clip=clip), plates))
@@ -52,15 +50,6 @@ def main() -> None:
         cells = [f"{np.mean(figures['plate']):.1f} ({np.max(figures['plate']):.1f})"]
         cells += [f"{np.mean(figures[key]):.1%} ({np.max(figures[key]):.1%})" for key in FIGURES[1:]]
         print(f"| {name} | {' | '.join(cells)} | {seconds / len(rows):.1f} |", flush=True)
-
-
-def _cases(smoke: Smoke) -> dict[str, Callable[[], Case]]:
-    """All cases by name, those of a camera that turns last."""
-    return cases(smoke) | {
-        "wall, shaken by 3": lambda: shaken(smoke, 3),
-        "wall, shaken by 10": lambda: shaken(smoke, 10),
-        "wall, panned by a third": lambda: panned(smoke, 1 / 3),
-    }
 
 
 if __name__ == "__main__":

@@ -107,25 +107,18 @@ class Case:
     ----------
     clip
         As it was filmed.
-    plate : (rows, columns, 3) or (frames, rows, columns, 3)
-        The true background, linear; one a frame if the camera turns.
+    plate : (rows, columns, 3)
+        The true background, linear.
     clean : (frames, rows, columns, 3)
         The true pictures, linear.
     given
         Whether the background is given.
-    lens : (3, 3)
-        Of a camera that may turn, from directions to pixels.
     """
 
     clip: Clip
     plate: Picture
     clean: Picture
     given: bool
-    lens: npt.NDArray[np.float64] | None = None
-
-    def behind(self, number: int) -> Picture:
-        """The true background of a frame, linear (rows, columns, 3)."""
-        return self.plate if self.plate.ndim == 3 else self.plate[number]
 
 
 class Frames:

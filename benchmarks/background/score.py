@@ -30,7 +30,7 @@ def score(case: Case, plates: Plates) -> dict[str, float]:
     unknown = 0.0
     for number in clip.spread(LOOKED_AT):
         plate = plates.at(number)
-        clean, behind = case.clean[number], case.behind(number)
+        clean, behind = case.clean[number], case.plate
         truth = linear_to_srgb(behind)
         contrast = np.abs(linear_to_srgb(clean) - truth).max(-1) * 255
         found = matte(clip.frame(number), plate).mask

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from benchmarks.background.clips import (
     BRIGHT,
-    Case,
     Smoke,
     backdrop,
     compressed,
@@ -20,9 +19,8 @@ from benchmarks.background.clips import (
     steps,
     wall,
 )
-from benchmarks.background.turning import ahead, panned, shaken
 from benchmarks.clean_clip.smoke import Baked
-from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.images import Picture
 
 GREY = (1.0, 1.0, 1.0)
 ORANGE = (1.0, 0.5, 0.1)
@@ -85,10 +83,9 @@ class Clips:
     def rows(self) -> dict[str, Row]:
         """All of them, each after the clean one that it is compared with."""
         painted, black, clouds = wall(self.shape), backdrop(self.shape, 0), sky(self.shape)
-        wide = ahead(self.smoke.front)
         noises = {share: (lambda x, s=share: noisy(x, s)) for share in (0.02, 0.05, 0.1)}
         rates = {crf: (lambda x, c=crf: compressed(x, c)) for crf in (20, 32, 45)}
-        front, dark = self.smoke.front, self.smoke.darkened()
+        dark = self.smoke.darkened()
         films: dict[str, dict[str, Callable[[], Film]]] = {
             "wall, given": {
                 "wall, given": lambda: self._film(painted, painted),
@@ -103,13 +100,6 @@ class Clips:
                     for n, s in noises.items()
                 },
                 **{f"wall, given, crf {n}": partial(self._film, painted, painted, spoil=s) for n, s in rates.items()},
-            },
-            "wide wall, given": {
-                "wide wall, given": lambda: self._film(wide, wide),
-                "wide wall": lambda: self._film(wide),
-                "wide wall, shaken by 3 pixels": lambda: self._turning(shaken(front, 3)),
-                "wide wall, panned by a third": lambda: self._turning(panned(front, 1 / 3)),
-                "wide wall, shaken by 10 pixels": lambda: self._turning(shaken(front, 10)),
             },
             "wall, column, given": {
                 "wall, column, given": lambda: self._film(painted, painted, of=self.standing),
@@ -135,10 +125,6 @@ class Clips:
             },
         }
         return {name: Row(clean, film) for clean, each in films.items() for name, film in each.items()}
-
-    def _turning(self, case: Case) -> Film:
-        """The clip of a camera that turns."""
-        return Film(self.smoke, np.stack([linear_to_srgb(picture) for picture in case.clip]))
 
     def _film(
         self,

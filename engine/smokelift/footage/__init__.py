@@ -6,8 +6,8 @@ encode light, ``lens`` the focal length that they give, and ``layer`` what an al
 
 ``proxy`` is the file in small, up to the cuts. ``backdrop`` decides on it what stands behind the smoke: what
 ``given_background`` reads, or what ``background_kind`` ranks first, one colour or a picture. ``clear_picture`` finds
-the frames that show a picture clear of smoke, ``behind_smoke`` continues what none does, and ``whole_plate`` makes it
-of full size. ``turning`` finds how a camera turned, and ``panorama`` what it would see if it stood still. ``noise``
-measures the clip's noise, and ``matte`` finds the smoke, which differs from the ``plate`` by more. ``working_picture``
-cuts out the small picture that a grid is fitted to.
+the frames that show a picture clear of smoke, unless its camera moves (``camera_motion``), ``behind_smoke`` continues
+what none does, and ``whole_plate`` makes it of full size. ``noise`` measures the clip's noise, and ``matte`` finds the
+smoke, which differs from the ``plate`` by more. ``working_picture`` cuts out the small picture that a grid is fitted
+to.
 """

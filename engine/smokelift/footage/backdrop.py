@@ -1,20 +1,22 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
 In this order: what an alpha channel says; what the scene gives; one colour, if that is the likeliest by the whole file
-(`background_kind`); the picture that the clear frames show (`clear_picture`), steadied if the camera turns (`turning`);
-black, if they show next to nothing. The clip's noise is measured on what cannot be smoke, before all else (`noise`).
+(`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show next to nothing. One
+colour is the same wherever a camera looks, before a picture it has to stand still (`camera_motion`). The clip's noise
+is measured on what cannot be smoke, before all else (`noise`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from smokelift.checks.array_types import Doubles, Mask
+from smokelift.checks.array_types import Mask
+from smokelift.footage import camera_motion
 from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture
@@ -30,13 +32,11 @@ from smokelift.footage.noise import (
     spread_about,
     white_noise,
 )
-from smokelift.footage.panorama import Panorama
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.proxy import Proxy
 from smokelift.footage.quantiser import median_quantiser
 from smokelift.footage.seen import median_of_seen
 from smokelift.footage.steady import cleared, uncovered, without_noise_light
-from smokelift.footage.turning import find_turns
 from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera
 
@@ -57,6 +57,13 @@ TEXTURE = np.float32(6 / 255)
 NO_ERRORS = np.zeros((3, 3), np.float32)
 """Covariance of the errors of what is known."""
 
+MOVING_CAMERA = (
+    "The camera moves, so what is behind the smoke cannot be found from the clip. Stabilize the clip (Blender's Movie "
+    "Clip Editor does), or track it and give a clean plate with a picture for every frame (a video or plate_####.png) "
+    "as background. If the camera stood still, give one clean plate, or a color."
+)
+"""What a clip is refused with."""
+
 Source = Literal["alpha", "given", "colour", "colour around one frame", "black for want of a picture", "picture"]
 
 
@@ -73,13 +80,11 @@ class Backdrop:
     plates
         Of the full pictures.
     background
-        As a scene would give it; None where it was estimated, unless the camera moves.
+        As a scene would give it; None where it was estimated, unless the camera is known to move.
     colour
         Linear, where one was found; black counts as such below half a step of 8 bit video.
     frames
         Number of the file's frames that decided on it: those up to the next cut.
-    steadied
-        Of a camera that was found to turn: how, and the background of one that stands still in its mean pose.
     quantiser
         Of the file, if it says it and the background is not of one colour.
     cut
@@ -94,22 +99,12 @@ class Backdrop:
     background: Background | None = None
     colour: tuple[float, float, float] | None = None
     frames: int = 0
-    steadied: tuple[Panorama, Plate] | None = None
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
     costs: dict[str, float] = field(default_factory=dict)
 
-    def still(self, clip: Clip) -> tuple[Clip, Plates]:
-        """Return the footage, changed in some way, and its backgrounds as a camera that stands still sees them."""
-        if self.steadied is None:
-            return clip, self.plates
-        panorama, plate = self.steadied
-        return cleared(panorama.steadied(clip), plate), plate
 
-
-def find_backdrop(
-    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Doubles] = ()
-) -> Backdrop:
+def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
     """Find what stands behind the smoke.
 
     Parameters
@@ -120,17 +115,13 @@ def find_backdrop(
         If it is known; one that moves allows no estimate but that of one colour.
     background
         What the scene says.
-    lenses : (3, 3)
-        That the clip may have, from directions to pixels, the likeliest first; without any the camera is taken to stand
-        still unless it is known to move.
 
     Raises
     ------
     ClipError
         If a frame cannot be read.
     ValueError
-        If a camera moves, and not by a turn that is found, before a background of more than one colour that is not
-        given.
+        If a camera moves before a background of more than one colour that is not given.
     """
     if clip.backdrop is not None:
         grey = (clip.backdrop,) * 3
@@ -140,7 +131,7 @@ def find_backdrop(
         quiet, plates = _before(clip, lambda of: given if of is clip else _given(background, camera, of))
         found = Backdrop("given", quiet, plates, background)
     else:
-        found = _estimated(clip, lenses, camera is not None and camera.moves)
+        found = _estimated(clip, camera is not None and camera.moves)
     shown = uncovered(found.plates, found.clip)
     return replace(found, clip=cleared(found.clip, shown), plates=shown)
 
@@ -162,7 +153,7 @@ def _given(background: Background | None, camera: Camera | None, clip: Clip) -> 
     return given
 
 
-def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
+def _estimated(clip: Clip, moves: bool) -> Backdrop:
     """The background of a clip of which nothing is given."""
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
@@ -177,30 +168,19 @@ def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
         if found.colour is None or found.objects.any() or passes_by:
-            raise ValueError(
-                "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
-                "a picture for every frame (a video or plate_####.png), or a color, "
-                "as background."
-            )
+            raise ValueError(MOVING_CAMERA)
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))
         return Backdrop("colour", clip, known_plate(found.colour, clip), behind, (red, green, blue), len(proxy.numbers))
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut, costs=found.costs)
     # black, and what is mostly one colour, is the same wherever the camera looks; else texture may pass by
     plain = found.colour is not None and (found.clear > MOSTLY or not found.colour.any())
-    if lenses and not plain:
-        turns = find_turns(clip, *lenses)
-        if turns is not None:
-            panorama = Panorama.around(turns)
-            steadied = panorama.steadied(clip)
-            part, cut = Proxy.of(steadied).shot(steadied)
-            plate = _picture(steadied, part, white, masked=False)
-            made = partial(made, frames=len(part.numbers), steadied=(panorama, plate), cut=cut)
-            return made("picture", plates=panorama.plates(plate, clip), quantiser=median_quantiser(clip.path))
+    if not plain and camera_motion.moves(proxy.between(*proxy.clip).pictures):
+        raise ValueError(MOVING_CAMERA)
     colour, objects = found.colour, found.objects
     source: Source = "colour"
     if colour is None:
-        plate = _picture(clip, part, white, masked=True)
+        plate = _picture(clip, part, white)
         if plate.confidence.mean() >= MIN_KNOWN:
             return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
         # fog that drifts over all of the file: it is shown as it was made, before black
@@ -210,11 +190,11 @@ def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
     return made(source, plates=plate, colour=(red, green, blue))
 
 
-def _picture(clip: Clip, proxy: Proxy, white: Picture, *, masked: bool) -> Plate:
-    """The plate of the picture that the clear frames show; ``masked`` is that of `clear_picture`."""
+def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
+    """The plate of the picture that the clear frames show."""
     even, gains = proxy.evened()
     noise = _noise(even, median_of_seen(even.pictures), white)
-    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale, masked)
+    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale)
     return Plate(
         whole_plate(clip, proxy, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),

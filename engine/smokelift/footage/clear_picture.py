@@ -106,7 +106,7 @@ class _Smoke:
     brightens: Mask
 
 
-def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, masked: bool) -> ClearPicture:
+def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float) -> ClearPicture:
     """Return the background of pictures.
 
     Parameters
@@ -119,8 +119,6 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
         Of them.
     detail
         Standard deviation of the Gaussian as of `behind_smoke.DETAIL`, in pixels.
-    masked
-        Whether what no picture shows is hidden by a mask: then it is unknown. Else it lies beyond all of them.
     """
     width = smoothing(noise)
     grey = np.stack([blurred(channel_mean(linear_to_srgb(picture)), width) for picture in pictures])
@@ -145,8 +143,7 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
     never = ~seen.any(0)
     if never.any():
-        if masked:
-            sure, known = sure & ~never, known & ~never
+        sure, known = sure & ~never, known & ~never
         mean[never] = push_pull(linear_to_srgb(image), sure.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
     whole, contrast = completed(image, known, sure, mean, smoke.brightness, brightens, detail)

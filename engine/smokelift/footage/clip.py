@@ -17,7 +17,7 @@ from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSo
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import Picture, Transfer
 from smokelift.footage.kept_frames import KeptFrames, keep
-from smokelift.footage.mask import FrameMask, Mask, Masked, Seen
+from smokelift.footage.mask import Mask, Masked, Seen
 from smokelift.footage.stored_picture import LinearPicture, StoredPicture
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
@@ -210,7 +210,7 @@ class Clip:
         return self._remembered(n, image) if isinstance(image, LinearPicture) else image
 
     @property
-    def mask(self) -> FrameMask | None:
+    def mask(self) -> Mask | None:
         """What hides a part of the frames, if anything does."""
         return None if self._masked is None else self._masked.mask
 
@@ -287,9 +287,6 @@ class Clip:
         self,
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
-        *,
-        size: tuple[int, int] | None = None,
-        mask: FrameMask | None = None,
     ) -> Clip:
         """Return the clip with each frame, by its number, replaced by another. The two share the open file.
 
@@ -299,15 +296,10 @@ class Clip:
             Makes the new frame.
         keeps
             Says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
-        size
-            Width and height of the new frames; those of the old ones by default.
-        mask
-            What hides a part of the new frames; what hides the old ones by default.
         """
         last = self.first + len(self) - 1
         source = _Changed(self, self._source, change, keeps)
-        masked = self._masked if mask is None else Masked(self._source, mask)
-        return Clip(self.path, source, self.fps, (self.first, last), size or self.size, masked)
+        return Clip(self.path, source, self.fps, (self.first, last), self.size, self._masked)
 
     def close(self) -> None:
         """Close the file."""

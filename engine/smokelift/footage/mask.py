@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -43,27 +42,6 @@ REMEMBERED = 16
 """Masks of a size that are kept: two megabytes each of 1080p."""
 
 Seen = npt.NDArray[np.bool_]
-
-
-class FrameMask(Protocol):
-    """What hides a part of each frame of a file; `Mask` is read from one, others are computed.
-
-    Attributes
-    ----------
-    files
-        What it is read from.
-    count
-        Frames of the file that have one; None if they all do.
-    """
-
-    files: tuple[Path, ...]
-    count: int | None
-
-    def seen(self, n: int, width: int, height: int) -> Seen:
-        """Return which pixels of frame ``n`` of the file are not hidden, (height, width), for pictures of any size."""
-
-    def close(self) -> None:
-        """Close the file."""
 
 
 class Mask:
@@ -170,7 +148,7 @@ class Masked:
         What hides them.
     """
 
-    def __init__(self, source: FrameSource, mask: FrameMask) -> None:
+    def __init__(self, source: FrameSource, mask: Mask) -> None:
         self.filmed, self.mask = source, mask
         self.count = min(source.count, mask.count or source.count)
         self.fps, self.warning, self.files = source.fps, source.warning, source.files

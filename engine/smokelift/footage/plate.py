@@ -193,12 +193,7 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
         return Plate(area_average(plates.frame(clip.first + frame), width, height), known, no_noise)
 
     silent = ChangingPlate(whole, no_noise, plates.files)
-    return replace(silent, noise=noise_before(silent, clip, sample_count))
-
-
-def noise_before(plates: Plates, clip: Clip, sample_count: int = 32) -> Noise:
-    """Return the noise of a clip before backgrounds that are known, from so many of its frames."""
-    return noise_about(*_deviations(plates, clip, sample_count))
+    return replace(silent, noise=noise_about(*_deviations(silent, clip, sample_count)))
 
 
 def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Picture]:

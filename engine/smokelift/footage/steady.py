@@ -92,7 +92,7 @@ def cleared(clip: Clip, plates: Plates) -> Clip:
 def uncovered(plates: Plates, clip: Clip) -> Plates:
     """Return backgrounds that show what a clip shows where a mask hides all of it, if nothing else tells what is there.
 
-    It is no smoke, so it may stand behind the result. The background of a camera that turns stays as it is.
+    It is no smoke, so it may stand behind the result.
 
     Parameters
     ----------

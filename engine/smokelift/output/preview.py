@@ -1,8 +1,7 @@
 """Pictures that show at a glance what a sequence is: a contact sheet, an orbit, a strip and a video.
 
 All of them show the part of the picture that holds smoke in some frame. The scene's own camera has the clip's
-background behind the smoke, all others one colour: the background's own where it has one, else black. A sequence keeps
-no background of a camera that was steadied against it: its own camera has that one colour too.
+background behind the smoke, all others one colour: the background's own where it has one, else black.
 """
 
 from __future__ import annotations

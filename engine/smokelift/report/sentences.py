@@ -72,10 +72,6 @@ SENTENCES: Mapping[str, str] = {
         "there is filled in from around it, so how thick the smoke is there is undetermined. Give a clean plate as "
         "background to show it."
     ),
-    "turning camera": (
-        "The camera moves, by up to {pixels:.0f} pixels. It is steadied against the background, as a camera that turns "
-        "in its place, and has a matrix for every frame."
-    ),
     "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is matched to the background.",
     "background of one frame": (
         "One frame alone does not show what moves: the color around it counts as background, and every other color as "

@@ -43,12 +43,8 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
     if found.source == "given":
         return ()
-    if found.steadied is None:
-        assert isinstance(plates, Plate)
-        return _still(plates, clip)
-    unknown = [unknown_part(plates, clip, number) for number in clip.spread(EXPOSURE_SAMPLES)]
-    moved = Remark("turning camera", {"pixels": found.steadied[0].turns.farthest})
-    return (moved, _picture(float(np.mean(unknown))))
+    assert isinstance(plates, Plate)
+    return _still(plates, clip)
 
 
 def backdrop_doubts(found: Backdrop) -> tuple[Doubt, ...]:

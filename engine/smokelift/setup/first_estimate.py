@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from smokelift.checks import Doubt, Remark
-from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.steady import steady
-from smokelift.footage.turning import Turns
 from smokelift.render import Image
 from smokelift.scene import Background, Camera
 from smokelift.setup.backdrop_remarks import (
@@ -37,7 +34,7 @@ class FirstEstimate:
     clip
         The footage at its background's exposure, without fire and without the brightness that noise adds.
     found
-        What stands behind the smoke, and how the camera turns before it.
+        What stands behind the smoke.
     samples
         Its smoke.
     fire
@@ -61,11 +58,6 @@ class FirstEstimate:
         return self.found.plates
 
     @property
-    def turns(self) -> Turns | None:
-        """How the camera turned, if it was found to."""
-        return None if self.found.steadied is None else self.found.steadied[0].turns
-
-    @property
     def picture(self) -> Image | None:
         """The background, if it was estimated as one picture: linear, (rows, columns, 3)."""
         if self.found.background is None and isinstance(self.plates, Plate):
@@ -79,18 +71,15 @@ class FirstEstimate:
         return (*backdrop_remarks(self.found), *unused, *self.doubts, *exposure_remarks(self.samples.exposure))
 
 
-def first_estimate(
-    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Doubles]
-) -> FirstEstimate:
+def first_estimate(clip: Clip, camera: Camera | None, background: Background | None) -> FirstEstimate:
     """Estimate what a clip shows; the parameters and errors are those of `find_backdrop`."""
-    found = find_backdrop(clip, camera, background, lenses)
-    corner = (0, 0) if found.steadied is None else found.steadied[0].corner
-    samples = sample_smoke(*found.still(found.clip), corner)
+    found = find_backdrop(clip, camera, background)
+    samples = sample_smoke(found.clip, found.plates)
     clip = steady(found.clip, found.plates, samples.gains)
     fire = find_fire(clip, found.plates, samples)
     if fire is not None:
         clip = fire.doused
-        samples = replace(sample_smoke(*found.still(clip), corner), gains=samples.gains)
+        samples = replace(sample_smoke(clip, found.plates), gains=samples.gains)
     cuts = cut_doubts(found)
     nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
     bars = between_bars(samples) if background is None else ()

@@ -15,7 +15,6 @@ from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
-from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
@@ -33,10 +32,6 @@ a person."""
 LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
 lens."""
-
-OTHER_LENSES = (0.6, 2.0)
-"""Other focal lengths over the usual one that a camera which turns may have: that of phones, 26 to 30 mm, and 100 mm.
-Either is right within a factor of one and a half for all lenses from 20 to 150 mm."""
 
 BOX_MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side."""
@@ -81,10 +76,8 @@ class Geometry:
         return () if self.resolution is None else (self.resolution,)
 
 
-def find_geometry(
-    clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples, turns: Turns | None = None
-) -> Geometry:
-    """Complete camera and domain; a camera that was found to turn gets a matrix for every frame.
+def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples) -> Geometry:
+    """Complete camera and domain.
 
     Raises
     ------
@@ -94,9 +87,8 @@ def find_geometry(
     """
     known = None if scene.camera is None else fitting(scene.camera, clip)
     if known is not None and scene.domain is not None:
-        camera = _turning(known, turns)
-        box, division, qualities = _divided(scene.domain, clip, camera, settings, plates, samples)
-        return Geometry(camera, box, division, _grown(scene.domain, box), qualities)
+        box, division, qualities = _divided(scene.domain, clip, known, settings, plates, samples)
+        return Geometry(known, box, division, _grown(scene.domain, box), qualities)
     if scene.domain is not None:
         raise ValueError("The scene gives a box but no camera; give the camera that filmed it.")
     if scene.inlets:
@@ -106,10 +98,9 @@ def find_geometry(
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
-    focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
+    focal = _focal(clip)
     camera = known or _level(clip, focal, settings.distance)
     base, size, metres = _around(camera, samples, settings.distance)
-    camera = _turning(camera, turns)
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
         # multiples of four, so that pyramids halve them evenly
@@ -157,33 +148,10 @@ def _divided(
     return _resolved(clip, camera, grids, plates, samples.smoky, settings)
 
 
-def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
-    """Return what may turn directions into pixels (3, 3): that of a clip's camera, or usual ones; none of a camera that
-    is orthographic or given as moving.
-
-    Raises
-    ------
-    ValueError
-        If the camera's picture has another shape than the clip's.
-    """
-    scales = (1.0, *OTHER_LENSES) if clip.lens is None else (1.0,)
-    cameras = [_level(clip, scale * _focal(clip)) for scale in scales] if camera is None else [fitting(camera, clip)]
-    return tuple(
-        np.array([[each.fx, 0, each.cx], [0, each.fy, each.cy], [0, 0, 1.0]])
-        for each in cameras
-        if each.type == "perspective" and not each.moves
-    )
-
-
 def _focal(clip: Clip) -> float:
     """Focal length in pixels of a clip without a camera: the file's, or that of the usual lens."""
     width, height = clip.size
     return LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
-
-
-def _turning(camera: Camera, turns: Turns | None) -> Camera:
-    """The camera, with a matrix for every frame if it was found to turn."""
-    return camera if turns is None else turns.carried(camera)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:

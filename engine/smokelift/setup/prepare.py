@@ -19,7 +19,7 @@ from smokelift.setup.coarse import CoarseClip
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_view
-from smokelift.setup.geometry import Geometry, clip_lenses, find_geometry
+from smokelift.setup.geometry import Geometry, find_geometry
 from smokelift.setup.illumination import Illumination, first_light, light_remarks, measured_light, sunlight
 from smokelift.setup.medium_estimate import find_medium
 from smokelift.setup.model import choose_model, tried_frames
@@ -54,11 +54,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     _check(clip, scene, settings)
     _expect(clip, scene)
     remarks = clip.remarks()
-    # a search for the lens finds turns of a camera; several cameras are calibrated, so they stand still where given
-    lenses = () if scene.views else clip_lenses(scene.camera, clip)
-    estimate = first_estimate(clip, scene.camera, scene.background, lenses)
+    estimate = first_estimate(clip, scene.camera, scene.background)
     steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples
-    geometry = find_geometry(steadied, scene, settings, plates, samples, estimate.turns)
+    geometry = find_geometry(steadied, scene, settings, plates, samples)
     camera, domain = geometry.camera, geometry.domain
     if settings.distance is not None:
         depth_at(settings.distance, camera, domain)  # refuse early what cannot be

@@ -78,16 +78,8 @@ def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
     return unknown if seen is None else unknown & seen
 
 
-def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -> SmokeSamples:
-    """Find the smoke in frames spread over a clip, whose exposure may change.
-
-    Parameters
-    ----------
-    clip, plates
-        The footage, and what is behind the smoke.
-    corner
-        Left and top of its pictures in pixels of the camera's.
-    """
+def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
+    """Find the smoke in frames spread over a clip, whose exposure may change."""
     width, height = clip.size
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = (max(1, round(side / scale)) for side in (width, height))
@@ -111,7 +103,6 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
             amounts[number] = int(mask.sum())
             textures.append(seen_texture(picture, plate, mask))
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
-    left, top = corner
-    bounds = (float(left), float(top), float(left + width), float(top + height))
+    bounds = (0.0, 0.0, float(width), float(height))
     radiance = np.concatenate(colours), np.concatenate(behind)
     return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures))

@@ -80,7 +80,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             for path in options.page:
                 write_page(path, page)
         if options.write is not None:
-            files += _write_scene(options.write, shot, scene, known)
+            files += _write_scene(options.write, shot, known)
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
@@ -105,13 +105,12 @@ def _qualities(shot: Shot, work: Workload) -> dict[str, dict[str, Any]]:
     return {quality: {**asdict(grids[quality]), **cost} for quality, cost in costs.items()}
 
 
-def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
+def _write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, ...]:
     """Write all that was found into a scene file, with what is known of it as comments; return the files.
 
     A background of one colour that was estimated becomes a colour of the file. Any other is left to be found again: a
     picture does not say which of its parts are unknown, and by how much they may be wrong. It is written beside the
-    file for those who want to mend it. The turns of a camera that was steadied belong to the background that they were
-    found with, and are left to be found again, too; camera and box stay as they are given, if they are.
+    file for those who want to mend it.
 
     Raises
     ------
@@ -134,7 +133,5 @@ def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) ->
         write_image(picture, plate, half=False)
         scene = replace(scene, background=None)
         said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it as background.")
-    elif shot.moves and shot.scene.background == Background():
-        scene = replace(scene, camera=given.camera, domain=given.domain, background=None)
     scene.save(path, said)
     return files
