@@ -15,9 +15,8 @@ from scipy import ndimage
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import Visitor
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
-from smokelift.footage.stored_picture import LinearPicture
+from smokelift.footage.stored_picture import StoredPicture
 
 FPS = 24.0
 BRIGHT = 0.75
@@ -134,11 +133,11 @@ class Frames:
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)
 
-    def read(self, n: int) -> LinearPicture:
+    def read(self, n: int) -> StoredPicture:
         """Return a frame, linear."""
-        return LinearPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
+        return StoredPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """None."""
         return ()
 

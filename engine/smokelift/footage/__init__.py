@@ -1,8 +1,8 @@
 """Footage: pictures in linear light, and the smoke in them apart from its background.
 
-``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``), each a ``stored_picture``;
-``kept_frames`` has the last ones of a file. ``images`` reads and resizes single pictures; ``colour`` knows how files
-encode light, ``lens`` the focal length that they give, and ``layer`` what an alpha channel means.
+``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``, opened in a ``container``),
+each a ``stored_picture``, less what a ``mask`` hides. ``images`` reads and resizes single pictures; ``colour`` knows
+how files encode light.
 
 ``proxy`` is the file in small, up to the cuts. ``backdrop`` decides on it what stands behind the smoke: what
 ``given_background`` reads, or what ``background_kind`` ranks first, one colour or a picture. ``clear_picture`` finds

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -13,20 +13,20 @@ import numpy as np
 
 from smokelift.checks import Remark
 from smokelift.footage.exposure import small_size
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Visitor
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import Picture, Transfer
-from smokelift.footage.kept_frames import KeptFrames, keep
 from smokelift.footage.mask import Mask, Masked, Seen
-from smokelift.footage.stored_picture import LinearPicture, StoredPicture
+from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
-CACHE_BYTES = 64 * 2**20
-"""Memory for the linear frames of a clip that are kept: two of 1080p."""
+STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
+"""Memory for the frames of a file that are kept as they are stored, twenty of 1080p at 8 bits, for what reads the same
+ones spread over a clip; and for the linear frames of a clip that are kept: two of 1080p."""
 
 
 class Clip:
@@ -73,7 +73,7 @@ class Clip:
             raise ClipError(f"{path}: frames {first} to {last} were asked for; it has 0 to {source.count - 1}")
         self.first = first
         self._count = last - first + 1
-        self._cache: OrderedDict[int, LinearPicture] = OrderedDict()
+        self._cache: OrderedDict[int, StoredPicture] = OrderedDict()
         self.size = self.stored(0).size if size is None else size
 
     @classmethod
@@ -127,11 +127,11 @@ class Clip:
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
             if said.mask is None:
-                return cls(path, KeptFrames(source), fps, frames)
+                return cls(path, _Kept(source), fps, frames)
             first, last = (min(n, source.count - 1) for n in frames or (0, source.count - 1))
             hides = Mask(said.mask, first, last)
-            masked = Masked(KeptFrames(source), hides)
-            clip = cls(path, KeptFrames(masked), fps, frames, masked=masked)
+            masked = Masked(_Kept(source), hides)
+            clip = cls(path, _Kept(masked), fps, frames, masked=masked)
             hides.check(*clip.size)
             return clip
         except BaseException:
@@ -193,7 +193,7 @@ class Clip:
         ClipError
             If there is no such frame, or most frames of the clip are damaged.
         """
-        return self._remembered(n, LinearPicture(self.stored(n).linear())).values
+        return _keep(self._cache, n, StoredPicture(self.stored(n).linear()), LINEAR_BYTES).values
 
     def stored(self, n: int) -> StoredPicture:
         """Return frame ``n`` as it is stored, of which a part or means cost less than the linear frame.
@@ -207,7 +207,7 @@ class Clip:
             self._cache.move_to_end(n)
             return self._cache[n]
         image = self._read(n)
-        return self._remembered(n, image) if isinstance(image, LinearPicture) else image
+        return _keep(self._cache, n, image, LINEAR_BYTES) if image.table is None else image
 
     @property
     def mask(self) -> Mask | None:
@@ -235,18 +235,6 @@ class Clip:
         rows, columns = picture.shape[:2]
         seen = self.seen(n, columns, rows)
         return picture if seen is None else np.where(seen[..., None], picture, np.float32(np.nan))
-
-    def _remembered(self, n: int, image: LinearPicture) -> LinearPicture:
-        """A linear frame, kept for the next caller."""
-        keep(self._cache, n, image, CACHE_BYTES)
-        return image
-
-    def expect(self, numbers: Iterable[int] = ()) -> None:
-        """Say which frames are asked for next: those decoded while `damaged` is determined are kept, the first of these
-        numbers before the others. It has no effect on a clip whose frames are `changed`.
-        """
-        if isinstance(self._source, KeptFrames):
-            self._source.expect([self.first + n for n in numbers if n < len(self)])
 
     def _read(self, n: int) -> StoredPicture:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
@@ -314,6 +302,33 @@ class Clip:
         self.close()
 
 
+class _Kept:
+    """The frames of a source, of which the last ones read are kept for all clips that share it."""
+
+    def __init__(self, source: FrameSource) -> None:
+        self._source = source
+        self._kept: OrderedDict[int, StoredPicture] = OrderedDict()
+        self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
+        self.count, self.fps, self.warning = source.count, source.fps, source.warning
+        self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
+
+    @property
+    def notes(self) -> tuple[Remark, ...]:
+        return self._source.notes
+
+    def read(self, n: int) -> StoredPicture:
+        image = self._kept.pop(n) if n in self._kept else self._source.read(n)
+        return _keep(self._kept, n, image, STORED_BYTES)
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        if (first, last) not in self._damaged:
+            self._damaged[first, last] = self._source.damaged(first, last)
+        return self._damaged[first, last]
+
+    def close(self) -> None:
+        self._source.close()
+
+
 class _Changed:
     """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
@@ -336,16 +351,25 @@ class _Changed:
         image, number = self._source.read(n), n - self._clip.first
         if self._keeps is not None and self._keeps(number, lambda: image.averaged(*small_size(*image.size))):
             return image
-        return LinearPicture(self._change(number, image.linear()))
+        return StoredPicture(self._change(number, image.linear()))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
         clip = self._clip
         if (first, last) == (clip.first, clip.first + len(clip) - 1):  # what the clip may know already
             return tuple(clip.first + n for n in clip.damaged)
-        return self._source.damaged(first, last, visit)
+        return self._source.damaged(first, last)
 
     def close(self) -> None:
         self._source.close()
+
+
+def _keep(kept: OrderedDict[int, StoredPicture], n: int, image: StoredPicture, most: int) -> StoredPicture:
+    """A picture, read-only from now on, put beside the last ones in so many bytes."""
+    image.values.flags.writeable = False
+    kept[n] = image
+    while len(kept) > max(1, most // image.values.nbytes):
+        kept.popitem(last=False)
+    return image
 
 
 def numbered(frames: Sequence[int]) -> str:

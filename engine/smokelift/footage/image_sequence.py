@@ -7,13 +7,23 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from smokelift.checks import Remark
-from smokelift.footage import lens
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Visitor
-from smokelift.footage.images import READABLE, ImageError, Transfer, area_average, read_layer, reduction
-from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
-from smokelift.footage.stored_picture import LinearPicture, StoredPicture
+from PIL import Image
 
+from smokelift.checks import Remark
+from smokelift.footage.frame_source import (
+    DEFAULT_FPS,
+    ClipError,
+    DamagedFrameError,
+    Layer,
+    backdrop_of,
+    believed_focal_length,
+    sample_numbers,
+    shown_before,
+)
+from smokelift.footage.images import READABLE, ImageError, Transfer, area_average, read_layer, reduction
+from smokelift.footage.stored_picture import StoredPicture
+
+_EXIF, _FOCAL_LENGTH_IN_35MM_FILM = 0x8769, 0xA405
 _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
 """How a shell or another program writes the number of a picture."""
 
@@ -45,7 +55,7 @@ class ImageSequence:
         self.warning = None
         if fps is None and self.count > 1:
             self.warning = Remark("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
-        self.lens = lens.of_picture(self.files[0])
+        self.lens = _focal_length(self.files[0])
         self._shape: tuple[int, ...] | None = None
         self.backdrop = backdrop_of(self._samples())
 
@@ -65,7 +75,7 @@ class ImageSequence:
 
     def read(self, n: int) -> StoredPicture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
-        image = self._layer(n).before(self.backdrop)
+        image = shown_before(self._layer(n), self.backdrop)
         self._shape = self._shape or image.shape
         if image.shape != self._shape:
             raise ClipError(
@@ -74,11 +84,11 @@ class ImageSequence:
             )
         height, width = image.shape[:2]
         divisor = reduction(width, height)
-        return LinearPicture(area_average(image, round(width / divisor), round(height / divisor)))
+        return StoredPicture(area_average(image, round(width / divisor), round(height / divisor)))
 
     def _layer(self, n: int) -> Layer:
         try:
-            return Layer(*read_layer(self.files[n], self._transfer))
+            return read_layer(self.files[n], self._transfer)
         except ImageError as error:
             raise DamagedFrameError(str(error)) from error
 
@@ -88,20 +98,18 @@ class ImageSequence:
             with suppress(DamagedFrameError):
                 layer = self._layer(n)
                 yield layer
-                if layer.alpha is None:
+                if layer[1] is None:
                     return
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
-        """Return which pictures from one to another are missing or cannot be read; others go to ``visit``."""
-        return tuple(n for n in range(first, last + 1) if not self._readable(n, visit))
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which pictures from one to another are missing or cannot be read."""
+        return tuple(n for n in range(first, last + 1) if not self._readable(n))
 
-    def _readable(self, n: int, visit: Visitor | None) -> bool:
+    def _readable(self, n: int) -> bool:
         try:
-            picture = self.read(n)
+            self.read(n)
         except DamagedFrameError:
             return False
-        if visit is not None:
-            visit(n, lambda: picture)
         return True
 
     def close(self) -> None:
@@ -111,6 +119,15 @@ class ImageSequence:
 def is_pattern(path: Path) -> bool:
     """Return whether a path stands for numbered pictures: its last row of # for the number, unless it is a file."""
     return "#" in path.name and not path.is_file()
+
+
+def _focal_length(path: Path) -> float | None:
+    """The focal length in the EXIF of a picture, in millimetres on 35 mm film; None if there is none."""
+    try:
+        with Image.open(path) as picture:
+            return believed_focal_length(picture.getexif().get_ifd(_EXIF).get(_FOCAL_LENGTH_IN_35MM_FILM))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # no picture that has such tags
+        return None
 
 
 def _numbered(path: Path) -> list[Path]:

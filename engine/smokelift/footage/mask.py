@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from smokelift.checks import Remark
 from smokelift.footage.behind_smoke import push_pull
-from smokelift.footage.frame_source import ClipError, FrameSource, Visitor
+from smokelift.footage.frame_source import ClipError, FrameSource
 from smokelift.footage.image_sequence import ImageSequence, is_pattern
 from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image
 from smokelift.footage.stored_picture import StoredPicture
@@ -159,22 +159,20 @@ class Masked:
         return self.filmed.notes
 
     def read(self, n: int) -> StoredPicture:
-        return self._continued(n, self.filmed.read(n))
+        image = self.filmed.read(n)
+        seen = self.mask.seen(n, *image.size)
+        if seen.all():
+            return image
+        whole = image.linear().copy()
+        whole[~seen] = continued(whole, seen)
+        return StoredPicture(whole)
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
-        def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
-            if visit is not None:
-                visit(n, lambda: self._continued(n, picture()))
-
-        return self.filmed.damaged(first, last, look_at)
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        return self.filmed.damaged(first, last)
 
     def close(self) -> None:
         self.filmed.close()
         self.mask.close()
-
-    def _continued(self, n: int, image: StoredPicture) -> StoredPicture:
-        seen = self.mask.seen(n, *image.size)
-        return image if seen.all() else image.filled(~seen, continued(image.linear(), seen))
 
 
 def continued(picture: Picture, seen: Seen) -> Picture:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,35 +14,52 @@ import smokelift._core as _core
 from smokelift.footage.images import Picture, area_average, area_weights, look_up, sum_lines
 
 Edges = npt.NDArray[np.int32]
-Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
 Value = TypeVar("Value", np.float32, np.uint16)
 
 
-class StoredPicture(Protocol):
-    """A picture (rows, columns, 3), row 0 at the top, whose values stand for linear light."""
+@dataclass(frozen=True, eq=False)
+class StoredPicture:
+    """A picture whose values stand for linear light: integers take a quarter of the memory, at 8 bits.
+
+    Attributes
+    ----------
+    values : (rows, columns, 3) float32, uint8 or uint16
+        Linear light, or codes; row 0 at the top.
+    table : (n,) float32, optional
+        Linear value of each code; None where the values are linear.
+    """
+
+    values: npt.NDArray[Any]
+    table: Picture | None = None
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that it takes."""
+        return self.values.shape[1], self.values.shape[0]
 
     def linear(self) -> Picture:
         """Return the linear picture (rows, columns, 3), read-only if it is kept."""
+        return self.values if self.table is None else look_up(self.table, self.values)
 
-    def cut(self, part: Cut) -> StoredPicture:
+    def cut(self, part: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> StoredPicture:
         """Return some of the pixels, which a function takes whatever their values are."""
+        return StoredPicture(part(self.values), self.table)
 
     def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
-        """Return the picture with a function applied to every linear value by itself."""
+        """Return the picture with a function applied to every linear value by itself, to each code once."""
+        return change(self.values) if self.table is None else look_up(change(self.table), self.values)
 
     def averaged(self, width: int, height: int) -> Picture:
         """Return the `area_average` of the linear picture."""
+        rows = len(self.values)
+        lines = self.sum_lines(area_weights(rows, height)) if 1 <= height < rows else self.linear()
+        return area_average(lines, width, height)
 
     def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
         """Return sums (n, columns, 3) of the lines of the linear picture, each of weights (n, rows)."""
+        if self.table is None or self.values.dtype != np.uint8:
+            return sum_lines(self.linear(), weights)
+        return _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
 
     def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
         """Add the linear picture, times weights of its parts, to sums.
@@ -56,120 +73,11 @@ class StoredPicture(Protocol):
         sums : (rows, columns, 3)
             Changed.
         """
-
-    def filled(self, where: npt.NDArray[np.bool_], values: Picture) -> StoredPicture:
-        """Return the picture with other linear values (n, 3), or the next that it can store, at some pixels."""
-
-    def lock(self) -> None:
-        """Make it read-only."""
-
-
-@dataclass(frozen=True, eq=False)
-class LinearPicture:
-    """A picture that is stored in linear light.
-
-    Attributes
-    ----------
-    values : (rows, columns, 3) float32
-        Linear.
-    """
-
-    values: Picture
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self.values.shape[1], self.values.shape[0]
-
-    @property
-    def nbytes(self) -> int:
-        return self.values.nbytes
-
-    def linear(self) -> Picture:
-        return self.values
-
-    def cut(self, part: Cut) -> LinearPicture:
-        return LinearPicture(part(self.values))
-
-    def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
-        return change(self.values)
-
-    def averaged(self, width: int, height: int) -> Picture:
-        return area_average(self.values, width, height)
-
-    def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
-        return sum_lines(self.values, weights)
-
-    def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
-        lines, columns = edges
-        for low, high, each in zip(lines[:-1], lines[1:], np.repeat(weights, np.diff(columns), axis=1), strict=True):
-            sums[low:high] += self.values[low:high] * each
-
-    def filled(self, where: npt.NDArray[np.bool_], values: Picture) -> LinearPicture:
-        whole = self.values.copy()
-        whole[where] = values
-        return LinearPicture(whole)
-
-    def lock(self) -> None:
-        self.values.flags.writeable = False
-
-
-@dataclass(frozen=True, eq=False)
-class CodedPicture:
-    """An opaque picture as the integers that it is stored in: a quarter of the memory, at 8 bits, of linear values.
-
-    Attributes
-    ----------
-    codes : (rows, columns, 3) uint8 or uint16
-        Row 0 at the top.
-    table : (n,) float32
-        Linear value of each code.
-    """
-
-    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
-    table: Picture
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self.codes.shape[1], self.codes.shape[0]
-
-    @property
-    def nbytes(self) -> int:
-        return self.codes.nbytes  # the table is that of many pictures
-
-    def linear(self) -> Picture:
-        return self.through(lambda values: values)
-
-    def cut(self, part: Cut) -> CodedPicture:
-        return CodedPicture(part(self.codes), self.table)
-
-    def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
-        return look_up(change(self.table), self.codes)  # each code once
-
-    def averaged(self, width: int, height: int) -> Picture:
-        rows = self.codes.shape[0]
-        if not 1 <= height < rows:
-            return area_average(self.linear(), width, height)
-        return area_average(self.sum_lines(area_weights(rows, height)), width, height)
-
-    def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
-        if self.codes.dtype != np.uint8:
-            return sum_lines(self.linear(), weights)
-        codes = np.asarray(self.codes, np.uint8)
-        return _core.sum_lines(codes, self.table, weights.indptr, weights.indices, weights.data)
-
-    def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
-        if self.codes.dtype == np.uint8:
-            _core.add_weighted(np.asarray(self.codes, np.uint8), self.table, weights, *edges, sums)
+        if self.table is None or self.values.dtype != np.uint8:
+            rows, columns = (np.diff(each) for each in edges)
+            sums += self.linear() * np.repeat(np.repeat(weights, rows, axis=0), columns, axis=1)
         else:
-            LinearPicture(self.linear()).add_weighted(weights, edges, sums)
-
-    def filled(self, where: npt.NDArray[np.bool_], values: Picture) -> CodedPicture:
-        codes = self.codes.copy()
-        codes[where] = np.searchsorted(self.table, values).clip(max=len(self.table) - 1).astype(codes.dtype)
-        return CodedPicture(codes, self.table)
-
-    def lock(self) -> None:
-        self.codes.flags.writeable = False
+            _core.add_weighted(self.values, self.table, weights, *edges, sums)
 
 
 def chequered_averages(picture: StoredPicture, width: int, height: int, first: int) -> tuple[Picture, Picture]:

@@ -14,7 +14,7 @@ A video whose rate varies by more than 1 % is read at its mean rate: frame n is 
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -30,10 +30,18 @@ from av.video.reformatter import ColorRange, Interpolation
 
 import smokelift._core as _core
 from smokelift.checks import Remark
-from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import lacks_index, open_container
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Visitor
+from smokelift.footage.frame_source import (
+    DEFAULT_FPS,
+    ClipError,
+    DamagedFrameError,
+    Layer,
+    backdrop_of,
+    believed_focal_length,
+    sample_numbers,
+    shown_before,
+)
 from smokelift.footage.images import (
     MAX_PIXELS,
     Picture,
@@ -45,11 +53,11 @@ from smokelift.footage.images import (
     reduction,
     srgb_to_linear,
 )
-from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
-from smokelift.footage.stored_picture import CodedPicture, LinearPicture, StoredPicture
+from smokelift.footage.stored_picture import StoredPicture
 from smokelift.scene import LARGEST_PICTURE
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
+_FOCAL_LENGTH = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 """FFmpeg's own decoders of these leave the alpha channel out."""
 
@@ -99,7 +107,7 @@ class Video:
         self._premultiplied = False
         self.backdrop = self._matted()
         self._format = self._described()
-        self.lens = lens.of_tags({**self._container.metadata, **self._stream.metadata})
+        self.lens = believed_focal_length({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
 
     def _start(self) -> None:
         """Open the file at its beginning."""
@@ -244,41 +252,29 @@ class Video:
 
     def read(self, n: int) -> StoredPicture:
         """Return a frame, or raise `DamagedFrameError`."""
-        return self._shown_by(self._decode(self._shown[n]))
-
-    def _shown_by(self, frame: av.VideoFrame) -> StoredPicture:
-        """What a frame shows."""
+        frame = self._decode(self._shown[n])
         if (
             _has_alpha(frame)
             or frame.interlaced_frame
             or primaries_name(self._stream.codec_context.color_primaries) is not None
         ):
-            return LinearPicture(self._layer(frame).before(self.backdrop))
+            return StoredPicture(shown_before(self._layer(frame), self.backdrop))
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
-        return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
+        return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded; others go to ``visit``, some twice."""
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which frames from one to another cannot be decoded."""
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
         if not self._keys:
             return ()  # they were counted by decoding them
-        numbers: dict[int, list[int]] = {}
-        for n, time in enumerate(wanted, first):
-            numbers.setdefault(time, []).append(n)
-
-        def pass_on(time: int, frame: av.VideoFrame) -> None:
-            for n in numbers.get(time, ()):
-                if visit is not None:
-                    visit(n, lambda: self._shown_by(frame))
-
         from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._container.seek(wanted[0], stream=self._stream)
         self._decoded = self._frames()
-        good = self._good_times(wanted[-1], pass_on)
+        good = self._good_times(wanted[-1])
         if not (from_start or good.issuperset(wanted)):  # as in `_decode`
             self._rewind()
-            good |= self._good_times(wanted[-1], pass_on)
+            good |= self._good_times(wanted[-1])
         damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
         if damaged or self._failed:
             self._rewind()
@@ -287,13 +283,12 @@ class Video:
         self._lost.update(self._shown[n] for n in damaged)
         return damaged
 
-    def _good_times(self, last: int, pass_on: Callable[[int, av.VideoFrame], None]) -> set[int]:
-        """Times of the frames that can be decoded from where the container stands, up to one; each is passed on."""
+    def _good_times(self, last: int) -> set[int]:
+        """Times of the frames that can be decoded from where the container stands, up to one."""
         good = set()
         for frame in self._decoded:
             if frame.pts is not None and not frame.is_corrupt:
                 good.add(frame.pts)
-                pass_on(frame.pts, frame)
             if frame.pts is not None and frame.pts >= last:
                 break
         return good
@@ -409,7 +404,7 @@ class Video:
             if opacity is not None:
                 opacity = area_average(_between_lines(opacity, frame.height), width, height)
         picture = to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
-        return Layer(picture, None if opacity is None else _upright(opacity, frame))
+        return picture, None if opacity is None else _upright(opacity, frame)
 
     def _field(self, frame: av.VideoFrame) -> av.VideoFrame:
         """Return the even lines of a frame: their colours too are of one moment."""

@@ -9,7 +9,6 @@ from smokelift.footage.backdrop import Backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.plate import Plate, Plates
-from smokelift.footage.quantiser import COARSE
 from smokelift.footage.steady import exposures
 from smokelift.setup.smoke import SAMPLE_FRAMES, SmokeSamples, unknown_part
 
@@ -31,6 +30,11 @@ the course of time."""
 
 MIN_SAME_FRAMES = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
+
+COARSE_QUANTISER = 42.0
+"""Quantiser from which on faint smoke is taken for background, in front of one of more than one colour. Before a brick
+wall crf 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50
+(docs/experiments/disturbed-clips.md)."""
 
 LARGE_NOISE = 6 / 255
 """Noise in sRGB values from which on the background may be what moves (docs/experiments/background.md)."""
@@ -54,7 +58,7 @@ def backdrop_doubts(found: Backdrop) -> tuple[Doubt, ...]:
     if found.source == "black for want of a picture":
         return (Doubt("background never seen"),)
     few = found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES
-    compressed = found.quantiser is not None and found.quantiser >= COARSE
+    compressed = found.quantiser is not None and found.quantiser >= COARSE_QUANTISER
     return (
         *((Doubt("background of few frames", {"frames": found.frames}),) if few else ()),
         *((Doubt("strong compression", {"quantiser": found.quantiser or 0.0}),) if compressed else ()),

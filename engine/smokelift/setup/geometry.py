@@ -13,7 +13,6 @@ from smokelift.checks import Figures, Remark
 from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
-from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
@@ -28,6 +27,10 @@ Shape = tuple[int, int, int]
 PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
 a person."""
+
+FILM_WIDTH = 36.0
+FILM_DIAGONAL = math.hypot(FILM_WIDTH, 24)
+"""Millimetres of 35 mm film."""
 
 LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default

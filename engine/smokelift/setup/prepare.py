@@ -11,7 +11,6 @@ from dataclasses import replace
 from smokelift.checks import Remark, counted, require_kind
 from smokelift.density.axis import depth_at
 from smokelift.footage.clip import Clip
-from smokelift.footage.proxy import proxy_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
@@ -26,7 +25,6 @@ from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.smoke import SAMPLE_FRAMES
 from smokelift.setup.view_gain import balanced
 
 
@@ -52,7 +50,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
     _check(clip, scene, settings)
-    _expect(clip, scene)
     remarks = clip.remarks()
     estimate = first_estimate(clip, scene.camera, scene.background)
     steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples
@@ -78,7 +75,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
             light = measured_light(light, coarse, frames, settings)
         complete = replace(complete, lights=light.lights, scattering=light.scattering)
     model = choose_model(complete, coarse, frames, settings) if measure else None
-    clip.expect()  # lets go of frames that are kept as they were decoded
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
@@ -146,14 +142,6 @@ def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
         raise ValueError(
             f"The camera's matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
         )
-
-
-def _expect(clip: Clip, scene: Scene) -> None:
-    """Say which frames are examined, so that each of them is decoded once."""
-    examined, estimates = clip.spread(SAMPLE_FRAMES), scene.background is None
-    # a velocity needs the frame after one with smoke, and a background more frames than the smoke
-    others = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect([*examined, *sorted(n for n in others.difference(examined) if n >= 0)])
 
 
 def _further_views(

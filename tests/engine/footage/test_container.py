@@ -1,4 +1,6 @@
-"""Opening files with FFmpeg: names that it would take for something else, and nothing over a network."""
+"""Opening files with FFmpeg: names that it would take for something else, and nothing over a network;
+how strongly a video is compressed, as its blocks say.
+"""
 
 import os
 import socket
@@ -9,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from films import coded, film, puff, wall
 
 from smokelift.footage import container
 from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.container import median_quantiser
 from smokelift.footage.images import ImageError, read_image
 from smokelift.output.video_file import write_video
 
@@ -106,3 +110,22 @@ def test_a_recording_that_was_cut_short_is_told_from_what_is_no_video(tmp_path: 
 def test_what_has_no_boxes_lacks_no_index(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "clip.mp4").write_bytes(content)
     assert not container.lacks_index(tmp_path / "clip.mp4")
+
+
+@pytest.mark.parametrize("quantiser", [10, 30, 48])
+def test_the_quantiser_is_that_of_the_encoder(tmp_path: Path, quantiser: int) -> None:
+    path = coded(tmp_path / "clip.mp4", wall(0.2, 0.5), puff, 0.6, quantiser)
+    assert median_quantiser(path) == pytest.approx(quantiser, abs=3)
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mpeg4"), ("a.mkv", "ffv1"), ("a.webm", "libvpx-vp9")])
+def test_other_codecs_tell_nothing(tmp_path: Path, name: str, codec: str) -> None:
+    assert median_quantiser(coded(tmp_path / name, wall(0.2, 0.5), puff, 0.6, codec=codec)) is None
+
+
+def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path: Path) -> None:
+    clip = film(tmp_path, wall(0.2, 0.5), puff, 0.6)
+    text = tmp_path / "a.mp4"
+    text.write_text("no video")
+    for path in (clip.path, *clip.files[:1], text, tmp_path, tmp_path / "absent.mp4"):
+        assert median_quantiser(path) is None

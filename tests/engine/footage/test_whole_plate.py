@@ -9,10 +9,9 @@ from films import codes_apart
 from smokelift.checks import Remark
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import Visitor
 from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.plate import Plate
-from smokelift.footage.stored_picture import CodedPicture
+from smokelift.footage.stored_picture import StoredPicture
 
 COUNT = 16
 SIZE = (80, 1280)
@@ -31,10 +30,10 @@ class Filmed:
     def __init__(self, codes: np.ndarray) -> None:
         self.codes, self.count = codes, len(codes)
 
-    def read(self, n: int) -> CodedPicture:
-        return CodedPicture(self.codes[n], code_values(255))
+    def read(self, n: int) -> StoredPicture:
+        return StoredPicture(self.codes[n], code_values(255))
 
-    def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
         return ()
 
     def close(self) -> None:
