@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import TracebackType
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from smokelift.checks import Remark
 from smokelift.footage.exposure import small_size
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Wrapped
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import Picture, Transfer
 from smokelift.footage.mask import Mask, Masked, Seen
@@ -126,14 +126,12 @@ class Clip:
         path, fps, frames, transfer = said.path, said.fps, said.frames, said.transfer
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
+            clip = cls(path, _Kept(source), fps, frames)
             if said.mask is None:
-                return cls(path, _Kept(source), fps, frames)
-            first, last = (min(n, source.count - 1) for n in frames or (0, source.count - 1))
-            hides = Mask(said.mask, first, last)
-            masked = Masked(_Kept(source), hides)
-            clip = cls(path, _Kept(masked), fps, frames, masked=masked)
-            hides.check(*clip.size)
-            return clip
+                return clip
+            needed = range(clip.first, clip.first + len(clip))
+            masked = Masked(clip._source, Mask(said.mask, needed, clip.size))
+            return cls(path, _Kept(masked), fps, frames, clip.size, masked)
         except BaseException:
             source.close()
             raise
@@ -218,7 +216,7 @@ class Clip:
         """Return the clip with what a mask hides. The two share the open file."""
         if self._masked is None:
             return self
-        return Clip(self.path, self._masked.filmed, self.fps, (self.first, self.first + len(self) - 1), self.size)
+        return Clip(self.path, self._masked.source, self.fps, (self.first, self.first + len(self) - 1), self.size)
 
     def seen(self, n: int, width: int, height: int) -> Seen | None:
         """Return which pixels of frame ``n`` no mask hides, at a size of (height, width); None of a clip without one.
@@ -302,34 +300,23 @@ class Clip:
         self.close()
 
 
-class _Kept:
+class _Kept(Wrapped):
     """The frames of a source, of which the last ones read are kept for all clips that share it."""
 
     def __init__(self, source: FrameSource) -> None:
-        self._source = source
+        super().__init__(source)
         self._kept: OrderedDict[int, StoredPicture] = OrderedDict()
-        self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
-        self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
-
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        return self._source.notes
+        self._damaged = lru_cache(maxsize=None)(source.damaged)
 
     def read(self, n: int) -> StoredPicture:
-        image = self._kept.pop(n) if n in self._kept else self._source.read(n)
+        image = self._kept.pop(n) if n in self._kept else self.source.read(n)
         return _keep(self._kept, n, image, STORED_BYTES)
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        if (first, last) not in self._damaged:
-            self._damaged[first, last] = self._source.damaged(first, last)
-        return self._damaged[first, last]
-
-    def close(self) -> None:
-        self._source.close()
+        return self._damaged(first, last)
 
 
-class _Changed:
+class _Changed(Wrapped):
     """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
     def __init__(
@@ -339,28 +326,14 @@ class _Changed:
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None,
     ) -> None:
-        self._clip, self._source, self._change, self._keeps = clip, source, change, keeps
-        self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files, self.lens, self.backdrop = source.files, clip.lens, clip.backdrop
-
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        return self._source.notes
+        super().__init__(source)
+        self._first, self._change, self._keeps = clip.first, change, keeps
 
     def read(self, n: int) -> StoredPicture:
-        image, number = self._source.read(n), n - self._clip.first
+        image, number = self.source.read(n), n - self._first
         if self._keeps is not None and self._keeps(number, lambda: image.averaged(*small_size(*image.size))):
             return image
         return StoredPicture(self._change(number, image.linear()))
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        clip = self._clip
-        if (first, last) == (clip.first, clip.first + len(clip) - 1):  # what the clip may know already
-            return tuple(clip.first + n for n in clip.damaged)
-        return self._source.damaged(first, last)
-
-    def close(self) -> None:
-        self._source.close()
 
 
 def _keep(kept: OrderedDict[int, StoredPicture], n: int, image: StoredPicture, most: int) -> StoredPicture:

@@ -85,6 +85,28 @@ class FrameSource(Protocol):
         ...
 
 
+class Wrapped:
+    """The frames of another source, of which a subclass changes some."""
+
+    def __init__(self, source: FrameSource) -> None:
+        self.source = source
+        self.count, self.fps, self.warning = source.count, source.fps, source.warning
+        self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
+
+    @property
+    def notes(self) -> tuple[Remark, ...]:
+        return self.source.notes
+
+    def read(self, n: int) -> StoredPicture:
+        return self.source.read(n)
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        return self.source.damaged(first, last)
+
+    def close(self) -> None:
+        self.source.close()
+
+
 def believed_focal_length(value: object) -> float | None:
     """Return a focal length in millimetres as a file says it; None where it says none."""
     try:

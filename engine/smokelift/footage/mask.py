@@ -18,9 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks import Remark
 from smokelift.footage.behind_smoke import push_pull
-from smokelift.footage.frame_source import ClipError, FrameSource
+from smokelift.footage.frame_source import ClipError, FrameSource, Wrapped
 from smokelift.footage.image_sequence import ImageSequence, is_pattern
 from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image
 from smokelift.footage.stored_picture import StoredPicture
@@ -52,8 +51,10 @@ class Mask:
     path
         A picture; or a video, or a pattern ``mask_####.png``, whose frame n belongs to the file's frame n. Of a picture
         with an alpha channel it is what is seen of it before black.
-    first, last
+    needed
         Frames of the file that need one.
+    size
+        Width and height of the clip's pictures.
 
     Attributes
     ----------
@@ -65,68 +66,51 @@ class Mask:
     Raises
     ------
     ClipError, ImageError
-        If it cannot be read, lacks a frame, or hides all of them.
+        If it cannot be read, lacks a frame, has another shape than the clip, or leaves next to nothing of it.
     """
 
-    def __init__(self, path: Path, first: int, last: int) -> None:
-        self._path = path
+    def __init__(self, path: Path, needed: range, size: tuple[int, int]) -> None:
         self._read: Callable[[int], Picture]
         self._video: Video | None = None
         self.count: int | None = None
+        self.files: tuple[Path, ...] = (path,)
         if not ImageSequence.reads(path):
             self._video = video = Video(path, "linear")
-            self.files, self.count = video.files, video.count
-            self._read = lambda n: video.read(n).linear()
+            self.count, self._read = video.count, lambda n: video.read(n).linear()
         elif is_pattern(path):
             self.files = ImageSequence(path, "linear", None).files
-            self.count = len(self.files)
-            self._read = lambda n: read_image(self.files[n], "linear")
+            self.count, self._read = len(self.files), lambda n: read_image(self.files[n], "linear")
+            missing = [file for file in self.files if not file.is_file()]
+            if missing:
+                raise ClipError(
+                    f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all."
+                )
         else:
             still = read_image(path, "linear")
-            self.files = (path,)
-            self._read = lambda _: still
+            self._read, needed = lambda _: still, needed[:1]
+        if self.count is not None and needed[-1] >= self.count:
+            raise ClipError(
+                f"{path}: has masks for {self.count} of the frames 0 to {needed[-1]} that are needed; give one for "
+                "every frame of the clip, or one picture for all."
+            )
         self._at = lru_cache(maxsize=REMEMBERED)(self._seen)
-        if self.count is not None and last >= self.count:
-            raise ClipError(
-                f"{path}: has masks for {self.count} of the frames 0 to {last} that are needed; give one for every "
-                "frame of the clip, or one picture for all."
-            )
-        missing = [file for file in self.files if is_pattern(path) and not file.is_file()]
-        if missing:
-            raise ClipError(f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all.")
-        self._needed = range(first, last + 1) if self.count else (first,)
-        if not any((self._read(n) @ LUMINANCE.astype(np.float32) >= HALF).any() for n in self._needed):
-            raise ClipError(
-                f"{path}: this mask is black everywhere (transparent counts as black), so no smoke could be "
-                "anywhere; paint white where smoke may be."
-            )
-
-    def seen(self, n: int, width: int, height: int) -> Seen:
-        """Return which pixels of frame ``n`` of the file are not hidden, (height, width), for pictures of any size.
-
-        Raises
-        ------
-        ClipError, ImageError
-            If the mask of the frame cannot be read.
-        """
-        return self._at(n if self.count else 0, width, height)
-
-    def check(self, width: int, height: int) -> None:
-        """Raise ClipError if it has another shape than a clip of so many pixels, or leaves next to nothing of it."""
-        rows, columns = self._read(self._needed[0]).shape[:2]
+        (width, height), (rows, columns) = size, self._read(needed[0]).shape[:2]
         # either may be a resized copy: each side is right to a pixel
         if abs(columns * height - rows * width) > columns + rows + width + height:
             raise ClipError(
-                f"{self._path}: this mask is {columns} x {rows} pixels, another shape than the clip's {width} x "
-                f"{height}; paint it over a frame of the clip."
+                f"{path}: this mask is {columns} x {rows} pixels, another shape than the clip's {width} x {height}; "
+                "paint it over a frame of the clip."
             )
-        side = max(1, round(ROOM * max(width, height)))
-        square = np.ones((side, side))
-        if not any(ndimage.binary_erosion(self.seen(n, width, height), square).any() for n in self._needed):
+        side = max(1, round(ROOM * max(size)))
+        if not any(ndimage.binary_erosion(self.seen(n, *size), np.ones((side, side))).any() for n in needed):
             raise ClipError(
-                f"{self._path}: this mask leaves too little of the picture white; leave a square of {side} x {side} "
-                "pixels at least, and room around the smoke."
+                f"{path}: this mask leaves too little of the picture white (transparent counts as black); paint white "
+                f"where smoke may be, a square of {side} x {side} pixels at least."
             )
+
+    def seen(self, n: int, width: int, height: int) -> Seen:
+        """Return which pixels of frame ``n`` of the file are not hidden, (height, width), for pictures of any size."""
+        return self._at(n if self.count else 0, width, height)
 
     def _seen(self, n: int, width: int, height: int) -> Seen:
         return area_average(self._read(n) @ LUMINANCE.astype(np.float32), width, height) >= HALF
@@ -137,29 +121,16 @@ class Mask:
             self._video.close()
 
 
-class Masked:
-    """The frames of a source, continued where a mask hides them. Those that have no mask are left out.
-
-    Attributes
-    ----------
-    filmed
-        The source.
-    mask
-        What hides them.
-    """
+class Masked(Wrapped):
+    """The frames of a source, continued where a mask hides them. Those that have no mask are left out."""
 
     def __init__(self, source: FrameSource, mask: Mask) -> None:
-        self.filmed, self.mask = source, mask
+        super().__init__(source)
+        self.mask = mask
         self.count = min(source.count, mask.count or source.count)
-        self.fps, self.warning, self.files = source.fps, source.warning, source.files
-        self.lens, self.backdrop = source.lens, source.backdrop
-
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        return self.filmed.notes
 
     def read(self, n: int) -> StoredPicture:
-        image = self.filmed.read(n)
+        image = self.source.read(n)
         seen = self.mask.seen(n, *image.size)
         if seen.all():
             return image
@@ -167,11 +138,8 @@ class Masked:
         whole[~seen] = continued(whole, seen)
         return StoredPicture(whole)
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        return self.filmed.damaged(first, last)
-
     def close(self) -> None:
-        self.filmed.close()
+        super().close()
         self.mask.close()
 
 

@@ -42,7 +42,7 @@ def here(shot, plume, tmp_path, monkeypatch):
         (("SHOT", "--resolution", "4,4,4"), "8 voxels"),
         (("SHOT", "--resolution", "16,16,16"), "cubic voxels"),
         (("SHOT", "--mask", "none.png"), "no such file"),
-        (("SHOT", "--mask", "black.png"), "black everywhere"),
+        (("SHOT", "--mask", "black.png"), "leaves too little of the picture white"),
         (("SHOT", "--mask", "SHOT"), "holds no video stream"),
     ],
 )

@@ -50,14 +50,14 @@ def mask(tmp_path: Path) -> Path:
 
 def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path: Path) -> None:
     file = painted(tmp_path / "mask.png", [[0, 120, 140, 255]])
-    seen = Mask(file, 0, 0).seen(0, 8, 2)
+    seen = Mask(file, range(1), (80, 20)).seen(0, 8, 2)
     np.testing.assert_array_equal(seen, [[False] * 4 + [True] * 4] * 2)
 
 
 def test_what_is_transparent_is_black(tmp_path: Path) -> None:
     white, clear = (255, 255, 255, 255), (255, 255, 255, 0)
     file = painted(tmp_path / "mask.png", np.array([[white, clear]]))
-    np.testing.assert_array_equal(Mask(file, 0, 0).seen(0, 2, 1), [[True, False]])
+    np.testing.assert_array_equal(Mask(file, range(1), (20, 10)).seen(0, 2, 1), [[True, False]])
 
 
 @pytest.mark.parametrize("kind", ["pictures", "video"])
@@ -96,7 +96,7 @@ LINE = np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1))
     ("values", "said"),
     [
         ({}, r"mask\.png: no such file"),
-        ({"mask.png": np.zeros((4, 4))}, r"mask\.png: this mask is black everywhere"),
+        ({"mask.png": np.zeros((4, 4))}, r"mask\.png: this mask leaves too little of the picture white"),
         ({"mask.png": LINE}, r"mask\.png: this mask leaves too little of the picture white"),
         ({"mask.png": None}, r"mask\.png: cannot be read"),
         ({"mask.png": np.full((HEIGHT, 2 * WIDTH), 255)}, "another shape than the clip's"),
