@@ -8,10 +8,9 @@ is measured on what cannot be smoke, before all else (`noise`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
     lasting_noise,
+    median_of_seen,
     noise_of,
     some_blocks,
     spread_about,
@@ -35,7 +35,6 @@ from smokelift.footage.noise import (
 )
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.seen import median_of_seen
 from smokelift.footage.steady import cleared, uncovered, without_noise_light
 from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera
@@ -50,6 +49,10 @@ passes by."""
 MIN_KNOWN = 0.1
 """Share of a picture that is ever seen clear, below which it tells nothing: of public clips before something it is .2
 and more (docs/clips.md)."""
+
+SEEN_OFTEN = 0.15
+"""Share of the blocks of all frames that shows one colour, from which on it is none of a texture that passes by: .2 and
+more of public clips, .05 and .12 of two walls before which a camera moves (docs/experiments/turning-camera.md)."""
 
 TEXTURE = np.float32(6 / 255)
 """White noise in sRGB values from which on it is texture that a moving camera sees."""
@@ -81,27 +84,21 @@ class Backdrop:
         Of the full pictures.
     background
         As a scene would give it; None where it was estimated, unless the camera is known to move.
-    colour
-        Linear, where one was found; black counts as such below half a step of 8 bit video.
     frames
         Number of the file's frames that decided on it: those up to the next cut.
     quantiser
         Of the file, if it says it and the background is not of one colour.
     cut
         Frames of the file before and after a cut within the clip, if there is one.
-    costs
-        As of `smokelift.footage.background_kind.Ranking`; empty where nothing was compared.
     """
 
     source: Source
     clip: Clip
     plates: Plates
     background: Background | None = None
-    colour: tuple[float, float, float] | None = None
     frames: int = 0
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
-    costs: dict[str, float] = field(default_factory=dict)
 
 
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
@@ -123,34 +120,20 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     ValueError
         If a camera moves before a background of more than one colour that is not given.
     """
-    if clip.backdrop is not None:
-        grey = (clip.backdrop,) * 3
-        quiet, plates = _before(clip, lambda of: known_plate(grey, of))
-        found = Backdrop("alpha", quiet, plates, Background(color=grey))
-    elif (given := given_plates(background, camera, clip)) is not None:
-        quiet, plates = _before(clip, lambda of: given if of is clip else _given(background, camera, of))
-        found = Backdrop("given", quiet, plates, background)
-    else:
+    grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
+    behind = grey or background
+    plates = given_plates(behind, camera, clip)
+    if plates is None:
         found = _estimated(clip, camera is not None and camera.moves)
+    else:
+        quiet = without_noise_light(clip, plates.noise)
+        if quiet is not clip:
+            # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
+            again: Any = given_plates(behind, camera, quiet)
+            plates = replace(again, noise=plates.noise)
+        found = Backdrop("alpha" if grey else "given", quiet, plates, behind)
     shown = uncovered(found.plates, found.clip)
     return replace(found, clip=cleared(found.clip, shown), plates=shown)
-
-
-def _before(clip: Clip, plates_of: Callable[[Clip], Plates]) -> tuple[Clip, Plates]:
-    """A clip without the light that its noise adds, and plates that are known."""
-    plates = plates_of(clip)
-    quiet = without_noise_light(clip, plates.noise)
-    if quiet is clip:
-        return clip, plates
-    again = plates_of(quiet)
-    # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
-    return quiet, replace(again, noise=plates.noise)  # type: ignore[type-var]  # all plates are dataclasses
-
-
-def _given(background: Background | None, camera: Camera | None, clip: Clip) -> Plates:
-    given = given_plates(background, camera, clip)
-    assert given is not None
-    return given
 
 
 def _estimated(clip: Clip, moves: bool) -> Backdrop:
@@ -171,32 +154,29 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
             raise ValueError(MOVING_CAMERA)
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))
-        return Backdrop("colour", clip, known_plate(found.colour, clip), behind, (red, green, blue), len(proxy.numbers))
-    made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut, costs=found.costs)
-    # black, and what is mostly one colour, is the same wherever the camera looks; else texture may pass by
-    plain = found.colour is not None and (found.clear > MOSTLY or not found.colour.any())
+        return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
+    made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut)
+    # black, and a colour that is often seen, is the same wherever the camera looks; else texture may pass by
+    plain = found.colour is not None and (found.clear > SEEN_OFTEN or not found.colour.any())
     if not plain and camera_motion.moves(proxy.between(*proxy.clip).pictures):
         raise ValueError(MOVING_CAMERA)
     colour, objects = found.colour, found.objects
     source: Source = "colour"
     if colour is None:
-        plate = _picture(clip, part, white)
+        plate = _picture(clip, part, even, gains, white)
         if plate.confidence.mean() >= MIN_KNOWN:
             return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
         # fog that drifts over all of the file: it is shown as it was made, before black
         colour, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    red, green, blue = (float(v) for v in colour)
-    plate = _of_one_colour(clip, part, even, gains, colour, objects, white)
-    return made(source, plates=plate, colour=(red, green, blue))
+    return made(source, plates=_of_one_colour(clip, part, even, gains, colour, objects, white))
 
 
-def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
+def _picture(clip: Clip, part: Proxy, even: Proxy, gains: Picture, white: Picture) -> Plate:
     """The plate of the picture that the clear frames show."""
-    even, gains = proxy.evened()
     noise = _noise(even, median_of_seen(even.pictures), white)
     picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale)
     return Plate(
-        whole_plate(clip, proxy, gains, picture),
+        whole_plate(clip, part, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),
         _noise(even, picture.image, white),
         picture.errors,

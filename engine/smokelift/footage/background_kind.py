@@ -18,10 +18,17 @@ import numpy as np
 
 from smokelift.checks.array_types import Mask
 from smokelift.footage.behind_smoke import DETAIL
-from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, spread_about
+from smokelift.footage.images import (
+    Picture,
+    area_average,
+    blurred,
+    channel_mean,
+    linear_to_srgb,
+    reduced_size,
+    srgb_to_linear,
+)
+from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, median_of_seen, spread_about
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.seen import median_of_seen
 
 BLOCKS = 64
 """Blocks along the longer side: means over some pixels, of which white noise is gone."""
@@ -81,14 +88,11 @@ class Ranking:
         Pixels of the proxy that show something else before the colour all the time.
     clear
         Share of all blocks and frames that show the colour.
-    costs
-        Of the kinds that were compared, in nats a block, by the colour in codes of 8 bit; the least is the likeliest.
     """
 
     colour: Picture | None
     objects: Mask
     clear: float
-    costs: dict[str, float]
 
 
 def rank(proxy: Proxy, white: Picture) -> Ranking:
@@ -111,7 +115,7 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
     for value in values:
         picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
     best = float(picture.mean()) + jump
-    costs, colour, found, share = {"picture": best}, None, np.zeros(values.shape[1], np.bool_), 0.0
+    colour, found, share = None, np.zeros(values.shape[1], np.bool_), 0.0
     still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
     for candidate in _candidates(values, limit):
         clear = within(values - candidate, limit)
@@ -125,12 +129,11 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
         brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
-        costs[", ".join(f"{255 * v:.0f}" for v in candidate)] = total
         if total < best and stands.mean() <= OBJECT and shows.mean() >= MIN_SHOWN_SHARE:
             best, found, share = total, stands & still, float(clear.mean())
             colour = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
             colour[linear_to_srgb(colour) < EIGHT_BIT_STEP / 2] = 0
-    return Ranking(colour, on_picture(found), share, costs)
+    return Ranking(colour, on_picture(found), share)
 
 
 def colour_around(picture: Picture) -> tuple[float, float, float] | None:
@@ -177,8 +180,7 @@ def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
 def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
     """The colours of blocks (frames, blocks, 3), in sRGB values, and how many rows and columns of them there are."""
     rows, columns = proxy.seen.shape[1:]
-    scale = max(1.0, max(rows, columns) / BLOCKS)
-    high, wide = max(1, round(rows / scale)), max(1, round(columns / scale))
+    wide, high = reduced_size(columns, rows, BLOCKS)
     values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
     return values.reshape(len(values), -1, 3), (high, wide)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, reduced_size, srgb_to_linear
 
 DRIFT = 8 / 255
 """Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
@@ -61,10 +61,9 @@ def completed(
 ) -> tuple[Picture, Picture]:
     """Return a linear plate with what is unknown filled in, and the ``contrast`` of `ClearPicture`.
 
-    ``mean`` is that of the samples in sRGB values.
-
-    What is unknown is continued from what is sure. Other pixels are known only because they look like their
-    surroundings: a few of them, at the rim of smoke that hardly changes, would spread over all that is behind it.
+    ``mean`` is that of the samples in sRGB values. What is unknown is continued from what is sure: other pixels are
+    known only because they look like their surroundings, and a few of them, at the rim of smoke that hardly changes,
+    would spread over all that is behind it.
 
     Smoke of transmittance T and brightness J shows J + T (B - J) of a background B. The mean over time has T from its
     coarse part and that of the surroundings, and so what of its detail is the background's.
@@ -103,15 +102,8 @@ def thin_rim(
     It is drawn towards the smoke's brightness by more than drift, compared with what is continued from further away,
     and smoke is near whenever it seems to be clear. A coarse codec keeps thin smoke as still as a background.
 
-    Parameters
-    ----------
-    image : (rows, columns, 3)
-        Linear.
-    known : (rows, columns)
-    brightens : (rows, columns)
-        Where smoke brightens.
-    clear : (frames, rows, columns)
-        Where each sample seems to be clear, or does not show the pixel.
+    ``brightens`` is where smoke brightens, ``clear`` (frames, rows, columns) where each sample seems to be clear, or
+    does not show the pixel.
     """
     beyond = ndimage.distance_transform_edt(known) > RIM
     if known.all() or not beyond.any():
@@ -156,9 +148,8 @@ def continuation_errors(image: Picture, known: npt.NDArray[np.bool_]) -> Picture
     """
     if known.all():
         return np.zeros((3, 3), np.float32)
-    height, width = known.shape
-    if max(height, width) > MAX_ERROR_SIDE:
-        height, width = (max(1, round(MAX_ERROR_SIDE * side / max(height, width))) for side in (height, width))
+    width, height = reduced_size(known.shape[1], known.shape[0], MAX_ERROR_SIDE)
+    if known.shape != (height, width):
         image, known = area_average(image, width, height), area_average(known.astype(np.float32), width, height) > 0.999
     encoded = linear_to_srgb(image)
     total, count = np.zeros((3, 3)), 0

@@ -33,8 +33,7 @@ from smokelift.footage.behind_smoke import (
 )
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import smoothing
-from smokelift.footage.noise import Noise, peak_spread
-from smokelift.footage.seen import at_rank, count_of_seen, median_of_seen
+from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
 """Width of the window of a pixel's clear values in units of noise: plus and minus three standard deviations."""

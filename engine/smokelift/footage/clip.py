@@ -12,10 +12,10 @@ from types import TracebackType
 import numpy as np
 
 from smokelift.checks import Remark
-from smokelift.footage.exposure import small_size
+from smokelift.footage.exposure import COMPARED_SIDE
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Wrapped
-from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import Picture, Transfer
+from smokelift.footage.image_sequence import ImageSequence, is_video
+from smokelift.footage.images import Picture, Transfer, reduced_size
 from smokelift.footage.mask import Mask, Masked, Seen
 from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
@@ -149,13 +149,7 @@ class Clip:
         return self._source.notes
 
     def remarks(self) -> tuple[Remark, ...]:
-        """Remarks on the clip: defects, frames that are replaced, how pictures are read.
-
-        Raises
-        ------
-        ClipError
-            If most frames are damaged.
-        """
+        """Remarks on the clip: defects, frames that are replaced, how pictures are read; ClipError as of `damaged`."""
         remarks = [self.warning] if self.warning else []
         if self.damaged:
             frames = numbered([self.first + n for n in self.damaged])
@@ -180,11 +174,7 @@ class Clip:
         return tuple(n - self.first for n in damaged)
 
     def frame(self, n: int) -> Picture:
-        """Return frame ``n``, counted from 0 at the start of the range.
-
-        Returns
-        -------
-        Linear float32 array of shape (height, width, 3), read-only because it is kept for the next caller.
+        """Return frame ``n``, counted from 0 at the start of the range: linear (height, width, 3), float32, read-only.
 
         Raises
         ------
@@ -194,13 +184,7 @@ class Clip:
         return _keep(self._cache, n, StoredPicture(self.stored(n).linear()), LINEAR_BYTES).values
 
     def stored(self, n: int) -> StoredPicture:
-        """Return frame ``n`` as it is stored, of which a part or means cost less than the linear frame.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
+        """Return frame ``n`` as it is stored, of which a part or means cost less than the linear `frame`."""
         if n in self._cache:
             self._cache.move_to_end(n)
             return self._cache[n]
@@ -219,13 +203,7 @@ class Clip:
         return Clip(self.path, self._masked.source, self.fps, (self.first, self.first + len(self) - 1), self.size)
 
     def seen(self, n: int, width: int, height: int) -> Seen | None:
-        """Return which pixels of frame ``n`` no mask hides, at a size of (height, width); None of a clip without one.
-
-        Raises
-        ------
-        ClipError, ImageError
-            If the mask of the frame cannot be read.
-        """
+        """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask."""
         return None if self._masked is None else self._masked.mask.seen(self.first + n, width, height)
 
     def as_seen(self, n: int, picture: Picture) -> Picture:
@@ -276,12 +254,7 @@ class Clip:
     ) -> Clip:
         """Return the clip with each frame, by its number, replaced by another. The two share the open file.
 
-        Parameters
-        ----------
-        change
-            Makes the new frame.
-        keeps
-            Says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
+        ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
         last = self.first + len(self) - 1
         source = _Changed(self, self._source, change, keeps)
@@ -327,11 +300,14 @@ class _Changed(Wrapped):
         keeps: Callable[[int, Callable[[], Picture]], bool] | None,
     ) -> None:
         super().__init__(source)
+        self.lens = clip.lens
         self._first, self._change, self._keeps = clip.first, change, keeps
 
     def read(self, n: int) -> StoredPicture:
         image, number = self.source.read(n), n - self._first
-        if self._keeps is not None and self._keeps(number, lambda: image.averaged(*small_size(*image.size))):
+        if self._keeps is not None and self._keeps(
+            number, lambda: image.averaged(*reduced_size(*image.size, COMPARED_SIDE))
+        ):
             return image
         return StoredPicture(self._change(number, image.linear()))
 
@@ -352,8 +328,3 @@ def numbered(frames: Sequence[int]) -> str:
         return f"frame {words[0]} is"
     last = f"{len(frames) - 5} more" if len(frames) > 5 else words.pop()
     return f"frames {', '.join(words)} and {last} are"
-
-
-def is_video(path: Path) -> bool:
-    """Return whether a path, to judge by its name, is that of a video, not of one or more pictures."""
-    return not ImageSequence.reads(path)

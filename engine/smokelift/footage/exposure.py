@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.footage.images import Picture, area_average
-from smokelift.footage.seen import median_of_seen
+from smokelift.footage.images import Picture, area_average, reduced_size
+from smokelift.footage.noise import median_of_seen
 
 COMPARED_SIDE = 160
 """Pixels along the longer side of the pictures that are compared: noise is averaged out, and there are thousands."""
@@ -40,10 +40,7 @@ SPREAD = 0.06
 def gain_of(picture: Picture, background: Picture) -> Picture:
     """Return how much brighter a picture is than its background, (3,); ones where that cannot be measured or seen.
 
-    Parameters
-    ----------
-    picture, background : (rows, columns, 3)
-        Linear, of one size, small enough that their noise does not count.
+    Both are linear (rows, columns, 3), `small` enough that their noise does not count.
     """
     low, high = USABLE
     gains = np.ones(3, np.float32)
@@ -73,13 +70,7 @@ def largest_change(gains: Sequence[Picture]) -> float:
 def small(picture: Picture) -> Picture:
     """Return a picture at the size at which gains are measured."""
     rows, columns = picture.shape[:2]
-    return area_average(picture, *small_size(columns, rows))
-
-
-def small_size(width: int, height: int) -> tuple[int, int]:
-    """Return width and height of the `small` picture of one of a width and a height."""
-    scale = max(1.0, max(height, width) / COMPARED_SIDE)
-    return max(1, round(width / scale)), max(1, round(height / scale))
+    return area_average(picture, *reduced_size(columns, rows, COMPARED_SIDE))
 
 
 def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:

@@ -54,10 +54,7 @@ COLOUR_FRAMES = 8
 def fire_share(colours: Picture, behind: Picture) -> float:
     """Return the share of fire among smoke pixels; 0 where none of it is brighter than light explains.
 
-    Parameters
-    ----------
-    colours, behind : (n, 3)
-        Linear radiance of the pixels, and of the background there.
+    ``colours`` and ``behind`` are the linear radiance (n, 3) of the pixels, and of the background there.
     """
     fire, brightest = _hot(colours, behind), brightest_channel(colours)
     if fire.sum() <= MIN_FIRE_SHARE * len(colours):
@@ -72,15 +69,7 @@ def fire_share(colours: Picture, behind: Picture) -> float:
 
 
 def without_fire(clip: Clip, plates: Plates) -> Clip:
-    """Return a clip in whose frames the smoke beside fire is continued over it.
-
-    Parameters
-    ----------
-    clip
-        Exposed as its backgrounds are.
-    plates
-        Its backgrounds.
-    """
+    """Return a clip, exposed as its backgrounds are, in whose frames the smoke beside fire is continued over it."""
     return clip.changed(lambda number, picture: _doused(picture, plates.at(number)))
 
 
@@ -93,12 +82,7 @@ def fire_colour(clip: Clip, light: Clip) -> Vector:
     """Return the colour of the light of fire in a clip, the largest of red, green and blue 1.
 
     That of the light in pixels that are not clipped (where there are none, in all), weighted by its brightness: what of
-    the smoke is mistaken for fire is as bright everywhere.
-
-    Parameters
-    ----------
-    clip, light
-        The clip, and its `firelight`, which is not zero everywhere.
+    the smoke is mistaken for fire is as bright everywhere. ``light`` is the clip's `firelight`, not zero everywhere.
     """
     whole, certain = np.zeros(3), np.zeros(3)
     for number in clip.spread(COLOUR_FRAMES):

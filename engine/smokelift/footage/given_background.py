@@ -18,19 +18,8 @@ the others are a nozzle, a floor, a logo."""
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
     """Open a clean plate as a clip if it changes from frame to frame, and return None if it does not.
 
-    Its frames are counted as those of the clip's file.
-
-    Parameters
-    ----------
-    background
-        What the scene gives.
-    camera
-        Before one that moves, a numbered picture stands for the sequence that it begins, else for itself.
-
-    Raises
-    ------
-    ClipError
-        If it cannot be read.
+    Its frames are counted as those of the clip's file. Before a camera that moves a numbered picture stands for the
+    sequence that it begins, else for itself. ClipError is raised if it cannot be read.
     """
     image = None if background is None else background.image
     moves = camera is not None and camera.moves
@@ -41,13 +30,6 @@ def open_plates(background: Background | None, camera: Camera | None) -> Clip | 
 
 def given_plates(background: Background | None, camera: Camera | None, clip: Clip) -> Plates | None:
     """Return the background of every frame of a clip as its scene gives it; None if it has to be estimated.
-
-    Parameters
-    ----------
-    background, camera
-        As in `open_plates`.
-    clip
-        The footage.
 
     Raises
     ------
@@ -69,15 +51,8 @@ def given_plates(background: Background | None, camera: Camera | None, clip: Cli
 def background_picture(scene: Scene | CompleteScene, camera: Camera | None = None) -> Picture:
     """Return the background as a camera sees it.
 
-    Of a plate that changes from frame to frame, it is the clip's first frame. `behind` says what another camera than
-    the scene's own sees of a clean plate.
-
-    Parameters
-    ----------
-    scene
-        Without a background it is black.
-    camera
-        By default the scene's own.
+    Of a plate that changes from frame to frame, it is the clip's first frame; without any it is black. The camera is by
+    default the scene's own; `behind` says what another one sees of a clean plate.
 
     Returns
     -------

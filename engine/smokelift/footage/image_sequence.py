@@ -59,11 +59,6 @@ class ImageSequence:
         self._shape: tuple[int, ...] | None = None
         self.backdrop = backdrop_of(self._samples())
 
-    @staticmethod
-    def reads(path: Path) -> bool:
-        """Return whether a path, to judge by its name, is that of one or more pictures."""
-        return is_pattern(path) or path.suffix.lower() in READABLE
-
     @property
     def notes(self) -> tuple[Remark, ...]:
         """That the pictures are reduced, if they are."""
@@ -103,14 +98,13 @@ class ImageSequence:
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """Return which pictures from one to another are missing or cannot be read."""
-        return tuple(n for n in range(first, last + 1) if not self._readable(n))
-
-    def _readable(self, n: int) -> bool:
-        try:
-            self.read(n)
-        except DamagedFrameError:
-            return False
-        return True
+        damaged = []
+        for n in range(first, last + 1):
+            try:
+                self.read(n)
+            except DamagedFrameError:
+                damaged.append(n)
+        return tuple(damaged)
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -119,6 +113,11 @@ class ImageSequence:
 def is_pattern(path: Path) -> bool:
     """Return whether a path stands for numbered pictures: its last row of # for the number, unless it is a file."""
     return "#" in path.name and not path.is_file()
+
+
+def is_video(path: Path) -> bool:
+    """Return whether a path, to judge by its name, is that of a video, not of one or more pictures."""
+    return not is_pattern(path) and path.suffix.lower() not in READABLE
 
 
 def _focal_length(path: Path) -> float | None:

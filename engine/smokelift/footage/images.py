@@ -95,18 +95,10 @@ def decode_integers(
     white: float = 1.0,
     premultiplied: bool = False,
 ) -> Picture:
-    """Return integer pixels [row, column, rgb or rgba] as linear RGB, alpha over black.
+    """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB, alpha over black.
 
-    Parameters
-    ----------
-    codes
-        8 or 16 bit values.
-    encoding
-        How they encode light; None is ``"srgb"``.
-    white
-        Share of the largest value that stands for white, and for opaque.
-    premultiplied
-        Whether colours are over black as they are stored.
+    The encoding is by default sRGB. ``white`` is the share of the largest value that stands for white, and for opaque.
+    Colours that are ``premultiplied`` are over black as they are stored.
     """
     linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
     alpha = decode_alpha(codes, white)
@@ -270,6 +262,12 @@ def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:
         if grey in names:
             return grey, grey, grey
     raise ImageError(f"{path}: holds neither RGB nor Y channels, but {', '.join(names)}")
+
+
+def reduced_size(width: int, height: int, side: float) -> tuple[int, int]:
+    """Return width and height of a picture whose longer side is reduced to so many pixels at most."""
+    scale = max(1.0, max(width, height) / side)
+    return max(1, round(width / scale)), max(1, round(height / scale))
 
 
 def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:

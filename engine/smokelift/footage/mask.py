@@ -20,8 +20,8 @@ from scipy import ndimage
 
 from smokelift.footage.behind_smoke import push_pull
 from smokelift.footage.frame_source import ClipError, FrameSource, Wrapped
-from smokelift.footage.image_sequence import ImageSequence, is_pattern
-from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image
+from smokelift.footage.image_sequence import ImageSequence, is_pattern, is_video
+from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image, reduced_size
 from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
 
@@ -74,7 +74,7 @@ class Mask:
         self._video: Video | None = None
         self.count: int | None = None
         self.files: tuple[Path, ...] = (path,)
-        if not ImageSequence.reads(path):
+        if is_video(path):
             self._video = video = Video(path, "linear")
             self.count, self._read = video.count, lambda n: video.read(n).linear()
         elif is_pattern(path):
@@ -146,8 +146,7 @@ class Masked(Wrapped):
 def continued(picture: Picture, seen: Seen) -> Picture:
     """Return the pixels (n, 3) of a linear picture (rows, columns, 3) that are not seen, smoothly from around them."""
     rows, columns = seen.shape
-    scale = max(1.0, max(rows, columns) / CONTINUED)
-    size = max(1, round(columns / scale)), max(1, round(rows / scale))
+    size = reduced_size(columns, rows, CONTINUED)
     share = area_average(seen.astype(np.float32), *size)
     mean = area_average(np.where(seen[..., None], picture, 0), *size) / np.maximum(share, 1e-6)[..., None]
     known = (share > 0).astype(np.float32)

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+import smokelift._core as _core
 from smokelift.footage.images import Picture, srgb_to_linear
-from smokelift.footage.seen import median_of_seen
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
 """One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have, since codecs shift whole
@@ -108,11 +108,8 @@ def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
 def white_noise(blocks: Picture) -> Picture:
     """Return the standard deviation (3,) of noise that differs from pixel to pixel.
 
-    Parameters
-    ----------
-    blocks : (frames, rows, columns, 3)
-        `some_blocks` of pictures of one exposure, or of their deviations, in sRGB values. What a mask hides is not a
-        number.
+    It is that of `some_blocks` of pictures of one exposure, or of their deviations, (frames, rows, columns, 3), in sRGB
+    values. What a mask hides is not a number.
     """
     frames, rows, columns = blocks.shape[:3]
     size = min(BLOCK, rows, columns)
@@ -132,18 +129,12 @@ def spread_about(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> 
 
 
 def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> float:
-    """Return the standard deviation of those deviations from a background that are noise, in sRGB values.
+    """Return the standard deviation, at most the largest, of those deviations from a background that are noise.
 
     They are a mixture of noise, normal about zero, and of smoke, whose deviations are of all sizes, each as often as
     its double. The likeliest mixture is found from little noise upwards, so that it is that of the peak at zero
-    (Dempster, Laird and Rubin, "Maximum likelihood from incomplete data via the EM algorithm", 1977).
-
-    Parameters
-    ----------
-    deviations
-        What is not a number is left out.
-    largest
-        Of all standard deviations that noise has.
+    (Dempster, Laird and Rubin, "Maximum likelihood from incomplete data via the EM algorithm", 1977). What is not a
+    number is left out.
     """
     some = deviations.ravel()[:: max(1, deviations.size // SPREAD_SAMPLES)]
     size = np.abs(some[np.isfinite(some)])
@@ -162,12 +153,8 @@ def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> f
 def noise_about(deviations: Picture, blocks: Picture) -> Noise:
     """Return the noise of pictures before a background that is known.
 
-    Parameters
-    ----------
-    deviations : (frames, rows, columns, 3)
-        `some_blocks` of how they differ from the background, in sRGB values.
-    blocks : (frames, rows, columns, 3)
-        `block_means` of all of that.
+    The deviations are `some_blocks` of how they differ from it, in sRGB values, the blocks `block_means` of all of
+    that, (frames, rows, columns, 3) both.
     """
     return noise_of(white_noise(deviations), spread_about(blocks), BLOCK**2)
 
@@ -179,20 +166,11 @@ def noise_of(white: Picture, spread: Picture, pixels: float) -> Noise:
 
 
 def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
-    """Return how bright a noisy black is on the mean, since noise below black is clipped, in sRGB values.
+    """Return how bright a noisy black is on the mean (3,), since noise below black is clipped, in sRGB values.
 
     It is the deviation of the darkest tenth of the blocks, each at its median over time, as far as noise explains it: a
     background that is given wrong, or smoke that fills the picture, deviates more. 0 for what is less than a step of 8
-    bit video.
-
-    Parameters
-    ----------
-    deviations, blocks
-        As `noise_about` takes them.
-
-    Returns
-    -------
-    (3,) float32
+    bit video. What it takes is that of `noise_about`.
     """
     apart = np.abs(deviations[:, :, 1:] - deviations[:, :, :-1])
     explained = CLIPPED_MEAN * np.nanmedian(apart, axis=(0, 1, 2)) if apart.size else 0
@@ -201,17 +179,10 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
 
 
 def linear_excess(encoded: Picture, deviation: npt.ArrayLike) -> Picture:
-    """Return by how much noise of sRGB values makes linear light brighter on the mean, at sRGB values.
+    """Return by how much noise of a standard deviation makes linear light brighter on the mean, at sRGB values.
 
     Light is a convex function of sRGB values, so that the mean of f(v + n) exceeds f(v) by half of the noise's variance
     times the second derivative of f. At a noisy value the term has the same mean, up to the fourth order in the noise.
-
-    Parameters
-    ----------
-    encoded : (..., 3)
-        sRGB values, noisy or not.
-    deviation
-        Standard deviation of the noise, in sRGB values, one or one a channel.
     """
     # the second derivative of the curve of `srgb_to_linear`
     curvature = 2.4 * 1.4 / 1.055**2 * ((np.maximum(encoded, 0.04) + 0.055) / 1.055) ** 0.4
@@ -223,3 +194,23 @@ def linear_per_srgb(encoded: Picture) -> Picture:
     """Return the derivative of linear light by the sRGB value, at sRGB values: what turns their noise into linear."""
     half = EIGHT_BIT_STEP / 2
     return (srgb_to_linear(encoded + half) - srgb_to_linear(encoded - half)) / EIGHT_BIT_STEP
+
+
+def median_of_seen(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return the median along the first axis of what is seen; not a number where nothing is."""
+    if not np.isnan(values).any():
+        lower, upper = _core.at_ranks(values, ((len(values) - 1) // 2, len(values) // 2))
+    else:
+        ordered, count = np.sort(values, axis=0), np.maximum(count_of_seen(values), 1)  # what is not seen comes last
+        lower, upper = at_rank(ordered, (count - 1) // 2), at_rank(ordered, count // 2)
+    return np.asarray((lower + upper) / np.float32(2), np.float32)
+
+
+def count_of_seen(values: npt.NDArray[np.float32]) -> npt.NDArray[np.intp]:
+    """Return how many values along the first axis are seen."""
+    return np.asarray(np.count_nonzero(~np.isnan(values), axis=0))
+
+
+def at_rank(ordered: npt.NDArray[np.float32], rank: npt.NDArray[np.intp]) -> npt.NDArray[np.float32]:
+    """Return the value of a rank of each pixel, from 0, of values that are ordered along the first axis."""
+    return np.asarray(np.take_along_axis(ordered, rank[None], 0)[0])

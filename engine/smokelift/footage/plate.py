@@ -28,6 +28,13 @@ CLIPPED_LEVEL = np.float32(0.1)
 it depends on how the file rounds."""
 
 
+NOISE_FRAMES = 32
+"""Frames on which the noise before a known background is measured: a median needs no more."""
+
+NO_NOISE = lasting_noise(0.0)
+"""Noise of a plate before it is measured."""
+
+
 @dataclass(frozen=True, eq=False)
 class Plate:
     """What the camera sees without smoke.
@@ -72,38 +79,25 @@ class ChangingPlate:
 
     Attributes
     ----------
-    whole
-        Makes that of a whole frame of the footage, counted from 0.
+    of
+        Makes that of a frame of the footage, counted from 0, but for its noise; raises ClipError if it cannot.
     noise
         Of the footage.
     files
         What it is read from.
-    cuts
-        What makes the part of the picture that is asked for, with the pixels of which each new one is the mean, applied
-        in this order.
     """
 
-    whole: Callable[[int], Plate]
+    of: Callable[[int], Plate]
     noise: Noise
     files: tuple[Path, ...] = ()
-    cuts: tuple[tuple[Callable[[Picture], Picture], float], ...] = ()
 
     def at(self, frame: int) -> Plate:
-        """Return the plate of a frame of the footage, counted from 0.
-
-        Raises
-        ------
-        ClipError
-            If its picture cannot be read.
-        """
-        plate = replace(self.whole(frame), noise=self.noise)
-        for cut, pixels in self.cuts:
-            plate = plate.through(cut, pixels)
-        return plate
+        """Return the plate of a frame of the footage, counted from 0."""
+        return replace(self.of(frame), noise=self.noise)
 
     def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> ChangingPlate:
         """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
-        return replace(self, cuts=(*self.cuts, (cut, pixels)))
+        return ChangingPlate(lambda frame: self.of(frame).through(cut), self.noise.averaged(pixels), self.files)
 
 
 class Plates(Protocol):
@@ -120,7 +114,7 @@ class Plates(Protocol):
         """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
 
 
-def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -> Plate:
+def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
     """Return the plate of a background that is known, with the clip's noise.
 
     Noise that is clipped at black makes a black background brighter on the mean: the plate is as bright.
@@ -131,8 +125,6 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
         A linear colour, shape (3,), or a picture, shape (rows, columns, 3), resized to the clip if need be.
     clip
         For its size and its noise.
-    sample_count
-        Frames that the noise is measured on.
 
     Raises
     ------
@@ -147,21 +139,18 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
         linear = np.broadcast_to(linear, (height, width, 3))
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
-    image = area_average(linear, width, height)
-    confidence = np.ones((height, width), np.float32)
-    deviations, blocks = _deviations(Plate(image, confidence, lasting_noise(0.0)), clip, sample_count)
-    given = linear_to_srgb(image)
+    plate = Plate(area_average(linear, width, height), np.ones((height, width), np.float32), NO_NOISE)
+    deviations, blocks = _deviations(plate, clip)
+    given = linear_to_srgb(plate.image)
     raised = np.maximum(given, clipped_black(deviations, blocks)) - given
-    if raised.any():
-        image = srgb_to_linear(given + raised)
-        deviations, blocks = deviations - some_blocks(raised), blocks - block_means(raised[None])
-    noise = noise_about(deviations, blocks)
-    if raised.any():
-        noise = Noise(noise.white, np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white))
-    return Plate(image, confidence, noise)
+    if not raised.any():
+        return replace(plate, noise=noise_about(deviations, blocks))
+    noise = noise_about(deviations - some_blocks(raised), blocks - block_means(raised[None]))
+    lasting = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
+    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting))
 
 
-def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> ChangingPlate:
+def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
     """Return the plates of a background that is known frame by frame, with the clip's noise.
 
     Parameters
@@ -170,8 +159,6 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
         With a frame for every one of the clip's file, resized to the clip if need be.
     clip
         Its noise is what differs from the plates.
-    sample_count
-        Frames that the noise is measured on.
 
     Raises
     ------
@@ -180,29 +167,25 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
     ClipError
         If a frame cannot be read.
     """
-    last = clip.first + len(clip) - 1
+    last, (width, height) = clip.first + len(clip) - 1, clip.size
     if last >= len(plates):
         raise ValueError(
             f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
             "picture for every frame of the clip, or a color, as background."
         )
-    width, height = clip.size
-    known, no_noise = np.ones((height, width), np.float32), lasting_noise(0.0)
+    known = np.ones((height, width), np.float32)
 
-    def whole(frame: int) -> Plate:
-        return Plate(area_average(plates.frame(clip.first + frame), width, height), known, no_noise)
+    def of(frame: int) -> Plate:
+        return Plate(area_average(plates.frame(clip.first + frame), width, height), known, NO_NOISE)
 
-    silent = ChangingPlate(whole, no_noise, plates.files)
-    return replace(silent, noise=noise_about(*_deviations(silent, clip, sample_count)))
+    silent = ChangingPlate(of, NO_NOISE, plates.files)
+    return replace(silent, noise=noise_about(*_deviations(silent, clip)))
 
 
-def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Picture]:
-    """How a clip differs from backgrounds that are known, as `noise_about` takes it.
-
-    What a mask hides is not a number.
-    """
+def _deviations(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
+    """How a clip differs from backgrounds that are known, as `noise_about` takes it; NaN where a mask hides it."""
     single, blocks = [], []
-    for number in clip.spread(count):
+    for number in clip.spread(NOISE_FRAMES):
         behind, frame = plates.at(number).image, clip.as_seen(number, clip.frame(number))
         gains = gain_of(small(frame), small(behind))
         deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
@@ -212,18 +195,8 @@ def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Pictur
 
 
 def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
-    """Return the noise of each pixel of a picture in linear light, where it grows with brightness.
+    """Return the standard deviation of the noise of each pixel of a linear picture (rows, columns, 3), linear.
 
-    Parameters
-    ----------
-    picture : (rows, columns, 3)
-        Linear.
-    plate
-        For its noise, which is even in sRGB values.
-
-    Returns
-    -------
-    (rows, columns, 3) float32
-        Standard deviation.
+    The noise of the plate is even in sRGB values, so that it grows with brightness.
     """
     return plate.noise.total * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.exposure import gain_of, sample_gains, small
-from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb
+from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb, reduced_size
 
 PROXY_SIDE = 480
 """Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred
@@ -60,22 +60,17 @@ class Proxy:
 
     @staticmethod
     def of(clip: Clip) -> Proxy:
-        """Read the frames of a clip's file.
-
-        Raises
-        ------
-        ClipError
-            If a frame of the clip cannot be read.
-        """
+        """Read the frames of a clip's file; ClipError is raised if one of the clip's own cannot be read."""
         first, last = clip.first, clip.first + len(clip) - 1
-        (columns, rows), whole = proxy_size(*clip.size), clip.whole()
+        (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
         pictures, seen = {}, []
-        for number in proxy_frames(clip):
+        own = {first + number for number in clip.spread(OF_CLIP)}
+        for number in sorted(own | set(whole.spread(OF_FILE))):
             inside = first <= number <= last
-            of, own = (clip, number - first) if inside else (whole, number)
+            of, n = (clip, number - first) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
-                pictures[number] = of.stored(own).averaged(columns, rows)
-                shown = of.seen(own, columns, rows)
+                pictures[number] = of.stored(n).averaged(columns, rows)
+                shown = of.seen(n, columns, rows)
                 seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
         scale = max(clip.size) / max(columns, rows)
         return Proxy(tuple(pictures), (first, last), np.stack(list(pictures.values())), np.stack(seen), scale)
@@ -97,19 +92,14 @@ class Proxy:
         """Return the frames that belong to a clip's shot, and the frames of the file before and after a cut in it.
 
         At a cut most of the picture changes at once and for good, and little does before and after it.
-
-        Raises
-        ------
-        ClipError
-            If a frame cannot be read.
         """
         tiny = [small(picture) for picture in self.pictures]
         shares = [_alike(one, other) for one, other in pairwise(tiny)]
         first, last, within = self.numbers[0], self.numbers[-1], None
         for n in range(len(shares)):
-            beside = min(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
-            if n in (0, len(shares) - 1):
-                beside = max(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
+            # its own neighbour at either end of the file is itself
+            least = max if n in (0, len(shares) - 1) else min
+            beside = least(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
             if shares[n] >= SAME_SHOT or beside < STEADY:
                 continue
             if _alike(*(np.median(side, axis=0) for side in (tiny[: n + 1], tiny[n + 1 :]))) >= SAME_SHOT:
@@ -135,18 +125,6 @@ class Proxy:
         if (gains == 1).all():
             return self, gains
         return replace(self, pictures=self.pictures / gains[:, None, None, :]), gains
-
-
-def proxy_size(width: int, height: int) -> tuple[int, int]:
-    """Return width and height of the pictures of a proxy."""
-    scale = max(1.0, max(width, height) / PROXY_SIDE)
-    return max(1, round(width / scale)), max(1, round(height / scale))
-
-
-def proxy_frames(clip: Clip) -> list[int]:
-    """Return the numbers in its file of the frames of a clip that its proxy reads, ascending."""
-    own = {clip.first + number for number in clip.spread(OF_CLIP)}
-    return sorted(own | set(clip.whole().spread(OF_FILE)))
 
 
 def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> tuple[int, int]:

@@ -23,17 +23,7 @@ UNCOVERED = 5
 
 
 def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
-    """Return a clip whose frames are all exposed as their backgrounds are.
-
-    Parameters
-    ----------
-    clip
-        The footage. It is read when the frames of the result are.
-    plates
-        Its backgrounds.
-    known
-        Gains (3,) of frames that are measured already, by their numbers.
-    """
+    """Return a clip whose frames are all exposed as their backgrounds are; ``known`` are gains (3,) by frame."""
     gains_of = exposures(plates)
 
     def gains(number: int, shown: Callable[[], Picture]) -> Picture:
@@ -50,13 +40,6 @@ def without_noise_light(clip: Clip, noise: Noise) -> Clip:
 
     A clip that is brightened by less than rounding to 8 bits may do is returned as it is. Before black too little is
     taken off: the noise is measured where there is no smoke, and there it is clipped.
-
-    Parameters
-    ----------
-    clip
-        The footage. It is read when the frames of the result are.
-    noise
-        Of its pixels.
     """
     if (linear_excess(MIDDLE, noise.total) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
         return clip
@@ -68,15 +51,7 @@ def without_noise_light(clip: Clip, noise: Noise) -> Clip:
 
 
 def cleared(clip: Clip, plates: Plates) -> Clip:
-    """Return a clip that shows its background, as it is exposed, wherever a mask hides a frame.
-
-    Parameters
-    ----------
-    clip
-        The footage. It is read when the frames of the result are.
-    plates
-        Its backgrounds.
-    """
+    """Return a clip that shows its background, as it is exposed, wherever a mask hides a frame."""
     if clip.mask is None:
         return clip
     gains_of = exposures(plates)
@@ -93,18 +68,6 @@ def uncovered(plates: Plates, clip: Clip) -> Plates:
     """Return backgrounds that show what a clip shows where a mask hides all of it, if nothing else tells what is there.
 
     It is no smoke, so it may stand behind the result.
-
-    Parameters
-    ----------
-    plates
-        As they are known or estimated.
-    clip
-        The footage.
-
-    Raises
-    ------
-    ClipError
-        If a frame cannot be read.
     """
     if clip.mask is None or not isinstance(plates, Plate):
         return plates

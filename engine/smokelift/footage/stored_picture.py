@@ -62,16 +62,9 @@ class StoredPicture:
         return _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
 
     def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
-        """Add the linear picture, times weights of its parts, to sums.
+        """Add the linear picture, times weights (m, n, 3) of its parts, to sums (rows, columns, 3).
 
-        Parameters
-        ----------
-        weights : (m, n, 3)
-            Of the parts.
-        edges : (m + 1,), (n + 1,)
-            Row, and column, where each part begins, and where the last ends.
-        sums : (rows, columns, 3)
-            Changed.
+        The edges (m + 1,) and (n + 1,) are the row, and the column, where each part begins, and where the last ends.
         """
         if self.table is None or self.values.dtype != np.uint8:
             rows, columns = (np.diff(each) for each in edges)
@@ -83,14 +76,7 @@ class StoredPicture:
 def chequered_averages(picture: StoredPicture, width: int, height: int, first: int) -> tuple[Picture, Picture]:
     """Resize a picture twice: by the pixels of either colour of a chequerboard, as `area_average` does by all of them.
 
-    Parameters
-    ----------
-    picture
-        As it is stored.
-    width, height
-        The new size in pixels.
-    first
-        0 if the pixel at the top left belongs to the first of the two pictures, 1 if to the second.
+    ``first`` is 0 if the pixel at the top left belongs to the first of the two pictures, 1 if to the second.
     """
     columns, rows = picture.size
     sums, shares = [], []

@@ -17,6 +17,7 @@ import bisect
 from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +45,7 @@ from smokelift.footage.frame_source import (
 )
 from smokelift.footage.images import (
     MAX_PIXELS,
-    Picture,
     Transfer,
-    area_average,
     code_values,
     decode_alpha,
     decode_integers,
@@ -253,11 +252,7 @@ class Video:
     def read(self, n: int) -> StoredPicture:
         """Return a frame, or raise `DamagedFrameError`."""
         frame = self._decode(self._shown[n])
-        if (
-            _has_alpha(frame)
-            or frame.interlaced_frame
-            or primaries_name(self._stream.codec_context.color_primaries) is not None
-        ):
+        if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
             return StoredPicture(shown_before(self._layer(frame), self.backdrop))
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
@@ -295,12 +290,21 @@ class Video:
 
     def _decode(self, index: int) -> av.VideoFrame:
         """Return the decoded frame at an index into ``_times``."""
+        frame = None
         if not self._keys:
-            return self._decode_by_count(index)
-        if index in self._lost:
+            frame = self._count_to(index)
+        elif index not in self._lost:
+            frame = self._seek(index)
+        if frame is None:
+            self._rewind()
+            self._lost.add(index)
             raise DamagedFrameError(
                 f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
             )
+        self._next = index + 1
+        return frame
+
+    def _seek(self, index: int) -> av.VideoFrame | None:
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
         key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
@@ -312,13 +316,6 @@ class Video:
             # A seek may land late (open groups of pictures); from the start nothing can be missed.
             self._rewind()
             frame = self._forward_to(wanted)
-        if frame is None:
-            self._rewind()
-            self._lost.add(index)
-            raise DamagedFrameError(
-                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
-            )
-        self._next = index + 1
         return frame
 
     def _forward_to(self, wanted: int) -> av.VideoFrame | None:
@@ -327,15 +324,10 @@ class Video:
                 return frame if frame.pts == wanted and not frame.is_corrupt else None
         return None
 
-    def _decode_by_count(self, index: int) -> av.VideoFrame:
+    def _count_to(self, index: int) -> av.VideoFrame | None:
         if index < self._next:
             self._rewind()
-        for frame in self._decoded:
-            self._next += 1
-            if self._next == index + 1:
-                return frame
-        self._rewind()
-        raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again")
+        return next(islice(self._decoded, index - self._next, None), None)
 
     def _pixel_shape(self) -> Fraction:
         """Return how many times as wide as high a pixel is, as stored."""
@@ -368,7 +360,7 @@ class Video:
         return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
 
     def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
-        """RGB, and alpha if there is any, in codes; of an interlaced frame the even lines."""
+        """RGB, and alpha if there is any, in codes."""
         wide = max(component.bits for component in frame.format.components) > 8
         alpha = _has_alpha(frame)
         # FFmpeg writes planes three times as fast as it writes pixels, of the same codes
@@ -381,12 +373,11 @@ class Video:
                 "export it in one size"
             )
         width, height = self._size()
-        interlaced = bool(frame.interlaced_frame)
-        shown = self._field(frame) if interlaced else frame
+        if frame.interlaced_frame:
+            self._interlaced, frame = True, self._of_one_moment(frame)
         way = _SHRINKING if width < size[0] else _GROWING
-        rows = shown.height if interlaced else height
         # in this thread: after a fork of a process that has read a video, the converter waits for its own for ever
-        converted = shown.reformat(width, rows, "gbrp" if planes else layout, interpolation=way, threads=1)
+        converted = frame.reformat(width, height, "gbrp" if planes else layout, interpolation=way, threads=1)
         if planes:
             green, blue, red = (_lines(plane) for plane in converted.planes)
             return _core.interleave((red, green, blue))
@@ -397,23 +388,19 @@ class Video:
         codes, white = self._codes(frame), _white(frame)
         linear = decode_integers(codes, self._encoding(), white, self._premultiplied)
         opacity = decode_alpha(codes, white)
-        if frame.interlaced_frame:
-            self._interlaced = True
-            width, height = self._size()
-            linear = area_average(_between_lines(linear, frame.height), width, height)
-            if opacity is not None:
-                opacity = area_average(_between_lines(opacity, frame.height), width, height)
         picture = to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
         return picture, None if opacity is None else _upright(opacity, frame)
 
-    def _field(self, frame: av.VideoFrame) -> av.VideoFrame:
-        """Return the even lines of a frame: their colours too are of one moment."""
+    def _of_one_moment(self, frame: av.VideoFrame) -> av.VideoFrame:
+        """The even lines of an interlaced frame, with others between them."""
         graph = Graph()
-        graph.link_nodes(graph.add_buffer(self._stream), graph.add("field", "type=top"), graph.add("buffersink"))
+        nodes = graph.add_buffer(self._stream), graph.add("estdif", "mode=frame:parity=tff"), graph.add("buffersink")
+        graph.link_nodes(*nodes)
         graph.configure()
         graph.vpush(frame)
-        field: av.VideoFrame = graph.vpull()
-        return field
+        graph.vpush(None)
+        whole: av.VideoFrame = graph.vpull()
+        return whole
 
 
 def _has_alpha(frame: av.VideoFrame) -> bool:
@@ -434,14 +421,6 @@ def _white(frame: av.VideoFrame) -> float:
     grey = len(frame.format.components) < 3  # read as of full range, whatever it says
     limited = frame.color_range != ColorRange.JPEG and not grey
     return 255 / 256 if limited else (2**bits - 1) * 2 ** (16 - bits) / 65535
-
-
-def _between_lines(even: Picture, rows: int) -> Picture:
-    """Return the whole picture of its even rows: each other row is the mean of its neighbours."""
-    picture = np.repeat(even, 2, axis=0)[:rows]
-    odd = picture[1:-1:2]
-    odd += 0.5 * (picture[2::2] - odd)
-    return picture
 
 
 def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]:

@@ -29,21 +29,8 @@ DETAIL_MARGIN = 16
 def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -> Picture:
     """Return a linear background (rows, columns, 3) of full size.
 
-    Parameters
-    ----------
-    clip
-        The footage.
-    proxy
-        Its frames, as they are exposed.
-    gains : (frames, 3)
-        By how much each is brighter than the background.
-    found
-        The background of the proxy.
-
-    Raises
-    ------
-    ClipError
-        If a frame cannot be read.
+    It is made of the frames of the clip's proxy, as they are exposed; each is brighter by its gain (3,) than the
+    background that was found of the proxy.
     """
     if found.image.shape[1::-1] == clip.size:
         return found.image

@@ -63,12 +63,8 @@ def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
     """Return the picture that a grid is fitted to.
 
     A pixel is as wide as a voxel at the domain's centre, unless the footage is coarser: finer pixels hold detail that
-    the grid cannot show, and coarser ones lose detail that it can.
-
-    Raises
-    ------
-    CameraError
-        If no part of the domain is in the picture.
+    the grid cannot show, and coarser ones lose detail that it can. CameraError is raised if no part of the domain is in
+    the picture.
     """
     corners = domain.corners()
     pixels, depth = project_points(camera, corners)

@@ -39,7 +39,7 @@ def test_frames_whose_exposure_is_known_are_not_examined(tmp_path: Path, monkeyp
     clip = film(tmp_path, truth, puff, 0.6)
     known = {2: np.ones(3, np.float32), 3: np.full(3, 2, np.float32)}
     even = steady(clip, known_plate(truth, clip), known)
-    monkeypatch.setattr("smokelift.footage.clip.small_size", lambda *_: pytest.fail("examined"))
+    monkeypatch.setattr("smokelift.footage.clip.reduced_size", lambda *_: pytest.fail("examined"))
     assert np.array_equal(even.frame(2), clip.frame(2))
     assert np.array_equal(even.frame(3), clip.frame(3) / 2)
     with pytest.raises(pytest.fail.Exception):
