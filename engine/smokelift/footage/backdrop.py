@@ -26,7 +26,6 @@ from smokelift.footage.noise import (
     Noise,
     lasting_noise,
     noise_of,
-    some_blocks,
     spread_about,
     white_noise,
 )
@@ -167,12 +166,12 @@ def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
     proxy = Proxy.of(clip)
-    white = _white_noise(clip, proxy)
+    white = _white_noise(proxy)
     quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
     if quiet is not clip:
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
-    even, gains = part.evened()
+    even, gains = part.evened
     found = rank(even, white)
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
@@ -212,9 +211,9 @@ def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, *, masked: bool) -> Plate:
     """The plate of the picture that the clear frames show; ``masked`` is that of `clear_picture`."""
-    even, gains = proxy.evened()
+    even, gains = proxy.evened
     noise = _noise(even, median_of_seen(even.pictures), white)
-    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale, masked)
+    picture = clear_picture(even, noise.averaged(even.scale**2), DETAIL / even.scale, masked)
     return Plate(
         whole_plate(clip, proxy, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),
@@ -245,16 +244,16 @@ def _of_one_colour(
     return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)
 
 
-def _white_noise(clip: Clip, proxy: Proxy) -> Picture:
+def _white_noise(proxy: Proxy) -> Picture:
     """The white noise (3,) of a clip's pixels, at one exposure."""
-    own = np.flatnonzero([clip.first <= number < clip.first + len(clip) for number in proxy.numbers])
+    own = np.flatnonzero([number in proxy.blocks for number in proxy.numbers])
     part = proxy.only(own[np.unique(np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int))])
-    _, gains = part.evened()
+    _, gains = part.evened
     blocks = []
     for number, gain in zip(part.numbers, gains, strict=True):
-        n = number - clip.first
-        picture = clip.stored(n).through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(clip.frame(n) / gain)
-        blocks.append(some_blocks(clip.as_seen(n, picture)))
+        part_of, seen = proxy.blocks[number]
+        even = part_of.through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(part_of.linear() / gain)
+        blocks.append(even if seen is None else np.where(seen[..., None], even, np.float32(np.nan)))
     return white_noise(np.stack(blocks))
 
 

@@ -34,6 +34,7 @@ from smokelift.footage.behind_smoke import (
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import Noise, peak_spread
+from smokelift.footage.proxy import Proxy
 from smokelift.footage.seen import at_rank, count_of_seen, median_of_seen
 
 WINDOW = 6.0
@@ -106,15 +107,13 @@ class _Smoke:
     brightens: Mask
 
 
-def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, masked: bool) -> ClearPicture:
+def clear_picture(proxy: Proxy, noise: Noise, detail: float, masked: bool) -> ClearPicture:
     """Return the background of pictures.
 
     Parameters
     ----------
-    pictures : (frames, rows, columns, 3)
-        Linear, of one exposure.
-    seen : (frames, rows, columns) bool
-        Which pixels each of them shows.
+    proxy
+        The pictures, of one exposure.
     noise
         Of them.
     detail
@@ -123,7 +122,8 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
         Whether what no picture shows is hidden by a mask: then it is unknown. Else it lies beyond all of them.
     """
     width = smoothing(noise)
-    grey = np.stack([blurred(channel_mean(linear_to_srgb(picture)), width) for picture in pictures])
+    pictures, seen = proxy.pictures, proxy.seen
+    grey = np.stack([blurred(channel_mean(encoded), width) for encoded in proxy.encoded])
     grey[~seen] = np.nan
     some = np.ascontiguousarray(grey[:, ::STRIDE, ::STRIDE])
     window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
@@ -141,7 +141,7 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
             pictures[:, band], grey[:, band], window, smoke.similarity
         )
     sure, known = _known(image, known, calm, clear | ~seen, brightens, window)
-    mean = sum(linear_to_srgb(picture) * shown[..., None] for picture, shown in zip(pictures, seen, strict=True))
+    mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
     never = ~seen.any(0)
     if never.any():

@@ -52,7 +52,7 @@ class KeptFrames:
 
     def damaged(self, first: int, last: int, visit: Visitor | None = None) -> tuple[int, ...]:
         def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
-            if n in self._expected and n not in self._kept:
+            if n in self._expected:
                 self._decoded[n] = picture
             if visit is not None:
                 visit(n, picture)

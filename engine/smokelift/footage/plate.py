@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
@@ -22,6 +23,9 @@ from smokelift.footage.noise import (
     noise_about,
     some_blocks,
 )
+
+NOISE_FRAMES = 32
+"""Frames that the noise before a known background is measured on."""
 
 CLIPPED_LEVEL = np.float32(0.1)
 """Lasting part of white noise that is clipped at black: so little is known of the mean that is left, since
@@ -120,7 +124,7 @@ class Plates(Protocol):
         """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
 
 
-def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -> Plate:
+def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = NOISE_FRAMES) -> Plate:
     """Return the plate of a background that is known, with the clip's noise.
 
     Noise that is clipped at black makes a black background brighter on the mean: the plate is as bright.
@@ -161,7 +165,7 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
     return Plate(image, confidence, noise)
 
 
-def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> ChangingPlate:
+def changing_plate(plates: Clip, clip: Clip, sample_count: int = NOISE_FRAMES) -> ChangingPlate:
     """Return the plates of a background that is known frame by frame, with the clip's noise.
 
     Parameters
@@ -196,7 +200,7 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
     return replace(silent, noise=noise_before(silent, clip, sample_count))
 
 
-def noise_before(plates: Plates, clip: Clip, sample_count: int = 32) -> Noise:
+def noise_before(plates: Plates, clip: Clip, sample_count: int = NOISE_FRAMES) -> Noise:
     """Return the noise of a clip before backgrounds that are known, from so many of its frames."""
     return noise_about(*_deviations(plates, clip, sample_count))
 
@@ -207,10 +211,13 @@ def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Pictur
     What a mask hides is not a number.
     """
     single, blocks = [], []
+    encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # of a camera that stands still, once
     for number in clip.spread(count):
-        behind, frame = plates.at(number).image, clip.as_seen(number, clip.frame(number))
-        gains = gain_of(small(frame), small(behind))
-        deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
+        plate, stored = plates.at(number), clip.stored(number)
+        seen = clip.as_seen(number, stored.linear())
+        gains = gain_of(small(seen), small(plate.image))
+        even = stored.through(linear_to_srgb) if (gains == 1).all() else linear_to_srgb(seen / gains)
+        deviation = clip.as_seen(number, even) - encoded(plate)
         single.append(some_blocks(deviation))
         blocks.append(block_means(deviation[None])[0])
     return np.stack(single), np.stack(blocks)

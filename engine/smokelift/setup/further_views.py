@@ -11,6 +11,7 @@ from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip, is_video
+from smokelift.footage.plate import NOISE_FRAMES
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import ClipSource, CompleteScene
@@ -61,13 +62,15 @@ def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, 
     background = view.background
     if background is None and scene.background.color is not None:
         background = scene.background
+    opened.expect(opened.spread(NOISE_FRAMES))
+    defects = opened.remarks()
     found = find_backdrop(opened, camera, background)
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
     last = opened.first + len(opened) - 1
     which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
     remarks = [
-        *opened.remarks(),
+        *defects,
         Remark("further view", which),
         *backdrop_remarks(found),
         *exposure_remarks(exposure_change(found.clip, found.plates)),

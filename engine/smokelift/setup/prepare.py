@@ -11,6 +11,7 @@ from dataclasses import replace
 from smokelift.checks import Remark, counted, require_kind
 from smokelift.density.axis import depth_at
 from smokelift.footage.clip import Clip
+from smokelift.footage.plate import NOISE_FRAMES
 from smokelift.footage.proxy import proxy_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
@@ -152,10 +153,13 @@ def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
 
 def _expect(clip: Clip, scene: Scene) -> None:
     """Say which frames are examined, so that each of them is decoded once."""
-    examined, estimates = clip.spread(SAMPLE_FRAMES), scene.background is None
-    # a velocity needs the frame after one with smoke, and a background more frames than the smoke
-    others = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect([*examined, *sorted(n for n in others.difference(examined) if n >= 0)])
+    examined = clip.spread(SAMPLE_FRAMES)
+    # a velocity needs the frame after one with smoke, or before the last; turns are found from the middle one
+    alone = sorted({n + 1 for n in examined} | {len(clip) - 2, len(clip) // 2})
+    # a background needs more frames than the smoke; those that do not fit are read in a row
+    given = scene.background is not None
+    in_a_row = clip.spread(NOISE_FRAMES) if given else [n - clip.first for n in proxy_frames(clip)]
+    clip.expect(dict.fromkeys(n for n in (*examined, *alone, *in_a_row) if n >= 0))
 
 
 def _further_views(
