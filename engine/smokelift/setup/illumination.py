@@ -198,8 +198,8 @@ def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], sett
     return Illumination(sky.lights(), "single", "measured", False, (), light.thickness, direction)
 
 
-def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
-    """What light is taken for one that is not given, and whether it is likely wrong.
+def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise, *, burns: bool) -> tuple[Remark, ...]:
+    """What light is taken for one that is not given, and whether it is likely wrong; ``burns`` says if fire does.
 
     Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
     the light leaves unexplained is its own fault.
@@ -222,7 +222,7 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
     if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
         return (taken,)
-    return taken, Doubt("likely wrong light", {"error": error})
+    return taken, Doubt("light of fire" if burns else "likely wrong light", {"error": error})
 
 
 def _with_directions(

@@ -93,7 +93,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
             *estimate.remarks,
             *geometry.remarks,
             *taken,
-            *light_remarks(light, samples, plates.noise),
+            *light_remarks(light, samples, plates.noise, burns=estimate.fire is not None),
             *said,
         ),
         estimates=(

@@ -47,6 +47,8 @@ class SmokeSamples:
         By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
     textures
         What the samples with smoke show of the texture behind it.
+    amounts
+        Numbers of smoke pixels of the samples that have any, in their order in ``colours``.
     """
 
     scale: float
@@ -58,6 +60,7 @@ class SmokeSamples:
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
     textures: tuple[NDArray[np.float64], ...] = ()
+    amounts: tuple[int, ...] = ()
 
     @property
     def exposure(self) -> float:
@@ -114,4 +117,6 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
     left, top = corner
     bounds = (float(left), float(top), float(left + width), float(top + height))
     radiance = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures))
+    return SmokeSamples(
+        scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures), tuple(amounts.values())
+    )

@@ -109,21 +109,33 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
 
 
 def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
-    """Return a doubt about smoke of more than one colour before black.
+    """Return a doubt about smoke of more than one colour before black, at a time or one after the other.
 
     Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
     explains the most of the light is another colour's. White that is clipped has none.
     """
-    shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
+    usable = samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE
+    shown = samples.colours[usable].astype(np.float64)
     if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
         return ()
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
         return ()
-    along = np.linalg.eigvalsh(shown.T @ shown)
-    off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
+    off = _off_one_colour(shown)
     if off < COLOURED:
         return ()
-    return (Doubt("smoke of several colours", {"degrees": off}),)
+    ends = np.cumsum(samples.amounts, dtype=np.intp)[:-1]
+    frames = [
+        part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colours, usable)), strict=True)
+    ]
+    apart = [_off_one_colour(frame.astype(np.float64)) for frame in frames if len(frame) >= PIXELS]
+    kind = "smoke that changes its colour" if apart and np.median(apart) < COLOURED else "smoke of several colours"
+    return (Doubt(kind, {"degrees": off}),)
+
+
+def _off_one_colour(colours: Doubles) -> float:
+    """Degrees by which light (n, 3) is off the one colour that explains the most of it, as root mean square."""
+    along = np.linalg.eigvalsh(colours.T @ colours)
+    return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
 
 
 def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:

@@ -115,6 +115,17 @@ def test_smoke_of_more_than_one_colour_is_said():
     assert said.kind == "smoke of several colours"
 
 
+def test_a_colour_that_changes_over_time_asks_for_other_frames():
+    """Of one colour in each frame, and of another in the next: no crop and no mask helps there."""
+    seen = two_kinds(RED, np.array((0.2, 0.3, 1.0)))
+    half = len(seen.colours) // 2
+    (said,) = several_colours(replace(seen, amounts=(half, half)))
+    assert said.kind == "smoke that changes its colour"
+    mixed = np.random.default_rng(3).permutation(len(seen.colours))
+    (said,) = several_colours(replace(seen, colours=seen.colours[mixed], amounts=(half, half)))
+    assert said.kind == "smoke of several colours"
+
+
 @pytest.mark.parametrize(
     ("one", "other", "behind"),
     [
