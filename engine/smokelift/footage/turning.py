@@ -164,9 +164,9 @@ class Key:
     def compare(self, detail: Picture, turn: Rotation) -> Laid:
         """Compare a picture, given by `detail_of`, with this one, when the camera turned so from one to the other."""
         rows, columns = self._shape
-        y, x = np.mgrid[:rows, :columns] + 0.5
+        x, y = np.arange(columns) + 0.5, np.arange(rows)[:, None] + 0.5
         matrix = self._lens @ turn.as_matrix() @ np.linalg.inv(self._lens)
-        across, down, ahead = np.tensordot(matrix, [x, y, np.ones_like(x)], 1)
+        across, down, ahead = (a * x + (b * y + c) for a, b, c in matrix)
         across, down = across / ahead, down / ahead
         inside = (across > 1) & (across < columns - 1) & (down > 1) & (down < rows - 1) & (ahead > 0)
         seen = ndimage.map_coordinates(detail, [down - 0.5, across - 0.5], order=1, mode="nearest") * inside
@@ -272,8 +272,10 @@ def find_turns(clip: Clip, *lenses: Doubles) -> Turns | None:
             mean = rotations.mean().inv()
             found = Turns(clip.size, lens, mean * rotations, key, mean)
             return found if moving >= MOVING_FRAMES * len(clip) and found.farthest >= MIN_OFFSET else None
-    # in a few frames, or a part of them, smoke alone moves so
-    if keys[0].textured.mean() < TEXTURE_EVERYWHERE or sum(lost) < max(MIN_LOST, len(lost) / 2):
+        # in a few frames, or a part of them, smoke alone moves so; a cell is found again whatever the lens
+        if sum(lost) < max(MIN_LOST, len(lost) / 2):
+            return None
+    if keys[0].textured.mean() < TEXTURE_EVERYWHERE:
         return None
     raise ValueError(
         "The picture moves as if the camera travels or zooms, which cannot be steadied. Track it in Blender, and give "
@@ -290,11 +292,11 @@ def _followed(clip: Clip, key: Key, size: tuple[int, int]) -> tuple[dict[int, Ro
         turn, before = still, len(lost)
         for number in numbers:
             detail = detail_of(clip.stored(number).averaged(*size))
-            laid, stands = key.lay(detail, turn), key.compare(detail, still).stands
+            laid = key.lay(detail, turn)
             if laid.explained:
-                turn, moving = laid.turn, moving + (not stands)
+                turn, moving = laid.turn, moving + (not key.compare(detail, still).stands)
             else:
-                lost.append(laid.found >= REFOUND and not stands)
+                lost.append(laid.found >= REFOUND and not key.compare(detail, still).stands)
             turns[number] = turn
             if len(lost) - before == LOST:
                 break
