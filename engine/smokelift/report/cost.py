@@ -2,8 +2,8 @@
 
 It follows the voxels of the box, and more so those that may hold smoke. The time of frames is counted in Poisson solves
 by cosine transforms, as long as one takes a voxel on this machine. What comes before the frames is not modelled: a
-forecast prepares the shot as the run does, and that takes as long again, however the camera moves; and how long it
-waited for the processor is how busy the machine is. All constants: docs/experiments/memory-and-time.md.
+forecast prepares the shot as the run does, and that takes as long and as much memory again, however the camera moves;
+and how long it waited for the processor is how busy the machine is. All constants: docs/experiments/memory-and-time.md.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -108,7 +109,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Spent:
-    """The time that preparing a shot took.
+    """What preparing a shot took.
 
     Attributes
     ----------
@@ -116,10 +117,13 @@ class Spent:
         That passed.
     processor
         Seconds of all cores together.
+    memory
+        Bytes at the peak: of a large clip on a small grid as many as the run takes. None where that is not known.
     """
 
     seconds: float
     processor: float
+    memory: int | None = None
 
     @property
     def wait(self) -> float:
@@ -132,7 +136,7 @@ def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Co
     frames = START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
     return Cost(
         seconds=prepared.seconds + prepared.wait * frames,
-        memory=memory_needed(resolution, work),
+        memory=max(memory_needed(resolution, work), prepared.memory or 0),
         memory_free=memory_free(),
         disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_A_SMOKY_VOXEL_ON_DISK),
     )
@@ -169,6 +173,18 @@ def affordable_room(resolution: Resolution) -> float:
 def memory_free() -> int:
     """Return the bytes that programs may still take."""
     return int(psutil.virtual_memory().available)
+
+
+def peak_memory() -> int | None:
+    """Return the peak of this process's memory in bytes; None where the system does not say.
+
+    The maximum of `getrusage` would not do: in a child process it starts at the parent's.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError):
+        return None
+    return next((1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")), None)
 
 
 def require_memory(resolution: Resolution, work: Workload, *, given: bool = True) -> None:

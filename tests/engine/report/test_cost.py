@@ -151,6 +151,14 @@ def test_preparing_takes_as_long_again(monkeypatch) -> None:
     assert both_cores == pytest.approx(quick), "a core that is free speeds up the timed solve as well"
 
 
+def test_a_run_takes_the_memory_that_preparing_took(monkeypatch) -> None:
+    monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
+    small, large = (
+        estimate_cost(SIZES["cube"], WORK, replace(PREPARED, memory=peak)).memory for peak in (2**20, 2**40)
+    )
+    assert (small, large) == (memory_needed(SIZES["cube"], WORK), 2**40)
+
+
 def test_time_without_detail_and_of_the_papers_method(monkeypatch) -> None:
     monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
     paper = replace(SMOOTH, settings=Settings.preset(method="paper"), largest=1.0, mean=1.0)

@@ -15,7 +15,7 @@ from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
-from smokelift.report.cost import Spent, estimate_cost
+from smokelift.report.cost import Spent, estimate_cost, peak_memory
 from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, Fact, write_page
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         for remark in remarks:
             say.note(remark)
         work = Workload.of(shot, settings)
-        prepared = Spent(time.perf_counter() - passed, time.process_time() - worked)
+        prepared = Spent(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
         cost = estimate_cost(domain.resolution, work, prepared)
         known = facts(shot, scene, cost)
         files = list(options.page)
