@@ -77,7 +77,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     others, gains, said = _further_views(first, complete, estimate, settings, bool(scene.lights))
     if frames and estimate.fire is None:
         light = sunlight(light, CoarseClip((first, *others), complete), tried, settings)
-        if light.sunny:  # gains stay: in its light they are found within .01 of those (docs/experiments/view-gain.md)
+        if light.sunny:  # gains stay: of real sets none has shown a sun (docs/experiments/view-gain.md)
             light = measured_light(light, coarse, frames, settings)
         complete = replace(complete, lights=light.lights, scattering=light.scattering)
     model = choose_model(complete, coarse, frames, settings) if measure else None
