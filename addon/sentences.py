@@ -11,7 +11,8 @@ SENTENCES = {
     "proxy": "The proxy of {frames} is made.",
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
-        "changes there. Choose Clean Plate, Scene Lights or Smoke Material. Report says what was assumed."
+        "changes there. Hide by a Mask what is no smoke, or choose Clean Plate, Scene Lights or Smoke Material. "
+        "Report says what was assumed."
     ),
     "not all is smoke": (
         "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "

@@ -17,6 +17,7 @@ import psutil
 import scipy.fft
 
 import smokelift
+from smokelift.report.cost import peak_memory
 
 COPY_THREADS = 2
 """Threads that copy memory: enough to fill the bus of a desktop processor."""
@@ -93,21 +94,9 @@ def poisson_seconds(shape: tuple[int, int, int], clock: Callable[[], float] = ti
     return float(np.median(spent))
 
 
-def peak_bytes() -> int | None:
-    """Return the peak of this process's memory; None where the system does not say.
-
-    The maximum of `getrusage` would not do: in a child process it starts at the parent's.
-    """
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    return next(1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM"))
-
-
 def peak_mib() -> float | None:
-    """Return `peak_bytes` in MiB."""
-    peak = peak_bytes()
+    """Return the peak of this process's memory in MiB; None where the system does not say."""
+    peak = peak_memory()
     return None if peak is None else peak / 2**20
 
 

@@ -20,11 +20,11 @@ from typing import Any, cast
 import numpy as np
 import psutil
 
-from benchmarks.machine import peak_bytes
 from benchmarks.process import run_module, why_it_ended
 from benchmarks.renderer.peers import PEERS, Iteration
 from benchmarks.renderer.scene import BenchScene, bench_scene, plume
 from smokelift.render.device import DeviceName, start
+from smokelift.report.cost import peak_memory
 
 WARM_UPS = 2
 """Iterations before the timed ones."""
@@ -96,7 +96,7 @@ def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
         iteration.run(density)
     ready = time.perf_counter()
     seconds, outcome = _clocked(iteration, density)
-    peak = peak_bytes()
+    peak = peak_memory()
     image, gradient = iteration.download(*outcome)
     result = Result(
         seconds=tuple(seconds),

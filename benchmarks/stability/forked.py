@@ -21,7 +21,7 @@ class Limits:
     """What a case may take: seconds of processor time, seconds in all, and bytes of address space."""
 
     processor_seconds: int = 30
-    seconds: float = 120.0
+    seconds: float = 600.0
     memory: int = 6 * 2**30
 
 

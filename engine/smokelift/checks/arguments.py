@@ -15,7 +15,13 @@ CODES = (np.uint8, np.uint16)
 """What picture files hold in place of light."""
 
 
-def require_kind(value: object, kinds: type | UnionType | tuple[type, ...], name: str, expected: str) -> None:
+def require_kind(
+    value: object,
+    kinds: type | UnionType | tuple[type, ...],
+    name: str,
+    expected: str,
+    error: type[ValueError] = ValueError,
+) -> None:
     """Refuse an argument that is of none of the kinds.
 
     Parameters
@@ -26,6 +32,8 @@ def require_kind(value: object, kinds: type | UnionType | tuple[type, ...], name
         What is taken.
     name, expected
         Of the argument, and what it must be, in words.
+    error
+        What is raised.
 
     Raises
     ------
@@ -33,15 +41,21 @@ def require_kind(value: object, kinds: type | UnionType | tuple[type, ...], name
         Of another kind.
     """
     if not isinstance(value, kinds):
-        raise ValueError(f"{name} must be {expected}, not {described(value)}.")
+        raise error(f"{name} must be {expected}, not {described(value)}.")
 
 
-def listed(values: Any, kinds: type | UnionType | tuple[type, ...], name: str, expected: str) -> tuple[Any, ...]:
-    """Return what a list holds, or raise a ValueError if it is no list, or one of its items is of none of the kinds."""
-    require_kind(values, list | tuple, name, expected)
+def listed(
+    values: Any,
+    kinds: type | UnionType | tuple[type, ...],
+    name: str,
+    expected: str,
+    error: type[ValueError] = ValueError,
+) -> tuple[Any, ...]:
+    """Return what a list holds, or raise an error if it is no list, or one of its items is of none of the kinds."""
+    require_kind(values, list | tuple, name, expected, error)
     for value in values:
         if not isinstance(value, kinds):
-            raise ValueError(f"{name} must be {expected}, but one of them is {described(value)}.")
+            raise error(f"{name} must be {expected}, but one of them is {described(value)}.")
     return tuple(values)
 
 

@@ -294,9 +294,11 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
 def _checked_initial(initial: Volume, domain: Domain) -> Volume:
     initial = numbers(initial, "The initial density")
     if initial.shape != domain.resolution:
-        raise ValueError(f"The initial density must have the shape {domain.resolution}, not {initial.shape}.")
+        raise ValueError(
+            f"The initial density must have the shape {domain.resolution}, not {initial.shape}; resample it."
+        )
     if not np.isfinite(initial).all() or initial.min() < 0:
-        raise ValueError("The initial density must be finite and not negative.")
+        raise ValueError("The initial density must be finite and not negative; set other values to 0.")
     if initial.max() > LARGEST_START:
         raise ValueError(f"The initial density must be {LARGEST_START:g} at most, not {initial.max():g}.")
     return initial

@@ -312,4 +312,4 @@ def _check(observation: Observation, domain: Domain) -> None:
     if image.shape != (height, width, 3):
         raise ValueError(f"The picture must have the shape {(height, width, 3)} of the camera, not {image.shape}.")
     if not (np.abs(image) <= LARGEST).all():
-        raise ValueError(f"The picture holds values that are not finite, or beyond {LARGEST:g}.")
+        raise ValueError(f"The picture holds values that are not finite, or beyond {LARGEST:g}; clamp them first.")

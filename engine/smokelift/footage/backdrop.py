@@ -29,7 +29,6 @@ from smokelift.footage.noise import (
     lasting_noise,
     median_of_seen,
     noise_of,
-    some_blocks,
     spread_about,
     white_noise,
 )
@@ -141,12 +140,12 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
     proxy = Proxy.of(clip)
-    white = _white_noise(clip, proxy)
+    white = _white_noise(proxy)
     quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
     if quiet is not clip:
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
-    even, gains = part.evened()
+    even, gains = part.evened
     found = rank(even, white)
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
@@ -163,7 +162,7 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
     colour, objects = found.colour, found.objects
     source: Source = "colour"
     if colour is None:
-        plate = _picture(clip, part, even, gains, white)
+        plate = _picture(clip, part, white)
         if plate.confidence.mean() >= MIN_KNOWN:
             return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
         # fog that drifts over all of the file: it is shown as it was made, before black
@@ -171,10 +170,11 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
     return made(source, plates=_of_one_colour(clip, part, even, gains, colour, objects, white))
 
 
-def _picture(clip: Clip, part: Proxy, even: Proxy, gains: Picture, white: Picture) -> Plate:
+def _picture(clip: Clip, part: Proxy, white: Picture) -> Plate:
     """The plate of the picture that the clear frames show."""
+    even, gains = part.evened
     noise = _noise(even, median_of_seen(even.pictures), white)
-    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale)
+    picture = clear_picture(even, noise.averaged(even.scale**2), DETAIL / even.scale)
     return Plate(
         whole_plate(clip, part, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),
@@ -205,16 +205,16 @@ def _of_one_colour(
     return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)
 
 
-def _white_noise(clip: Clip, proxy: Proxy) -> Picture:
+def _white_noise(proxy: Proxy) -> Picture:
     """The white noise (3,) of a clip's pixels, at one exposure."""
-    own = np.flatnonzero([clip.first <= number < clip.first + len(clip) for number in proxy.numbers])
+    own = np.flatnonzero([number in proxy.blocks for number in proxy.numbers])
     part = proxy.only(own[np.unique(np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int))])
-    _, gains = part.evened()
+    _, gains = part.evened
     blocks = []
     for number, gain in zip(part.numbers, gains, strict=True):
-        n = number - clip.first
-        picture = clip.stored(n).through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(clip.frame(n) / gain)
-        blocks.append(some_blocks(clip.as_seen(n, picture)))
+        part_of, seen = proxy.blocks[number]
+        even = part_of.through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(part_of.linear() / gain)
+        blocks.append(even if seen is None else np.where(seen[..., None], even, np.float32(np.nan)))
     return white_noise(np.stack(blocks))
 
 

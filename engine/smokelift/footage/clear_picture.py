@@ -34,6 +34,7 @@ from smokelift.footage.behind_smoke import (
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
+from smokelift.footage.proxy import Proxy
 
 WINDOW = 6.0
 """Width of the window of a pixel's clear values in units of noise: plus and minus three standard deviations."""
@@ -105,22 +106,21 @@ class _Smoke:
     brightens: Mask
 
 
-def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float) -> ClearPicture:
+def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     """Return the background of pictures.
 
     Parameters
     ----------
-    pictures : (frames, rows, columns, 3)
-        Linear, of one exposure.
-    seen : (frames, rows, columns) bool
-        Which pixels each of them shows.
+    proxy
+        The pictures, of one exposure.
     noise
         Of them.
     detail
         Standard deviation of the Gaussian as of `behind_smoke.DETAIL`, in pixels.
     """
     width = smoothing(noise)
-    grey = np.stack([blurred(channel_mean(linear_to_srgb(picture)), width) for picture in pictures])
+    pictures, seen = proxy.pictures, proxy.seen
+    grey = np.stack([blurred(channel_mean(encoded), width) for encoded in proxy.encoded])
     grey[~seen] = np.nan
     some = np.ascontiguousarray(grey[:, ::STRIDE, ::STRIDE])
     window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
@@ -138,7 +138,7 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float) ->
             pictures[:, band], grey[:, band], window, smoke.similarity
         )
     sure, known = _known(image, known, calm, clear | ~seen, brightens, window)
-    mean = sum(linear_to_srgb(picture) * shown[..., None] for picture, shown in zip(pictures, seen, strict=True))
+    mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
     never = ~seen.any(0)
     if never.any():

@@ -70,7 +70,7 @@ class Clip:
         self._source = source
         first, last = (0, source.count - 1) if frames is None else frames
         if not 0 <= first <= last < source.count:
-            raise ClipError(f"{path}: frames {first} to {last} were asked for; it has 0 to {source.count - 1}")
+            raise ClipError(f"{path}: there are no frames {first} to {last}; choose some of 0 to {source.count - 1}")
         self.first = first
         self._count = last - first + 1
         self._cache: OrderedDict[int, StoredPicture] = OrderedDict()

@@ -82,7 +82,7 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     if linear.shape != plate.image.shape:
         raise ValueError(f"the frame has the shape {linear.shape}, its background {plate.image.shape}; they must agree")
     if not np.isfinite(linear).all():
-        raise ValueError("the frame holds values that are not finite")
+        raise ValueError("the frame holds values that are not finite; clamp them first")
     width = smoothing(plate.noise)
     # as far as white noise goes, a Gaussian is a mean over so many pixels
     noise = plate.noise.averaged(4 * np.pi * width**2).total

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
@@ -185,10 +186,13 @@ def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
 def _deviations(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
     """How a clip differs from backgrounds that are known, as `noise_about` takes it; NaN where a mask hides it."""
     single, blocks = [], []
+    encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # of a camera that stands still, once
     for number in clip.spread(NOISE_FRAMES):
-        behind, frame = plates.at(number).image, clip.as_seen(number, clip.frame(number))
-        gains = gain_of(small(frame), small(behind))
-        deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
+        plate, stored = plates.at(number), clip.stored(number)
+        seen = clip.as_seen(number, stored.linear())
+        gains = gain_of(small(seen), small(plate.image))
+        even = stored.through(linear_to_srgb) if (gains == 1).all() else linear_to_srgb(seen / gains)
+        deviation = clip.as_seen(number, even) - encoded(plate)
         single.append(some_blocks(deviation))
         blocks.append(block_means(deviation[None])[0])
     return np.stack(single), np.stack(blocks)

@@ -6,6 +6,7 @@ What happens in the rest of the file tells what is behind the smoke of a short p
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +18,9 @@ from numpy.typing import NDArray
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.exposure import gain_of, sample_gains, small
 from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb, reduced_size
+from smokelift.footage.mask import Seen
+from smokelift.footage.noise import some_blocks
+from smokelift.footage.stored_picture import StoredPicture
 
 PROXY_SIDE = 480
 """Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred
@@ -48,6 +52,8 @@ class Proxy:
         Linear; what a mask hides is continued from around it.
     seen : (frames, rows, columns) bool
         What no mask hides.
+    blocks
+        Of each frame of the clip: some blocks of its full picture, and where no mask hides them (None without one).
     scale
         Pixels of the file along one of them.
     """
@@ -56,6 +62,7 @@ class Proxy:
     clip: tuple[int, int]
     pictures: Picture
     seen: NDArray[np.bool_]
+    blocks: Mapping[int, tuple[StoredPicture, Seen | None]]
     scale: float
 
     @staticmethod
@@ -63,17 +70,22 @@ class Proxy:
         """Read the frames of a clip's file; ClipError is raised if one of the clip's own cannot be read."""
         first, last = clip.first, clip.first + len(clip) - 1
         (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
-        pictures, seen = {}, []
+        pictures, seen, blocks = {}, [], {}
         own = {first + number for number in clip.spread(OF_CLIP)}
         for number in sorted(own | set(whole.spread(OF_FILE))):
             inside = first <= number <= last
             of, n = (clip, number - first) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
-                pictures[number] = of.stored(n).averaged(columns, rows)
+                picture = of.stored(n)
+                pictures[number] = picture.averaged(columns, rows)
                 shown = of.seen(n, columns, rows)
                 seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
+                if inside:
+                    hides = of.seen(n, *clip.size)
+                    blocks[number] = picture.cut(some_blocks), None if hides is None else some_blocks(hides)
         scale = max(clip.size) / max(columns, rows)
-        return Proxy(tuple(pictures), (first, last), np.stack(list(pictures.values())), np.stack(seen), scale)
+        whole_file = np.stack(list(pictures.values()))
+        return Proxy(tuple(pictures), (first, last), whole_file, np.stack(seen), blocks, scale)
 
     @cached_property
     def encoded(self) -> Picture:
@@ -118,8 +130,9 @@ class Proxy:
         numbers = tuple(self.numbers[n] for n in which)
         return replace(self, numbers=numbers, pictures=self.pictures[which], seen=self.seen[which])
 
+    @cached_property
     def evened(self) -> tuple[Proxy, Picture]:
-        """Return the pictures at one exposure, with the gains (frames, 3) that they had against it."""
+        """The pictures at one exposure, with the gains (frames, 3) that they had against it."""
         hidden = np.where(self.seen[..., None], self.pictures, np.float32(np.nan))
         gains = sample_gains(np.stack([small(picture) for picture in hidden]))
         if (gains == 1).all():

@@ -46,7 +46,7 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
     if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
         raise ImageError(f"{path}: a picture must have the shape (height, width, 3), not {values.shape}")
     if not np.isfinite(values).all():
-        raise ImageError(f"{path}: the picture holds values that are not finite")
+        raise ImageError(f"{path}: the picture holds values that are not finite; clamp them first")
     suffix = path.suffix.lower()
     if suffix == ".png":
         with atomic_path(path) as aside:

@@ -18,7 +18,8 @@ import numpy as np
 from smokelift.checks import shown
 from smokelift.output.atomic import atomic_path
 from smokelift.output.layout import INDEX
-from smokelift.scene import Domain
+from smokelift.scene import Domain, SceneError
+from smokelift.scene.checks import file_path
 from smokelift.scene.files import read_text
 
 FORMAT = 1
@@ -37,6 +38,14 @@ FILES = ("path", "image")
 
 class SequenceError(ValueError):
     """A directory that cannot be written to or opened, and why."""
+
+
+def directory_path(value: object) -> Path:
+    """Return what is given as the directory of a sequence, or raise a SequenceError."""
+    try:
+        return file_path(value, "directory", "the path of a directory")
+    except SceneError as error:
+        raise SequenceError(str(error)) from error
 
 
 class DirectoryBusyError(SequenceError):
@@ -148,7 +157,9 @@ class Index:
         try:
             data = json.loads(read_text(path))
         except FileNotFoundError:
-            raise SequenceError(f"{directory}: holds no sequence ({INDEX} is missing)") from None
+            raise SequenceError(
+                f"{directory}: holds no sequence ({INDEX} is missing); give a directory that a run wrote"
+            ) from None
         except OSError as error:
             raise SequenceError(str(error)) from error
         except (ValueError, RecursionError) as error:

@@ -12,13 +12,12 @@ import numpy as np
 from smokelift.checks import shown
 from smokelift.output.archive import FLAME, VELOCITY, read_arrays
 from smokelift.output.checksum import checksum
-from smokelift.output.index import Index, SequenceError
+from smokelift.output.index import Index, SequenceError, directory_path
 from smokelift.output.layout import INDEX, frame_path
 from smokelift.output.vdb import read_flame, read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from_dict
-from smokelift.scene.checks import file_path
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
 USUAL_FPS = 24.0
@@ -70,7 +69,7 @@ class Sequence:
         SequenceError
             If there is no sequence, or it is damaged.
         """
-        directory = file_path(directory, "directory", "the path of a directory")
+        directory = directory_path(directory)
         if directory.is_file():
             raise SequenceError(f"{directory}: is a file; give the directory of the sequence")
         index = Index.read(directory)
@@ -124,7 +123,7 @@ class Sequence:
         """
         density = self._read(number, "density")["density"]
         if density.min() < 0:
-            raise SequenceError(f"{self.directory}: frame {number} holds negative densities")
+            raise SequenceError(f"{self.directory}: frame {number} holds negative densities; write it again")
         return density
 
     def flame(self, number: int) -> Array | None:

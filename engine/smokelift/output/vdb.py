@@ -213,9 +213,9 @@ def _part(velocity: npt.ArrayLike | StaggeredGrid, box: tuple[slice, ...], domai
         centres = np.ascontiguousarray(velocity, np.float32)
         shape, finite, part = centres.shape, bool(np.isfinite(centres).all()), centres[box].copy()
     if shape != (*domain.shape, 3):
-        raise ValueError(f"velocity {shape} does not fit the domain's {domain.shape} voxels")
+        raise ValueError(f"velocity {shape} does not fit the domain's {domain.shape} voxels; resample it")
     if not finite:
-        raise ValueError("velocity must be finite")
+        raise ValueError("velocity must be finite; set other values to 0")
     return part
 
 

@@ -346,7 +346,7 @@ def _checked(density: npt.ArrayLike, faces: Any, shape: tuple[int, int, int]) ->
         found = ", ".join(str(array.shape) for array in arrays)
         raise ValueError(f"density and velocity on faces must have shapes {wanted}, not {found}")
     if not all(np.isfinite(array).all() for array in arrays):
-        raise ValueError("density and velocity must be finite")
+        raise ValueError("density and velocity must be finite; set other values to 0")
     if rho.min() < 0.0:
-        raise ValueError("density must not be negative")
+        raise ValueError("density must not be negative; set such values to 0")
     return rho, (x, y, z)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from smokelift.checks import require_kind
 from smokelift.footage.clip import Clip
-from smokelift.output.index import Origins
+from smokelift.output.index import Origins, directory_path
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -17,7 +17,6 @@ from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.pipeline.source_files import sources
 from smokelift.report.provenance import provenance, record
 from smokelift.scene import Scene
-from smokelift.scene.checks import file_path
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -79,7 +78,7 @@ class Reconstruction:
         """
         shot = self.shot
         others = other_parts(self.method, shot.settings)
-        directory = file_path(directory, "directory", "the path of a directory")
+        directory = directory_path(directory)
         with SequenceWriter(
             directory,
             shot.scene,

@@ -136,7 +136,7 @@ def _of_view(density: Volume, renderer: Renderer, target: npt.ArrayLike) -> tupl
     if wanted.shape != (height, width, 3):
         raise ValueError(f"The target image must have the shape {(height, width, 3)}, not {wanted.shape}.")
     if not np.isfinite(wanted).all():
-        raise ValueError("The target image holds values that are not finite.")
+        raise ValueError("The target image holds values that are not finite; clamp them first.")
     image = renderer.image(_checked(density, renderer), keep_record=True)
     difference = image - wanted
     loss = float(np.sum(np.square(difference, dtype=np.float64)))
@@ -147,11 +147,11 @@ def _checked(density: Volume, renderer: Renderer) -> Volume:
     density = numbers(density, "The density")
     wanted = renderer.domain.resolution
     if density.shape != wanted:
-        raise ValueError(f"The density has the shape {density.shape}, the domain {wanted}; they must agree.")
+        raise ValueError(f"The density has the shape {density.shape}, the domain {wanted}; resample one of them.")
     if not np.isfinite(density).all():
-        raise ValueError("The density holds values that are not finite.")
+        raise ValueError("The density holds values that are not finite; set them to 0.")
     if density.min(initial=0.0) < 0:
-        raise ValueError("The density holds negative values.")
+        raise ValueError("The density holds negative values; set them to 0.")
     depth = float(density.max(initial=0.0)) * renderer.medium.extinction * renderer.domain.voxel_size
     if depth > LARGEST_DEPTH:
         raise ValueError(

@@ -1,7 +1,9 @@
 """What a run takes, known before it is spent: time, memory and disk.
 
-It follows the voxels of the box, and more so those that may hold smoke. Time is counted in Poisson solves by cosine
-transforms, as long as one takes a voxel on this machine now. All constants: docs/experiments/memory-and-time.md.
+It follows the voxels of the box, and more so those that may hold smoke. The time of frames is counted in Poisson solves
+by cosine transforms, as long as one takes a voxel on this machine. What comes before the frames is not modelled: a
+forecast prepares the shot as the run does, and that takes as long and as much memory again, however the camera moves;
+and how long it waited for the processor is how busy the machine is. All constants: docs/experiments/memory-and-time.md.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -21,8 +24,8 @@ from smokelift.report.workload import Workload
 
 Resolution = tuple[int, int, int]
 
-START_SECONDS = 3.5
-"""Seconds to start, to estimate what is not given and to measure the clip's texture."""
+START_SECONDS = 1.5
+"""Seconds of a processor to start and to measure the clip's texture."""
 
 VOXELS_A_FRAME = 1.2e7
 """Voxels whose solve takes as long as what every frame takes, however small its grid: decoding and files."""
@@ -69,8 +72,8 @@ BYTES_A_VOXEL_OF_SMALL = 80, 100
 BYTES_A_VOXEL_OF_SOLVER = 145
 """Bytes for each voxel of the box that a velocity adds whose estimate has the grid of the density."""
 
-TIMED = (64, 64, 64)
-"""Voxels of the grid whose solve is timed."""
+TIMED, TIMES = (64, 64, 64), 9
+"""Voxels of the grid whose solve is timed, and how often."""
 
 BYTES_A_SIMULATED_VOXEL = 170
 """Bytes of memory at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a
@@ -104,11 +107,36 @@ class Cost:
     disk: int
 
 
-def estimate_cost(resolution: Resolution, work: Workload) -> Cost:
-    """Estimate the cost of a run; it takes a part of a second."""
+@dataclass(frozen=True)
+class Spent:
+    """What preparing a shot took.
+
+    Attributes
+    ----------
+    seconds
+        That passed.
+    processor
+        Seconds of all cores together.
+    memory
+        Bytes at the peak: of a large clip on a small grid as many as the run takes. None where that is not known.
+    """
+
+    seconds: float
+    processor: float
+    memory: int | None = None
+
+    @property
+    def wait(self) -> float:
+        """Seconds that pass for each in which the process could work: 1 on a machine without other work."""
+        return max(1.0, self.seconds / self.processor) if self.processor > 0 else 1.0
+
+
+def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Cost:
+    """Estimate the cost of a run, whose shot took some time to be prepared; it takes a part of a second."""
+    frames = START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
     return Cost(
-        seconds=START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel(),
-        memory=memory_needed(resolution, work),
+        seconds=prepared.seconds + prepared.wait * frames,
+        memory=max(memory_needed(resolution, work), prepared.memory or 0),
         memory_free=memory_free(),
         disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_A_SMOKY_VOXEL_ON_DISK),
     )
@@ -145,6 +173,18 @@ def affordable_room(resolution: Resolution) -> float:
 def memory_free() -> int:
     """Return the bytes that programs may still take."""
     return int(psutil.virtual_memory().available)
+
+
+def peak_memory() -> int | None:
+    """Return the peak of this process's memory in bytes; None where the system does not say.
+
+    The maximum of `getrusage` would not do: in a child process it starts at the parent's.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError):
+        return None
+    return next((1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")), None)
 
 
 def require_memory(resolution: Resolution, work: Workload, *, given: bool = True) -> None:
@@ -192,11 +232,14 @@ def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
 
 @cache
 def _seconds_a_voxel() -> float:
-    """Return the seconds that a Poisson solve takes on this machine now, for each voxel; timed once, for all costs."""
+    """Return the seconds that a Poisson solve takes on this machine, for each voxel; timed once, for all costs.
+
+    The fastest of some is one that no other work held up.
+    """
     field = np.zeros(TIMED, np.float32)
     spent = []
-    for _ in range(5):
+    for _ in range(TIMES):
         began = time.perf_counter()
         scipy.fft.idctn(scipy.fft.dctn(field, workers=2), workers=2)
         spent.append(time.perf_counter() - began)
-    return float(np.median(spent)) / field.size
+    return min(spent) / field.size

@@ -118,6 +118,10 @@ SENTENCES: Mapping[str, str] = {
         "degrees from the nearest single color. Its colors are wrong, and its thickness may be. Use frames with smoke "
         "of one color, crop the clip to it, or give a mask."
     ),
+    "smoke that changes its colour": (
+        "The color of the smoke changes over time, but one is assumed for all of it: on average its light is "
+        "{degrees:.0f} degrees from the nearest single color. Use a range of frames in which it stays the same."
+    ),
     # where the camera stands, and where the smoke is
     "assumed camera": (
         "Camera not given: a level {lens:.0f} mm lens on {film:g} mm film is assumed, and a picture {height:.3g} m "
@@ -193,6 +197,11 @@ SENTENCES: Mapping[str, str] = {
     "likely wrong light": (
         "The assumed light is likely wrong, and the smoke too thick or too thin by half or more: {error:.0%} of what "
         "the smoke changes in the clip is unexplained. Give the lights."
+    ),
+    "light of fire": (
+        "Fire lights its smoke from within, but the light is taken to come from outside: {error:.0%} of the smoke's "
+        "contrast is left unexplained, so how thick the smoke near the fire is may be wrong. Hide the fire by a mask, "
+        "or use frames with less fire."
     ),
     "light strength": (
         "Light: {factor:.2f} times as strong as given, because the smoke is brighter than the given light can make it. "
@@ -274,8 +283,13 @@ SENTENCES: Mapping[str, str] = {
     ),
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
-        "changes there. Its psnr is high only because the smoke is faint. Give the background, the light or the medium "
-        "of the clip, or a mask around its smoke. `smokelift inspect` says what was assumed."
+        "changes there. Its psnr is high only because the smoke is faint. Hide by a mask what is no smoke, or give the "
+        "background, the light or the medium of the clip. `smokelift inspect` says what was assumed."
+    ),
+    "fire beside what is fitted": (
+        "Fire and smoke are not separated well: a typical frame still differs from the clip by {error:.0%} "
+        "of what changes in it. Smoke that fire lights looks like fire, and flames that are clipped to white look "
+        "like smoke. Use a copy that is exposed for the flames, frames with less fire, or hide the fire by a mask."
     ),
     "not all is smoke": (
         "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "

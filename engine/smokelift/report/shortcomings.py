@@ -22,15 +22,17 @@ def count_empty(figures: Sequence[Mapping[str, Any]]) -> int:
     return sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
 
 
-def shortcomings(figures: Sequence[Mapping[str, Any]]) -> list[Doubt]:
-    """Return what the figures of the frames of a finished run say against it."""
+def shortcomings(figures: Sequence[Mapping[str, Any]], *, burns: bool = False) -> list[Doubt]:
+    """Return what the figures of the frames of a finished run, in which fire ``burns`` or not, say against it."""
     doubts = []
     empty = count_empty(figures)
     if empty:
         doubts.append(Doubt("empty frames", {"empty": empty, "frames": len(figures)}))
     errors = [of_frame["relative_error"] for of_frame in figures if of_frame.get("relative_error") is not None]
     typical = float(np.median(errors)) if errors else 0.0
-    if typical > UNEXPLAINED_SHARE:
+    if burns and typical > DOUBTFUL_SHARE:
+        doubts.append(Doubt("fire beside what is fitted", {"error": typical}))
+    elif typical > UNEXPLAINED_SHARE:
         doubts.append(Doubt("hardly any smoke fitted", {"error": typical}))
     elif typical > DOUBTFUL_SHARE:
         doubts.append(Doubt("not all is smoke", {"error": typical}))

@@ -83,16 +83,16 @@ class Scene:
 
     def _check_kinds(self) -> None:
         """Refuse a part that is of another kind, and make tuples of lists."""
-        require_kind(self.clip, ClipSource | None, "clip", 'a ClipSource, such as ClipSource("clip.mp4")')
-        require_kind(self.camera, Camera | None, "camera", "a Camera")
-        require_kind(self.domain, Box | None, "domain", "a Domain")
-        require_kind(self.medium, Medium | None, "medium", "a Medium")
-        require_kind(self.background, Background | None, "background", "a Background")
+        require_kind(self.clip, ClipSource | None, "clip", 'a ClipSource, such as ClipSource("clip.mp4")', SceneError)
+        require_kind(self.camera, Camera | None, "camera", "a Camera", SceneError)
+        require_kind(self.domain, Box | None, "domain", "a Domain", SceneError)
+        require_kind(self.medium, Medium | None, "medium", "a Medium", SceneError)
+        require_kind(self.background, Background | None, "background", "a Background", SceneError)
         set_fields(
             self,
-            lights=listed(self.lights, Light, "lights", "a list of lights"),
-            views=listed(self.views, View, "views", "a list of Views"),
-            inlets=listed(self.inlets, Inlet, "inlets", "a list of Inlets"),
+            lights=listed(self.lights, Light, "lights", "a list of lights", SceneError),
+            views=listed(self.views, View, "views", "a list of Views", SceneError),
+            inlets=listed(self.inlets, Inlet, "inlets", "a list of Inlets", SceneError),
         )
 
     def _check_places(self, domain: Box) -> None:

@@ -49,6 +49,8 @@ class SmokeSamples:
         By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
     textures
         What the samples with smoke show of the texture behind it.
+    amounts
+        Numbers of smoke pixels of the samples that have any, in their order in ``colours``.
     """
 
     scale: float
@@ -59,6 +61,7 @@ class SmokeSamples:
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
     textures: tuple[NDArray[np.float64], ...] = ()
+    amounts: tuple[int, ...] = ()
 
     @property
     def typical(self) -> tuple[int, ...]:
@@ -165,4 +168,5 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
             textures.append(seen_texture(picture, plate, mask))
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
     radiance = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, tuple(textures))
+    found = tuple(textures), tuple(amounts.values())
+    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, *found)

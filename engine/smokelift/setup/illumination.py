@@ -177,8 +177,8 @@ def light_around(radiance: Doubles) -> tuple[DirectionalLight, ...]:
     return tuple(DirectionalLight(way, (red, green, blue)) for way in AXES)
 
 
-def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
-    """What light is taken for one that is not given, and whether it is likely wrong.
+def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise, *, burns: bool) -> tuple[Remark, ...]:
+    """What light is taken for one that is not given, and whether it is likely wrong; ``burns`` says if fire does.
 
     Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
     the light leaves unexplained is its own fault.
@@ -201,7 +201,7 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
     if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
         return (taken,)
-    return taken, Doubt("likely wrong light", {"error": error})
+    return taken, Doubt("light of fire" if burns else "likely wrong light", {"error": error})
 
 
 def _strengthened(

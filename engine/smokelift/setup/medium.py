@@ -66,9 +66,7 @@ def find_medium(
         color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
         medium = replace(medium, color=color)
         estimates.append(coloured)
-    off = degrees_off_one_colour(samples)
-    if off >= COLOURED:
-        remarks.append(Doubt("smoke of several colours", {"degrees": off}))
+    remarks += several_colours(samples)
     if fire is not None:
         red, green, blue = color = medium.flame_color or fire.color
         figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
@@ -131,18 +129,33 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
     return (red, green, blue), measured("smoke colour", named, figures, tolerance=COLOURED)
 
 
-def degrees_off_one_colour(samples: SmokeSamples) -> float:
-    """Return by how much the light of smoke differs from one colour; 0 before anything but black, or if too faint.
+def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
+    """Return a doubt about smoke of more than one colour before black, at a time or one after the other.
 
     Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
     explains the most of the light is another colour's. White that is clipped has none.
     """
-    shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
+    usable = samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE
+    shown = samples.colours[usable].astype(np.float64)
     if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
-        return 0.0
+        return ()
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
-        return 0.0
-    along = np.linalg.eigvalsh(shown.T @ shown)
+        return ()
+    off = _off_one_colour(shown)
+    if off < COLOURED:
+        return ()
+    ends = np.cumsum(samples.amounts, dtype=np.intp)[:-1]
+    frames = [
+        part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colours, usable)), strict=True)
+    ]
+    apart = [_off_one_colour(frame.astype(np.float64)) for frame in frames if len(frame) >= PIXELS]
+    kind = "smoke that changes its colour" if apart and np.median(apart) < COLOURED else "smoke of several colours"
+    return (Doubt(kind, {"degrees": off}),)
+
+
+def _off_one_colour(colours: Doubles) -> float:
+    """Degrees by which light (n, 3) is off the one colour that explains the most of it, as root mean square."""
+    along = np.linalg.eigvalsh(colours.T @ colours)
     return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
 
 

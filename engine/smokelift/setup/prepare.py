@@ -87,7 +87,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
             *first_remarks(estimate, scene.background is not None),
             *geometry.remarks,
             *medium_remarks,
-            *light_remarks(light, samples, plates.noise),
+            *light_remarks(light, samples, plates.noise, burns=estimate.fire is not None),
             *view_remarks,
         ),
         estimates=(geometry.resolution, *of_medium, *light.estimates, *coarsening, *gains),

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
-from smokelift.scene.checks import integer, items, number, positive
+from smokelift.scene.checks import SceneError, integer, items, number, positive
 from smokelift.scene.domain import MAX_SIDE_VOXELS
 from smokelift.velocity import VelocitySettings
 
@@ -143,15 +143,15 @@ class Settings:
             ("scattering", ("auto", *SCATTERINGS)),
         ):
             if getattr(self, name) not in known:
-                raise ValueError(f"{name} must be one of {', '.join(known)}, not {getattr(self, name)!r}.")
+                raise SceneError(f"{name} must be one of {', '.join(known)}, not {getattr(self, name)!r}.")
         for name in ("transport", "detail"):
             number(getattr(self, name), name, "a number from 0 to 1", lambda share: 0 <= share <= 1)
         if self.distance is not None:
             positive(self.distance, "distance", "a number of metres above 0")
         if self.method == "paper" and self.detail > 0:
-            raise ValueError(f"The paper's method makes up no detail: detail must be 0 with it, not {self.detail}.")
+            raise SceneError(f"The paper's method makes up no detail: detail must be 0 with it, not {self.detail}.")
         if not isinstance(self.seed, int) or self.seed < 0:
-            raise ValueError(f"seed must be a whole number from 0, not {self.seed}.")
+            raise SceneError(f"seed must be a whole number from 0, not {self.seed}.")
         if self.resolution not in (None, "auto"):
             expected = "three whole numbers of at least 8 voxels"
             for count in items(self.resolution, 3, "resolution", expected):
@@ -164,9 +164,9 @@ class Settings:
         method: MethodName = "default",
         resolution: tuple[int, int, int] | Literal["auto"] | None = None,
     ) -> Settings:
-        """The settings of a quality and a method; ValueError if there is no such one."""
+        """The settings of a quality and a method; SceneError if there is no such one."""
         if quality not in QUALITIES:
-            raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}.")
+            raise SceneError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}.")
         if method == "paper":
             selection = SelectionSettings(measure=False)
             return cls(method=method, quality=quality, resolution=resolution, selection=selection, detail=0.0)

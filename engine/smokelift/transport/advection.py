@@ -89,7 +89,7 @@ def advect(
         x, y, z = _core.advect_faces(field.faces, displacement.faces, corrected)
         return Velocity((x, y, z), field.voxel_size, field.closed)
     if not finite(field):
-        raise ValueError("the field holds values that are not finite.")
+        raise ValueError("the field holds values that are not finite; set them to 0.")
     if not conserve:
         return _moved(field, displacement, corrected)
     moved = _core.advect_cells(field, displacement.faces, corrected)

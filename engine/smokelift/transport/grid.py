@@ -51,7 +51,7 @@ class StaggeredGrid:
             raise ValueError("faces must be three arrays, of the components on x, y and z faces.")
         x, y, z = (np.ascontiguousarray(numbers(component, "faces")) for component in self.faces)
         if any(component.ndim != 3 for component in (x, y, z)):
-            raise ValueError("faces must be three three-dimensional arrays.")
+            raise ValueError("faces must be three three-dimensional arrays; Velocity.zero shows their shapes.")
         shape = (x.shape[0] - 1, *x.shape[1:])
         shapes = (x.shape, y.shape, z.shape)
         if min(shape) < 1 or shapes != face_shapes(shape):
@@ -145,7 +145,7 @@ class Velocity(StaggeredGrid):
     def __post_init__(self, known_finite: bool) -> None:
         super().__post_init__()
         if not known_finite and not all(map(finite, self.faces)):
-            raise ValueError("the velocity holds values that are not finite.")
+            raise ValueError("the velocity holds values that are not finite; set them to 0.")
 
     def displacement(self, dt: float) -> StaggeredGrid:
         """The way that smoke goes in `dt` seconds, in voxels, on a grid of unit voxels.
@@ -259,4 +259,4 @@ def require_positive(name: str, value: float) -> None:
 def require_same_shape(what: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
     """Refuse an array that does not fit the box."""
     if tuple(shape) != tuple(expected):
-        raise ValueError(f"{what} has shape {tuple(shape)}, but the box has {tuple(expected)} voxels.")
+        raise ValueError(f"{what} has shape {tuple(shape)}, but the box has {tuple(expected)} voxels; resample it.")

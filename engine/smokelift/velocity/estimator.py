@@ -196,9 +196,9 @@ def _density(name: str, values: Density) -> Array:
         raise ValueError(f"{name} must be a three-dimensional array, not one of shape {values.shape}.")
     least, most = values.min(), values.max()  # NaN if any is
     if not np.isfinite((least, most)).all():
-        raise ValueError(f"{name} holds densities that are not finite.")
+        raise ValueError(f"{name} holds densities that are not finite; set them to 0.")
     if least < 0:
-        raise ValueError(f"{name} holds negative densities.")
+        raise ValueError(f"{name} holds negative densities; set them to 0.")
     if most > LARGEST_DENSITY:
         raise ValueError(f"{name} holds densities up to {most:g}; scale them to {LARGEST_DENSITY:g} at most.")
     return np.ascontiguousarray(values)

@@ -75,3 +75,14 @@ def test_a_smooth_picture_takes_over_the_detail_of_an_exemplar(scale) -> None:
     assert fine(smooth) < 0.4 * fine(like)
     kept = exemplar.towards(like, 0)
     assert np.linalg.norm(kept - like) < 0.5 * np.linalg.norm(like - ndimage.gaussian_filter(like, SIZE / 2))
+
+
+@pytest.mark.parametrize("line", [np.s_[0, 3:9], np.s_[-1, :], np.s_[:, 0], np.s_[7, 7]])
+def test_smoke_along_an_edge_has_patches(line) -> None:
+    """Shifted pictures of it are empty."""
+    picture = np.zeros((32, 24), np.float32)
+    picture[line] = 0.5
+    for scale in (1, 2, 4):
+        found = Exemplar.of([picture], scale)
+        assert np.isfinite(found.quantiles).all()
+        assert np.isfinite(found.towards(reduced(picture, scale), 0)).all()

@@ -209,7 +209,7 @@ def test_a_range_of_frames(ramp: Path) -> None:
             with pytest.raises(ClipError, match=f"there is no frame {outside}; there are 0 to 4"):
                 clip.frame(outside)
     assert len(Clip.open(source, frames=(0, 29))) == 30
-    with pytest.raises(ClipError, match="frames 25 to 30 were asked for; it has 0 to 29"):
+    with pytest.raises(ClipError, match="there are no frames 25 to 30; choose some of 0 to 29"):
         Clip.open(ramp, frames=(25, 30))
     with pytest.raises(ClipError, match="fps must be"):
         Clip.open(ramp, fps=0.0)

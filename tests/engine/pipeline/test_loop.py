@@ -421,8 +421,9 @@ def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
     assert Sequence.open(out).complete
 
 
-def test_frames_without_smoke_are_empty(plume, draft, tmp_path) -> None:
-    nothing = np.zeros_like(plume.densities[0])
+@pytest.mark.parametrize("detail", [0.0, 0.5, 1.0])
+def test_frames_without_smoke_are_empty(plume, draft, tmp_path, detail) -> None:
+    draft, nothing = replace(draft, detail=detail), np.zeros_like(plume.densities[0])
     clip = [nothing, nothing, plume.densities[0], nothing, nothing, plume.densities[1], plume.densities[2]]
     frames = frames_written(plume.write(tmp_path / "clip", clip), draft, tmp_path / "out")
     assert [bool(frame.density.any()) for frame in frames] == [bool(density.any()) for density in clip]

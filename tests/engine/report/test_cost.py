@@ -7,7 +7,14 @@ from types import SimpleNamespace
 import pytest
 
 from smokelift.report import cost
-from smokelift.report.cost import NotEnoughMemoryError, estimate_cost, memory_needed, require_memory, voxel_solves
+from smokelift.report.cost import (
+    NotEnoughMemoryError,
+    Spent,
+    estimate_cost,
+    memory_needed,
+    require_memory,
+    voxel_solves,
+)
 from smokelift.report.workload import Workload
 from smokelift.scene import Domain
 from smokelift.setup.settings import Settings
@@ -37,6 +44,8 @@ TIME = [
     ((256, 256, 384), 0.008, 332),
 ]
 """Voxels, share and processor time of a frame, in the time of a solve for a million voxels, of the same page."""
+
+PREPARED = Spent(3.0, 3.0)
 
 SIZES = {"cube": (128, 128, 128), "paper": (128, 128, 192), "odd": (100, 120, 220)}
 
@@ -118,7 +127,7 @@ def test_nothing_fits_is_said_too(monkeypatch) -> None:
 def test_more_frames_views_and_smoke_cost_more(monkeypatch) -> None:
     monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
     base, longer, more = (
-        estimate_cost(SIZES["cube"], work)
+        estimate_cost(SIZES["cube"], work, PREPARED)
         for work in (WORK, replace(WORK, frames=240), replace(WORK, mean=2 * WORK.mean, largest=2 * WORK.largest))
     )
     assert longer.disk == pytest.approx(10 * base.disk)
@@ -126,12 +135,33 @@ def test_more_frames_views_and_smoke_cost_more(monkeypatch) -> None:
     assert longer.seconds > 8 * base.seconds
     assert 1.3 * base.seconds < more.seconds
     assert more.disk == pytest.approx(2 * base.disk)
-    assert estimate_cost(SIZES["cube"], replace(WORK, views=21)).seconds > 2 * base.seconds
+    assert estimate_cost(SIZES["cube"], replace(WORK, views=21), PREPARED).seconds > 2 * base.seconds
+
+
+def test_preparing_takes_as_long_again(monkeypatch) -> None:
+    """A camera that is steadied takes long to prepare; a machine that makes that wait makes the frames wait, too."""
+    monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
+    quick, slow, busy = (
+        estimate_cost(SIZES["cube"], WORK, Spent(seconds, processor)).seconds
+        for seconds, processor in ((3.0, 3.0), (50.0, 50.0), (15.0, 3.0))
+    )
+    assert slow - quick == pytest.approx(47)
+    assert busy == pytest.approx(5 * quick)
+    both_cores = estimate_cost(SIZES["cube"], WORK, Spent(3.0, 5.0)).seconds
+    assert both_cores == pytest.approx(quick), "a core that is free speeds up the timed solve as well"
+
+
+def test_a_run_takes_the_memory_that_preparing_took(monkeypatch) -> None:
+    monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
+    small, large = (
+        estimate_cost(SIZES["cube"], WORK, replace(PREPARED, memory=peak)).memory for peak in (2**20, 2**40)
+    )
+    assert (small, large) == (memory_needed(SIZES["cube"], WORK), 2**40)
 
 
 def test_time_without_detail_and_of_the_papers_method(monkeypatch) -> None:
     monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
     paper = replace(SMOOTH, settings=Settings.preset(method="paper"), largest=1.0, mean=1.0)
-    detailed, smooth, papers = (estimate_cost(SIZES["cube"], work).seconds for work in (WORK, SMOOTH, paper))
+    detailed, smooth, papers = (estimate_cost(SIZES["cube"], work, PREPARED).seconds for work in (WORK, SMOOTH, paper))
     assert 1.5 * smooth < detailed < 2.5 * smooth
     assert papers > 5 * smooth

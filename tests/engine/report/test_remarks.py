@@ -31,6 +31,14 @@ def test_a_fit_that_explains_little_is_said(left: float, kinds: list[str]) -> No
     assert said == [Doubt(kind, {"error": left}) for kind in kinds]
 
 
+def test_what_a_fire_leaves_is_said_to_be_fires() -> None:
+    """A bonfire lights its smoke: neither the light of the clip nor its background is what lacks."""
+    for left in (0.4, 0.8):
+        (said,) = shortcomings([{"hull_share": 0.1, "relative_error": left}], burns=True)
+        assert said == Doubt("fire beside what is fitted", {"error": left})
+    assert not shortcomings([{"hull_share": 0.1, "relative_error": 0.2}], burns=True)
+
+
 def test_empty_frames_are_counted() -> None:
     said = shortcomings([{"hull_share": 0.0}, {"hull_share": None}, {}, {"hull_share": 0.2}])
     assert said == [Doubt("empty frames", {"empty": 3, "frames": 4})]

@@ -197,8 +197,9 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
     )
     unknown = Estimate("unknown", what="smoke thickness", value="undetermined", source="assumed")
     light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), (unknown,))
-    _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255))
-    assert doubts == [Doubt("likely wrong light", {"error": error})] * said
+    for burns, kind in ((False, "likely wrong light"), (True, "light of fire")):
+        _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255), burns=burns)
+        assert doubts == [Doubt(kind, {"error": error})] * said
 
 
 def chosen(shot: Shot, what: str) -> Estimate:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
-from smokelift.report.cost import estimate_cost
+from smokelift.report.cost import Spent, estimate_cost, peak_memory
 from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, Fact, write_page
@@ -52,6 +53,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Prepare the shot and say what it takes."""
+    passed, worked = time.perf_counter(), time.process_time()
     settings = settings_of(options)
     for path in (*options.page, options.write):
         require_folder(path)
@@ -70,7 +72,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         for remark in remarks:
             say.note(remark)
         work = Workload.of(shot, settings)
-        cost = estimate_cost(domain.resolution, work)
+        prepared = Spent(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
+        cost = estimate_cost(domain.resolution, work, prepared)
         known = facts(shot, scene, cost)
         files = list(options.page)
         if options.page:
@@ -90,16 +93,16 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             "choices": [record(estimate) for estimate in shot.estimates],
             "facts": [fact.as_dict() for fact in known],
             "files": [str(path) for path in files],
-            "qualities": _qualities(shot, work),
+            "qualities": _qualities(shot, work, prepared),
             **asdict(cost),
         },
     )
 
 
-def _qualities(shot: Shot, work: Workload) -> dict[str, dict[str, Any]]:
+def _qualities(shot: Shot, work: Workload, prepared: Spent) -> dict[str, dict[str, Any]]:
     """What each quality takes of this clip, and what it loses of it."""
     return {
-        quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work))}
+        quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
         for quality, grid in shot.qualities.items()
     }
 

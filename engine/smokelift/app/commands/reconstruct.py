@@ -77,7 +77,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             f"in {options.out} are empty. "
             f"{sentence(what_helps(shot.clip, shot.views[0].plates, scene.background is not None))}"
         )
-    for doubt in shortcomings(figures):
+    for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)
     seconds = time.monotonic() - began
     fit = median_psnr(figures)

@@ -18,7 +18,7 @@ def finite_array(values: npt.ArrayLike) -> Doubles:
         raise ValueError("a velocity must be an array of vectors at voxel centres: velocity.centres(), not a Velocity")
     array = numbers(values, "values", np.float64)
     if not np.isfinite(array).all():
-        raise ValueError("values must be finite")
+        raise ValueError("values must be finite; replace those that are not, or leave their pixels or voxels out")
     return array
 
 
@@ -26,9 +26,9 @@ def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Doubles, Doubles]:
     """Return two arrays of float64; ValueError if a value is not finite, or they are empty or differ in shape."""
     first, second = finite_array(a), finite_array(b)
     if first.shape != second.shape:
-        raise ValueError(f"shapes must be equal, not {first.shape} and {second.shape}")
+        raise ValueError(f"shapes must be equal, not {first.shape} and {second.shape}; bring one to the other's size")
     if first.size == 0:
-        raise ValueError("arrays must not be empty")
+        raise ValueError("arrays must not be empty; give one value at least")
     return first, second
 
 
