@@ -212,8 +212,8 @@ def _strengthened(
     Given lights are measured or tracked, and a picture hardly contradicts them: stronger light with thinner smoke fits
     it as well or better, since thin smoke is the simpler one to fit. So lights are too weak only where even the
     densities that fit best are too dark, and stronger light leaves less dark: more smoke would only hide what is behind
-    it. Then the weakest light that leaves nothing dark is taken. Densities of thin smoke that are wrong otherwise stay
-    as dark in any light.
+    it. Then the weakest light that leaves nothing dark is taken; where none does it is not the light that is wrong.
+    Densities of thin smoke that are wrong otherwise stay as dark in any light.
     """
 
     def tried(factor: float) -> HeldOut:
@@ -227,7 +227,7 @@ def _strengthened(
         if stronger.error >= found.error or stronger.light >= found.light:
             break
         factor, found = factor * STEP, stronger
-    if factor == 1.0:
+    if factor == 1.0 or found.light > 1 + MAX_MISSING_LIGHT:
         return lights, ()
     figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
     strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MAX_MISSING_LIGHT)
