@@ -37,7 +37,6 @@ MIN_DENSITY = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
 range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
 
-
 SINGLE_VOXELS = 1.0
 """Standard deviation (voxels) of the Gaussian that leaves of a change what lobes share
 (docs/experiments/density-descent.md)."""
@@ -262,7 +261,7 @@ def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
 
 
 def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_]) -> Volume:
-    """A density with what changes in it from one to another of the hull's densities, but for single voxels' changes."""
+    """The density before a descent, with what it changes up to the one after, but for the changes of single voxels."""
     box = box_around(hull, 1)
     blurred_before, blurred_after = (ndimage.gaussian_filter(each[box], SINGLE_VOXELS) for each in (before, after))
     faint = FAINT_SHARE * float(blurred_before.max())

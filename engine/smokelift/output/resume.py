@@ -47,10 +47,8 @@ class ResumeState:
     def write(self, path: Path) -> None:
         """Write the state; OSError if that fails."""
         arrays = {"number": np.array(self.number), **dict(zip(VELOCITY, self.velocity, strict=True))}
-        for name, values in {
-            "density": self.density,
-            **{_EXTRA + name: kept for name, kept in self.extra.items()},
-        }.items():
+        volumes = {"density": self.density, **{_EXTRA + name: values for name, values in self.extra.items()}}
+        for name, values in volumes.items():
             there = values != 0
             arrays |= {
                 name: values[there],

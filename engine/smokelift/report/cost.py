@@ -2,8 +2,8 @@
 
 It follows the voxels of the box, and more so those that may hold smoke. The time of frames is counted in Poisson solves
 by cosine transforms, as long as one takes a voxel on this machine. What comes before the frames is not modelled: a
-forecast prepares the shot as the run does, and that takes as long and as much memory again, however the camera moves;
-and how long it waited for the processor is how busy the machine is. All constants: docs/experiments/memory-and-time.md.
+forecast prepares the shot as the run does, and that takes as long and as much memory again. How long it waited for the
+processor is how busy the machine is. All constants: docs/experiments/memory-and-time.md.
 """
 
 from __future__ import annotations
