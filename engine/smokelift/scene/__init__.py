@@ -8,14 +8,14 @@ from smokelift.scene.camera import LARGEST_PICTURE, Camera, as_matrix, look_at_m
 from smokelift.scene.checks import SceneError
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed, require_scene
-from smokelift.scene.description import Scene
-from smokelift.scene.dictionary import scene_from_dict, scene_to_dict
+from smokelift.scene.description import Scene, scene_from_dict
 from smokelift.scene.domain import SIDES, Box, Domain, Inlet, Side
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import SCATTERINGS, SHADOWED, Medium, Scattering
 from smokelift.scene.view import View
+from smokelift.scene.writing import scene_to_dict
 
 __all__ = [
     "LARGEST_PICTURE",

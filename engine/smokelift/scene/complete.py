@@ -51,7 +51,7 @@ class CompleteScene:
 
     def save(self, path: str | Path) -> None:
         """Write a scene file that `Scene.load` and `completed` read back as an equal scene; see `Scene.save`."""
-        write_file(vars(self), file_path(path, "path"))
+        write_file(self, file_path(path, "path"))
 
     def inflow(self) -> NDArray[np.bool_] | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""

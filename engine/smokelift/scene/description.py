@@ -10,9 +10,10 @@ refused for the same reasons; `smokelift.scene.reading` adds the file and the li
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from smokelift.checks import listed, require_kind, shown
 from smokelift.scene.background import Background
@@ -25,7 +26,7 @@ from smokelift.scene.finite_lights import PointLight
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import Medium, Scattering, checked_scattering
 from smokelift.scene.projection import sees
-from smokelift.scene.reading import read_file
+from smokelift.scene.reading import from_tables, read_file
 from smokelift.scene.view import View
 from smokelift.scene.writing import write_file
 
@@ -172,4 +173,24 @@ class Scene:
         OSError
             If the file cannot be written.
         """
-        write_file(vars(self), file_path(path, "path"), comments)
+        write_file(self, file_path(path, "path"), comments)
+
+
+def scene_from_dict(data: Mapping[str, Any], name: str = "scene", base: Path | None = None) -> Scene:
+    """Return the scene that the tables of a scene file describe, as a sequence keeps them in its JSON.
+
+    Parameters
+    ----------
+    data
+        The tables.
+    name
+        What messages call the source.
+    base
+        Folder that relative paths are relative to; None is the current one.
+
+    Raises
+    ------
+    SceneError
+        For the same reasons as `Scene.load`.
+    """
+    return from_tables(data, Scene, name, base)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
@@ -16,33 +16,20 @@ from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError
 from smokelift.scene.lights import LIGHT_TYPES
 
+if TYPE_CHECKING:
+    from smokelift.scene.complete import CompleteScene
+    from smokelift.scene.description import Scene
+
 Table = dict[str, Any]
 _LIGHT_NAMES = {kind: name for name, kind in LIGHT_TYPES.items()}
 
 
-def write_file(parts: Mapping[str, Any], path: Path, comments: Sequence[str] = ()) -> None:
-    """Write a scene file, whole or not at all; paths below its folder become relative to it.
-
-    Parameters
-    ----------
-    parts
-        The fields of a scene by name.
-    path
-        The file.
-    comments
-        Lines at its top.
-
-    Raises
-    ------
-    SceneError
-        If the path is that of a folder.
-    OSError
-        If the file cannot be written.
-    """
+def write_file(scene: Scene | CompleteScene, path: Path, comments: Sequence[str] = ()) -> None:
+    """Write a scene file, whole or not at all, with comments as lines at its top; see `Scene.save`."""
     if path.is_dir():
         raise SceneError(f"{path}: is a folder; give the name of a file")
     top = "".join(f"# {printable(line)}\n" for line in listed(comments, str, "comments", "a list of lines"))
-    text = top + tomli_w.dumps(to_tables(parts, path.absolute().parent))
+    text = top + tomli_w.dumps(scene_to_dict(scene, path.absolute().parent))
     aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         aside.write_text(text, encoding="utf-8")
@@ -55,25 +42,25 @@ def write_file(parts: Mapping[str, Any], path: Path, comments: Sequence[str] = (
             aside.unlink(missing_ok=True)
 
 
-def to_tables(parts: Mapping[str, Any], base: Path | None) -> Table:
-    """Return the tables of a scene file: dictionaries, lists, strings and numbers only.
+def scene_to_dict(scene: Scene | CompleteScene, base: Path | None = None) -> Table:
+    """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
 
     Parameters
     ----------
-    parts
-        The fields of a scene by name. What is None or empty has no table.
+    scene
+        Any scene. A complete one is what `completed` makes of the description that is read back.
     base
-        Paths below this folder become relative to it, all others absolute.
+        Paths below this folder become relative to it; all others absolute.
     """
     tables: Table = {
-        "clip": _table(parts["clip"], base),
-        "camera": _table(parts["camera"], base),
-        "domain": _table(parts["domain"], base, closed=parts["closed"]),
-        "inlet": [_table(inlet, base) for inlet in parts["inlets"]] or None,
-        "medium": _table(parts["medium"], base, scattering=parts["scattering"]),
-        "lights": [_table(light, base) for light in parts["lights"]] or None,
-        "background": _table(parts["background"], base),
-        "views": [_table(view, base) for view in parts["views"]] or None,
+        "clip": _table(scene.clip, base),
+        "camera": _table(scene.camera, base),
+        "domain": _table(scene.domain, base, closed=scene.closed),
+        "inlet": [_table(inlet, base) for inlet in scene.inlets] or None,
+        "medium": _table(scene.medium, base, scattering=scene.scattering),
+        "lights": [_table(light, base) for light in scene.lights] or None,
+        "background": _table(scene.background, base),
+        "views": [_table(view, base) for view in scene.views] or None,
     }
     return {name: table for name, table in tables.items() if table is not None}
 
