@@ -18,10 +18,9 @@ from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.process import run_module
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.resampling import on_grid, resampled
-from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed

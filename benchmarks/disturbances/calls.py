@@ -11,10 +11,9 @@ from benchmarks.disturbances.spoiled import FIRST, plain
 from smokelift import Settings
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
-from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values
+from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values, finite_mean
 from smokelift.evaluation.metrics import psnr, velocity_error
 from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.series import finite_mean
 from smokelift.pipeline import Method, compose
 from smokelift.render import scene_renderer
 from smokelift.setup.prepare import prepare_shot

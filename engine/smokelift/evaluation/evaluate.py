@@ -30,10 +30,8 @@ class Evaluation:
     ----------
     figures
         Nested plain values, as JSON holds them; None where there is nothing to say.
-    sequence
-        What was evaluated.
-    truth
-        Of its box, if it is known.
+    sequence, truth
+        What was evaluated, and the truth of its box, if it is known.
     """
 
     figures: Figures
@@ -63,8 +61,6 @@ def evaluate(
 
     Parameters
     ----------
-    sequence
-        What was reconstructed.
     truth_path
         A truth.npz over the same box and at the same rate; resolutions may differ.
     view_paths

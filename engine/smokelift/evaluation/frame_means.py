@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from scipy import ndimage
 
 from smokelift.evaluation import metrics
 from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import linear_to_srgb
 from smokelift.render import Image, Volume
@@ -32,13 +32,7 @@ class PictureMeans:
         self._frames: list[Figures] = []
 
     def add(self, image: Image, truth: Image) -> Figures:
-        """Add a frame, linear radiance (rows, columns, 3), and return its own metrics.
-
-        Raises
-        ------
-        ValueError
-            If the shapes differ or a value is not finite.
-        """
+        """Add a frame, linear radiance (rows, columns, 3), and return its own metrics."""
         found, true = (eight_bit_values(picture) for picture in _without_copies(image, truth))
         figures = {"psnr": metrics.psnr(found, true), "ssim": metrics.ssim(found, true)}
         self._frames.append(figures)
@@ -50,13 +44,7 @@ class PictureMeans:
 
 
 class VolumeMeans:
-    """Densities and velocities beside the true ones, on the truth's grid.
-
-    Parameters
-    ----------
-    truth
-        What they should be.
-    """
+    """Densities and velocities beside the true ones, on the truth's grid."""
 
     def __init__(self, truth: Truth) -> None:
         self._truth = truth
@@ -64,22 +52,10 @@ class VolumeMeans:
         self._before: tuple[int, Volume] | None = None
 
     def add(self, frame: int, density: Volume, velocity: Array | None = None) -> Figures:
-        """Add a frame and return its own metrics.
+        """Add a frame of the truth, from 0, in order, and return its own metrics.
 
-        Parameters
-        ----------
-        frame
-            Of the truth, from 0, in order.
-        density
-            Shape (nx, ny, nz), of any resolution over the truth's box.
-        velocity
-            In m/s at the voxels' centres, shape (nx, ny, nz, 3), of the smoke that arrives in this frame. Compared from
-            the second frame on.
-
-        Raises
-        ------
-        ValueError
-            If a value is not finite.
+        The density (nx, ny, nz) has any resolution over the truth's box. The velocity (nx, ny, nz, 3), in m/s at the
+        voxels' centres, is of the smoke that arrives in this frame; it is compared from the second frame on.
         """
         truth = self._truth
         found, true = resampled(density, truth.shape), truth.density(frame)
@@ -124,6 +100,12 @@ class VolumeMeans:
         """Means over the frames that are finite."""
         names = dict.fromkeys(name for figures in self._frames for name in figures)
         return {name: finite_mean(f[name] for f in self._frames if name in f) for name in names}
+
+
+def finite_mean(values: Iterable[float | None]) -> float | None:
+    """The mean of what is known and finite (equal pictures have infinite decibels); None where nothing is."""
+    finite = [value for value in values if value is not None and np.isfinite(value)]
+    return float(np.mean(finite)) if finite else None
 
 
 def eight_bit_values(image: npt.ArrayLike) -> Array:

@@ -19,14 +19,8 @@ GAMMA = 2.2
 class Orbit:
     """Renders densities of one scene from all azimuths about the vertical; 0 is the camera's, orthographic.
 
-    Smoke that no light makes brighter is shown by what it takes from white light behind it.
-
-    Parameters
-    ----------
-    scene
-        Its background does not count.
-    lights_turn
-        Whether the lights go around with the camera, so that every azimuth is lit as the front is.
+    Smoke that no light makes brighter is shown by what it takes from white light behind it. The scene's background does
+    not count. With `lights_turn` the lights go around with the camera, so that every azimuth is lit as the front is.
     """
 
     def __init__(self, scene: CompleteScene, *, lights_turn: bool = False) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.evaluation.frame_means import finite_mean
 from smokelift.evaluation.metrics import PatchStatistics, flicker, mean_gradient
 from smokelift.evaluation.orbit import Orbit
-from smokelift.evaluation.series import finite_mean
 from smokelift.render import Volume
 from smokelift.scene import CompleteScene
 from smokelift.transport import Array
@@ -46,16 +46,7 @@ def orbit_scores(
     Beside the truth all are lit as the scene is. Beside the front the lights go around with the camera, for what counts
     is the texture of the smoke, and not on which side the sun stands. The front is the sequence's own, rendered at
     azimuth 0, and not the clip's frames: camera, light and resolution are then the same, there is no grain, and a
-    blurred front shows in its PSNR.
-
-    Parameters
-    ----------
-    scene
-        On the grid of all densities.
-    count
-        Consecutive frames, at least one.
-    density, truth
-        Of these frames, on one grid.
+    blurred front shows in its PSNR. There are `count` consecutive frames, at least one, on the scene's grid.
 
     Returns
     -------

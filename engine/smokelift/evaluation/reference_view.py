@@ -68,23 +68,10 @@ def first_frame(sequence: Sequence) -> int:
 def open_views(
     sequence: Sequence, paths: tuple[tuple[Path, Path], ...], stack: ExitStack, notes: list[str]
 ) -> list[ReferenceView]:
-    """Open the sequence's own input, and other cameras with their clips.
+    """Open the sequence's own input, and other cameras with their clips, by the paths of both.
 
-    Parameters
-    ----------
-    sequence
-        With at least one frame.
-    paths
-        Camera files and clips.
-    stack
-        Closes the clips.
-    notes
-        Takes a sentence if the input cannot be compared with.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot be read, or a camera does not fit its clip.
+    The stack closes the clips. The notes take a sentence if the input cannot be compared with. It raises ValueError if
+    a file cannot be read, or a camera does not fit its clip.
     """
     scene = sequence.scene
     views = []

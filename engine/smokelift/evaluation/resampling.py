@@ -17,13 +17,9 @@ def on_grid(scene: CompleteScene, shape: tuple[int, int, int]) -> CompleteScene:
 
 
 def resampled(values: Array, shape: tuple[int, int, int]) -> Array:
-    """Return a volume on another grid over the same box.
+    """Return a volume (nx, ny, nz, ...) on another grid over the same box.
 
-    Parameters
-    ----------
-    values : (nx, ny, nz, ...)
-    shape
-        Of the new grid. Along an axis where it is coarser its values are means, otherwise they are interpolated.
+    Along an axis where that is coarser its values are means, otherwise they are interpolated.
     """
     if values.shape[:3] == tuple(shape):
         return values

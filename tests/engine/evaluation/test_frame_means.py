@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
 from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.transport import Velocity
 

@@ -50,13 +50,7 @@ class PatchStatistics:
 
     @staticmethod
     def of(picture: npt.ArrayLike) -> PatchStatistics:
-        """Return the statistics of a picture (rows, columns) of smoke before black.
-
-        Raises
-        ------
-        ValueError
-            If a value is not finite or the picture has not two axes.
-        """
+        """Return the statistics of a picture (rows, columns) of smoke before black."""
         values = finite_array(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
@@ -70,9 +64,8 @@ class PatchStatistics:
         Elnekave and Weiss, "Generating natural images with direct patch distributions matching" (ECCV 2022). Every
         random direction holds something of every wave, so what is strongest decides: outlines and slow shading.
 
-        Returns
-        -------
-        0 for equal distributions, about 1 if only the reference has smoke; infinity if only the reference has none.
+        It is 0 for equal distributions, about 1 if only the reference has smoke; infinity if only the reference has
+        none.
         """
         away, spread = (np.sqrt(np.mean(values[:, :DIRECTIONS] ** 2, axis=1)) for values in self._beside(reference))
         return _mean_ratio(away, spread)
@@ -81,11 +74,7 @@ class PatchStatistics:
         """Return the distance on the waves, each in units of its own spread; the mean over scales and waves.
 
         All sizes and directions of detail count alike, so it sees what is constant along rows, soft or noisy, however
-        faint.
-
-        Returns
-        -------
-        As `distance`.
+        faint. Its range is that of `distance`.
         """
         away, spread = (values[:, DIRECTIONS:].ravel() for values in self._beside(reference))
         return _mean_ratio(away, spread)
@@ -96,13 +85,7 @@ class PatchStatistics:
 
 
 def mean_gradient(picture: npt.ArrayLike) -> float:
-    """Return the sum of a picture's gradients over that of its values: how sharp it is; 0 for a black one.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or the picture has not two axes of two pixels at least.
-    """
+    """Return the sum of a picture's gradients over that of its values: how sharp it is; 0 for a black one."""
     values = finite_array(picture)
     down, right = np.gradient(values)
     total = float(values.sum())
