@@ -16,7 +16,6 @@ from smokelift.transport.grid import (
     part_of,
     require_positive,
     require_same_shape,
-    sides_in_order,
 )
 from smokelift.transport.pressure import divergence, outflow, project, without_divergence
 
@@ -40,6 +39,5 @@ __all__ = [
     "project",
     "require_positive",
     "require_same_shape",
-    "sides_in_order",
     "without_divergence",
 ]

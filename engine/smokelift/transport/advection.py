@@ -101,14 +101,9 @@ def advect(
 
 
 def advect_cells(field: Array, displacement: StaggeredGrid) -> Array:
-    """Values at x - displacement(x), interpolated linearly; beyond the box the field continues as on its side.
+    """Values (nx, ny, nz) at x - displacement(x), in voxels, interpolated linearly.
 
-    Parameters
-    ----------
-    field : (nx, ny, nz) float32
-        At voxel centres.
-    displacement
-        In voxels.
+    Beyond the box the field continues as on its side.
     """
     return _core.advect_cells(field, displacement.faces, False, True)
 

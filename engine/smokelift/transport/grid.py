@@ -16,6 +16,7 @@ from smokelift.checks import numbers, shown
 from smokelift.checks.array_types import Array
 from smokelift.scene import SIDES, Side
 from smokelift.scene.checks import LARGEST, SMALLEST
+from smokelift.scene.domain import checked_sides
 
 Faces = tuple[Array, Array, Array]
 VoxelBox = tuple[slice, slice, slice]
@@ -60,13 +61,13 @@ class StaggeredGrid:
                 "expected (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1)."
             )
         object.__setattr__(self, "faces", (x, y, z))
-        object.__setattr__(self, "closed", sides_in_order(self.closed))
+        object.__setattr__(self, "closed", checked_sides(self.closed))
 
     @classmethod
     def zero(cls, shape: tuple[int, ...], voxel_size: float, closed: Iterable[Side] = ()) -> Self:
         """The field that is zero on a box of `shape` voxels."""
         x, y, z = (np.zeros(n, np.float32) for n in face_shapes(shape))
-        return cls((x, y, z), voxel_size, sides_in_order(closed))
+        return cls((x, y, z), voxel_size, tuple(closed))
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -234,16 +235,6 @@ def on_faces(centres: Array) -> Faces:
     )
     half = np.float32(0.5)
     return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
-
-
-def sides_in_order(closed: Iterable[Side]) -> tuple[Side, ...]:
-    """Return the names of walls in the order of `SIDES`; ValueError if one is unknown."""
-    if isinstance(closed, str) or not isinstance(closed, Iterable):
-        raise ValueError(f"closed must be a list of sides, some of {', '.join(SIDES)}, not {shown(closed)}.")
-    names = list(closed)
-    if unknown := [name for name in names if name not in SIDES]:
-        raise ValueError(f"unknown side {unknown[0]!r}: expected some of {', '.join(SIDES)}.")
-    return tuple(side for side in SIDES if side in names)
 
 
 def require_positive(name: str, value: float) -> None:

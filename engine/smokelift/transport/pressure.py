@@ -11,7 +11,7 @@ import smokelift._core as _core
 from smokelift.checks import require_kind
 from smokelift.checks.array_types import Array
 from smokelift.scene import Side
-from smokelift.transport.grid import StaggeredGrid, Velocity, sides_in_order
+from smokelift.transport.grid import StaggeredGrid, Velocity
 
 
 def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocity:
@@ -49,7 +49,7 @@ def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocit
     """
     require_kind(velocity, Velocity, "velocity", "a Velocity")
     if closed is not None:
-        velocity = replace(velocity, closed=sides_in_order(closed))
+        velocity = replace(velocity, closed=tuple(closed))
     grid, largest = without_divergence(velocity, passes=2)
     return Velocity(grid.faces, velocity.voxel_size, velocity.closed, figures={"divergence": largest})
 
@@ -57,26 +57,17 @@ def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocit
 def without_divergence(field: StaggeredGrid, passes: int = 1) -> tuple[StaggeredGrid, float]:
     """The nearest field without divergence, and max |div u| times voxel size over max |u| of that.
 
-    Parameters
-    ----------
-    field
-        Any field.
-    passes
-        Projections in a row. A second one removes what rounding leaves of a large divergence.
+    A second pass removes what rounding leaves of a large divergence.
     """
     faces, largest = _core.project(field.faces, field.walls, passes=passes)
     return StaggeredGrid((faces[0], faces[1], faces[2]), field.voxel_size, field.closed), largest
 
 
 def outflow(sources: Array, like: StaggeredGrid) -> StaggeredGrid:
-    """The field that is the gradient of something and has a given net outflow from every voxel.
+    """The field that is the gradient of something and has a given net outflow (nx, ny, nz) from every voxel.
 
-    Parameters
-    ----------
-    sources : (nx, ny, nz) float32
-        The sum over a voxel's six faces, outwards. With all sides closed its mean is left out, as it cannot get away.
-    like
-        Gives the grid.
+    That is the sum over a voxel's six faces, outwards. With all sides closed its mean is left out, as it cannot get
+    away.
     """
     pressure = _core.solve_poisson(sources, like.walls)
     faces = []

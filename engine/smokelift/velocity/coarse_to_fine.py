@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 import smokelift._core as _core
 from smokelift.scene import Side
+from smokelift.scene.domain import checked_sides
 from smokelift.transport import (
     Array,
     Faces,
@@ -18,7 +19,6 @@ from smokelift.transport import (
     StaggeredGrid,
     Velocity,
     advect_cells,
-    sides_in_order,
 )
 from smokelift.velocity.estimator import VelocityEstimate, checked, coarsened, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
@@ -48,7 +48,7 @@ class CoarseToFine:
         settings = self.settings
         # a prediction may be on the coarser grid already, where its shape is checked
         first, second = checked(pair, None if settings.coarsening else prediction)
-        closed = sides_in_order(pair.closed)
+        closed = checked_sides(pair.closed)
         peaks = sorted(float(density.max()) for density in (first, second))
         if peaks[0] <= settings.smoke_threshold * peaks[1]:
             # Between smoke and none there is no motion to be seen: what is new has come in.

@@ -32,7 +32,7 @@ def test_bad_input_is_refused():
         advect(density - 1, velocity, 1.0, conserve=True)
     with pytest.raises(ValueError, match="not for a velocity"):
         advect(velocity, velocity, 1.0, conserve=True)
-    with pytest.raises(ValueError, match="unknown side 'up'"):
+    with pytest.raises(ValueError, match="closed must be a list of sides"):
         project(velocity, ("up",))
     with pytest.raises(ValueError, match="voxel_size must be positive"):
         Velocity.zero(SHAPE, 0.0)

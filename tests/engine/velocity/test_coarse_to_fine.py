@@ -243,7 +243,7 @@ def test_smoke_at_rest_has_no_velocity(estimator):
             {"prediction": Velocity.zero((31, 28, 40), VOXEL), "settings": VelocitySettings(coarsening=1)},
             "prediction has shape",
         ),
-        ({"closed": ("top",)}, "unknown side 'top'"),
+        ({"closed": ("top",)}, "closed must be a list of sides"),
     ],
 )
 def test_bad_input_is_refused(change, message):
