@@ -68,11 +68,6 @@ def run_on_cluster(
         Is called when the scheduler goes away.
     returns, pause
         Seconds in which a scheduler that went away has to return, and from try to try.
-
-    Raises
-    ------
-    ClusterError
-        If Dask is not installed, or there is no scheduler at the address.
     """
     try:
         import distributed

@@ -60,23 +60,10 @@ class EngineResult:
 def run_engine(
     arguments: Sequence[str], stop: threading.Event, log: Path, engine: Sequence[str] = ENGINE
 ) -> EngineResult:
-    """Run the engine to its end.
+    """Run the engine to its end, with arguments of ``smokelift``.
 
-    Parameters
-    ----------
-    arguments
-        Of ``smokelift``.
-    stop
-        Ends the run once it is set; finished frames stay.
-    log
-        A file to which all that the engine says is appended; what cannot be written there is left out.
-    engine
-        The command.
-
-    Raises
-    ------
-    OSError
-        If it cannot be started.
+    `stop` ends the run once it is set; finished frames stay. All that the engine says is appended to the file `log`;
+    what cannot be written there is left out. It raises OSError if the engine cannot be started.
     """
     began = time.monotonic()
     result = EngineResult()

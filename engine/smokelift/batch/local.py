@@ -33,18 +33,8 @@ def run_here(
     """Run shots side by side and yield each when it has ended.
 
     A shot starts as soon as its memory is left, in the order of the list; a small one may overtake a large one. What
-    needs more than all of it runs alone.
-
-    Parameters
-    ----------
-    shots
-        With what is known of them; without a forecast a shot runs alone.
-    work
-        Runs one to its end.
-    room
-        What they may take.
-    stop
-        Set when the caller leaves early: the work ends, and is waited for.
+    needs more than all of it, or has no forecast, runs alone. When the caller leaves early `stop` is set: the work
+    ends, and is waited for.
     """
     waiting = list(shots)
     running: dict[Future[Record], tuple[BatchShot, int]] = {}

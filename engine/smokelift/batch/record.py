@@ -78,16 +78,7 @@ class Record:
 class Frames:
     """The finished frames of a shot.
 
-    Attributes
-    ----------
-    count
-        How many.
-    complete
-        Whether these are all.
-    seconds
-        That were spent on each.
-    psnr
-        Of those with smoke, dB.
+    How many, whether these are all, the seconds that were spent on each, and the PSNR in dB of those with smoke.
     """
 
     count: int = 0

@@ -87,21 +87,9 @@ class BatchShot:
 
 
 def read_shots(path: Path, check: Check) -> tuple[BatchShot, ...]:
-    """Read a list of shots.
+    """Read a list of shots, the arguments of each of which `check` judges.
 
-    Parameters
-    ----------
-    path
-        The file.
-    check
-        Judges the arguments of each.
-
-    Raises
-    ------
-    ValueError
-        With the file, the line and what was expected.
-    OSError
-        If the file cannot be read.
+    It raises ValueError with the file, the line and what was expected, and OSError if the file cannot be read.
     """
     text = read_text(path)
     try:

@@ -22,14 +22,8 @@ from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 class Patience:
     """How long to wait for failures that pass: a full disk, a server that is away, memory that others use.
 
-    Attributes
-    ----------
-    pause
-        Seconds before the first new try; each further pause is twice as long.
-    longest_pause
-        Seconds.
-    total
-        Seconds without a new frame after which the shot is given up.
+    In seconds: the pause before the first new try, each further one being twice as long up to the longest, and the
+    total without a new frame after which the shot is given up.
     """
 
     pause: float = 5.0
@@ -43,15 +37,7 @@ PATIENCE = Patience()
 def look_at_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
     """Ask the engine what a shot will take, unless that is known.
 
-    Returns
-    -------
-    Record
-        With a forecast; or ``refused`` with the reason, which is not kept.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written to.
+    The record has a forecast; or it is ``refused`` with the reason, and not kept.
     """
     record = read_record(shot)
     if record.forecast is not None:
@@ -76,25 +62,9 @@ def finish_shot(
 ) -> Record:
     """Reconstruct a shot to its end, going on from the frames that are there.
 
-    A failure that passes is waited for. After a crash the caller decides where to try again.
-
-    Parameters
-    ----------
-    shot
-        What to reconstruct.
-    stop
-        Ends the work once it is set; finished frames stay.
-    say
-        Is called with what is waited for.
-    patience
-        How long to wait for failures that pass.
-    engine
-        The command.
-
-    Returns
-    -------
-    Record
-        As it was written beside the sequence.
+    A failure that passes is waited for, and `say` is called with what it is. After a crash the caller decides where to
+    try again. Once `stop` is set the work ends; finished frames stay. The record is returned as it was written beside
+    the sequence.
     """
     waited, pause, frames = 0.0, patience.pause, -1
     while True:

@@ -47,12 +47,7 @@ class EndShots(WorkerPlugin):  # type: ignore[misc]  # Dask is not followed
 def work(shot: BatchShot, task: Task, batch: str) -> Record:
     """Work on a shot.
 
-    Raises
-    ------
-    ShotCrashedError
-        If the engine ended by itself.
-    Reschedule
-        If the worker ends before the shot does.
+    It raises ShotCrashedError if the engine ended by itself, and Reschedule if the worker ends before the shot does.
     """
     try:
         record = task(shot, _STOPS.setdefault(batch, threading.Event()))

@@ -24,21 +24,7 @@ def require_kind(
 ) -> None:
     """Refuse an argument that is of none of the kinds.
 
-    Parameters
-    ----------
-    value
-        What was given.
-    kinds
-        What is taken.
-    name, expected
-        Of the argument, and what it must be, in words.
-    error
-        What is raised.
-
-    Raises
-    ------
-    ValueError
-        Of another kind.
+    `name` is that of the argument, `expected` says in words what it must be, and the error of that kind is raised.
     """
     if not isinstance(value, kinds):
         raise error(f"{name} must be {expected}, not {described(value)}.")
@@ -62,19 +48,8 @@ def listed(
 def numbers(values: Any, name: str, dtype: type[np.floating[Any]] = np.float32) -> NDArray[Any]:
     """Return an array of real numbers; the same one if it is of the type that is wanted.
 
-    Parameters
-    ----------
-    values
-        An array, or lists of numbers.
-    name
-        What a message calls it.
-    dtype
-        Of the result. A number that it cannot hold becomes infinite.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else, or rows of different lengths.
+    A number that the type cannot hold becomes infinite. It raises ValueError, with the name, if it holds anything else,
+    or rows of different lengths.
     """
     try:
         array = np.asarray(values)
@@ -87,12 +62,9 @@ def numbers(values: Any, name: str, dtype: type[np.floating[Any]] = np.float32) 
 
 
 def radiance(values: Any, name: str) -> NDArray[np.float32]:
-    """Return a picture as float32.
+    """Return a picture as float32; ValueError if it holds no real numbers, or the codes of a picture file.
 
-    Raises
-    ------
-    ValueError
-        If it holds no real numbers, or the codes of a picture file: nothing would look wrong but the result.
+    Of those nothing would look wrong but the result.
     """
     if getattr(values, "dtype", None) in CODES:
         raise ValueError(f"{name} must be linear radiance, not codes of {values.dtype}; `Clip` reads files as light.")

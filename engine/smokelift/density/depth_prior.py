@@ -133,7 +133,7 @@ class RoundDepth:
 
     def _in_its_shadows(self, view: ObservedView, views: ViewSet, scatter: Scatter | None) -> ObservedView:
         """The only view, with the optical depth that explains it in the shadows of the smoke that it shows itself."""
-        optics = replace(views.optics, domain=views.optics.domain.halved())  # shadows need no single voxels
+        optics = replace(views.optics, domain=views.optics.domain.coarser(2))  # shadows need no single voxels
         coarse = replace(view, projection=project_voxels(view.camera, optics.domain))
         seen = ViewSet((coarse,), any_of_two(views.hull), optics, views.frame)
         density = _density(seen, self._profiles(seen, scatter))

@@ -58,7 +58,7 @@ class MomentLevel:
         views = self.views
         if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
             return None
-        optics = replace(views.optics, domain=views.optics.domain.halved())
+        optics = replace(views.optics, domain=views.optics.domain.coarser(2))
         seen = tuple(ObservedView.of(_shrunk(view, optics.domain), optics) for view in views.views)
         inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
         return MomentLevel(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)

@@ -25,20 +25,10 @@ FaceMasks = tuple[Mask, Mask, Mask]
 def project_with_given_faces(
     field: StaggeredGrid, given: FaceMasks, wanted: Faces, *, tolerance: float = 1e-3, limit: int = 60
 ) -> StaggeredGrid:
-    """The nearest field without divergence that has the values wanted on the given faces.
+    """The nearest field without divergence that has the values wanted on the given faces; others do not count.
 
-    Parameters
-    ----------
-    field
-        Any field.
-    given
-        Marks the faces.
-    wanted
-        Values there; others do not count. Where no field without divergence has them, the nearest are taken.
-    tolerance
-        Ends the iteration, relative to the first gradient.
-    limit
-        Iterations at most.
+    Where no field without divergence has them, the nearest are taken. The iteration ends at a tolerance relative to the
+    first gradient, or after `limit` rounds.
     """
     weights = [_half_on_sides(len(mask.shape), mask.shape[axis], axis) for axis, mask in enumerate(given)]
 

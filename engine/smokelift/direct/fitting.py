@@ -24,8 +24,7 @@ from smokelift.checks.array_types import Mask
 from smokelift.direct.burning import fit_fire
 from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.moment import Moment
-from smokelift.direct.physics import Physics
-from smokelift.direct.simulation import Simulation
+from smokelift.direct.simulation import Physics, Simulation
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Array, Velocity, advect
 from smokelift.velocity.pyramid import coarsen, coarsen_faces
@@ -52,16 +51,8 @@ def fit_simulation(
 ) -> Simulation:
     """Fit forces, inlets and fire to the moments of a clip, for a simulation that goes on from them.
 
-    Parameters
-    ----------
-    moments
-        Consecutive ones, two at least.
-    dt
-        Time between them in seconds.
-    marked : (nx, ny, nz) bool, optional
-        Where smoke enters, if that is known.
-    surroundings
-        What is placed around the smoke.
+    The moments are consecutive, two at least, `dt` seconds apart. Where smoke enters is marked (nx, ny, nz), if that is
+    known.
     """
     inflow = find_inflow(moments, dt, marked)
     dissipation = _dissipation(moments, dt, inflow.voxels)
@@ -70,14 +61,9 @@ def fit_simulation(
 
 
 def spun_up(simulation: Simulation, moments: Sequence[Moment]) -> Moment:
-    """The last of some moments, with the velocity that the forces have made since the first.
+    """The last of some consecutive moments, with the velocity that the forces have made since the first.
 
-    Parameters
-    ----------
-    simulation
-        Fitted to the moments; what is placed around the smoke does not act yet.
-    moments
-        Consecutive ones of the clip, with its densities.
+    The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
     return _spun_up(_along(simulation), moments)
 

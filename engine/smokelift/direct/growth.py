@@ -137,19 +137,10 @@ def moves(box: Domain, larger: Domain) -> Moves:
 
 
 def in_larger_box(moment: Moment, ends: Moves, before: Surroundings, after: Surroundings, time: float) -> Moment:
-    """A moment in a larger box.
+    """A moment, at a time in seconds, in a box that is larger by some `moves`.
 
-    Parameters
-    ----------
-    moment
-        The moment.
-    ends
-        See `moves`.
-    before, after
-        What is placed in its box, and in the larger one. The velocity of the air goes on as theirs, and what the smoke
-        has beside that as it is at the side.
-    time
-        Of the moment, in seconds.
+    The velocity of the air goes on as that of what is placed in the larger box; what the smoke has beside the air of
+    its own box goes on as it is at the side.
     """
     velocity = moment.velocity
     air = before.air(velocity, time)
@@ -164,18 +155,8 @@ def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float, first: tuple
     """A moment whose smoke has lost what it loses in a step on its way to sides that cannot move.
 
     What is left of it goes with the distance to the power `FADE_POWER`, to a surface before the side that has bumps. So
-    it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight.
-
-    Parameters
-    ----------
-    moment
-        The moment.
-    stopped
-        The sides.
-    dt
-        Seconds of the step.
-    first
-        Voxel at which the box begins, counted from the clip's box: the bumps stay where they are when the box grows.
+    it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight. The box
+    begins at the voxel `first` of the clip's: the bumps stay where they are when the box grows.
     """
     if not stopped:
         return moment
@@ -209,16 +190,7 @@ def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ..
 def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step: int, dt: float) -> Moment:
     """A moment whose smoke is thin where it has just come out of sides of the clip's box that had cut it.
 
-    Parameters
-    ----------
-    moment
-        The moment.
-    clip
-        The clip's box in its voxels.
-    cut
-        Sides of the clip's box.
-    step, dt
-        Steps since the clip, and seconds of each.
+    It is so many steps of `dt` seconds after the clip, whose box is given in voxels.
     """
     missing = 1 - min(1.0, step * dt / EMERGING) ** 2
     if not cut or missing == 0:

@@ -96,16 +96,9 @@ class Inflow:
 
 
 def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None) -> Inflow:
-    """Find the inlets of a clip from its last moments.
+    """Find the inlets of a clip from its last moments, two at least, `dt` seconds apart.
 
-    Parameters
-    ----------
-    moments
-        Two at least.
-    dt
-        Time between them in seconds.
-    marked : (nx, ny, nz) bool, optional
-        Inlets that are known; otherwise they are found from what the velocities do not explain.
+    Inlets that are known are marked (nx, ny, nz); otherwise they are found from what the velocities do not explain.
     """
     voxels = _detect_inlets(moments, dt) if marked is None else marked
     if voxels.any():

@@ -28,12 +28,8 @@ def interpolate(
 
     Parameters
     ----------
-    before, after
-        The two moments.
     motion
-        Velocity in m/s that carries the first to the second in `dt`, at the points of arrival.
-    dt
-        Seconds from the one to the other.
+        Velocity in m/s that carries the first to the second in `dt` seconds, at the points of arrival.
     share
         0 for the first, 1 for the second.
     mix

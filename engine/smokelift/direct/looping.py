@@ -39,13 +39,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     """Return the first and the last frame of the longest part in which the smoke is steady.
 
     Where it is in none, of the parts that are half as long as the sequence or longer, the one in which it is most so.
-
-    Parameters
-    ----------
-    sequence
-        See `smokelift.direct.new_sequence.open_source`.
-    overlap
-        Frames that the start and the end share; None for `usual_overlap`.
+    Start and end share `overlap` frames, by default those of `usual_overlap`.
     """
     whole = len(sequence.frames)
     shortest = max(SHORTEST, math.ceil(whole / 2), 2 * (overlap or 0))
@@ -70,13 +64,7 @@ def usual_overlap(count: int) -> int:
 
 
 def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
-    """Return how many frames a loop has.
-
-    Raises
-    ------
-    ValueError
-        If there are no such frames, or too few.
-    """
+    """Return how many frames a loop has; ValueError if there are no such frames, or too few."""
     there = f"{sequence.directory}: has the frames {sequence.frames[0]} to {sequence.frames[-1]}"
     if not sequence.frames[0] <= first <= last <= sequence.frames[-1]:
         raise ValueError(f"{there}, not {first} to {last}.")
@@ -92,34 +80,12 @@ def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
 def loop_sequence(
     sequence: Sequence, out: str | Path, first: int, last: int, overlap: int, *, npz: bool = False, resume: bool = False
 ) -> Iterator[Written]:
-    """Write a part of a sequence so that its last frame leads to its first.
+    """Write a part of a sequence so that its last frame leads to its first; the rest is as in `continue_sequence`.
 
-    The part overlaps with its own start. In the overlap the motion from the last density to the first is estimated, the
-    last frames are advected along it and the first ones back, and the two are mixed. So shapes move to where they
-    have to be, and do not fade out in one place and in at another. Smoke that only one of them has comes and goes by
-    its edges.
-
-    Parameters
-    ----------
-    sequence
-        See `smokelift.direct.new_sequence.open_source`.
-    out
-        Directory to write to.
-    first, last
-        Frames of the part.
-    overlap
-        Frames in which the end becomes the start; the loop is shorter by so many.
-    npz, resume
-        As in `smokelift.output.writer.SequenceWriter`.
-
-    Yields
-    ------
-    The number and the figures of every frame, which is written already.
-
-    Raises
-    ------
-    ValueError
-        See `loop_length`, or if a file cannot be read or written.
+    The part overlaps with its own start, and the loop is shorter by so many frames. In the overlap the motion from the
+    last density to the first is estimated, the last frames are advected along it and the first ones back, and the two
+    are mixed. So shapes move to where they have to be, and do not fade out in one place and in at another. Smoke that
+    only one of them has comes and goes by its edges.
     """
     length = loop_length(sequence, first, last, overlap)
     settings = {"frames": [first, last], "overlap": overlap}
@@ -143,16 +109,10 @@ def loop_sequence(
 
 
 def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
-    """The smoke on its way from one moment of a clip to another that it is to become.
+    """The smoke on its way from one moment of a clip, `end`, to another that it is to become, `start`.
 
-    Parameters
-    ----------
-    end, start
-        The moment that leaves, and the one that comes.
-    share
-        Of the way, 0 to 1.
-    duration
-        Seconds that the whole way takes. The velocity gains what moves the one's shapes to the other's in them.
+    It has gone a share, 0 to 1, of the way, which takes a duration in seconds. The velocity gains what moves the one's
+    shapes to the other's in them.
     """
     if not (end.density.any() and start.density.any()):  # there are no shapes to carry
         way = Velocity.zero(end.velocity.shape, end.velocity.voxel_size, end.velocity.closed)
@@ -166,7 +126,7 @@ def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
 
 
 def mix_by_edges(end: Array, start: Array, share: float, closed: tuple[Side, ...] = ()) -> Array:
-    """Mix two densities so that neither shows through the other.
+    """Mix two densities (nx, ny, nz) so that neither shows through the other; a share of 0 gives the first.
 
     Where both are alike it is a linear mix. Where one alone has smoke, the thin of it goes first and comes last, as air
     dissolves smoke, and no shape becomes a ghost of itself. Each has the weight
@@ -175,15 +135,6 @@ def mix_by_edges(end: Array, start: Array, share: float, closed: tuple[Side, ...
 
     of density a beside b of the other, with the usual density c, more near open sides of the box: what rises out of it
     is gone before it shows where the box ends. The mass changes linearly.
-
-    Parameters
-    ----------
-    end, start : (nx, ny, nz)
-        Not negative.
-    share
-        0 for the first, 1 for the second.
-    closed
-        Sides of the box that are walls.
     """
     of_end, of_start = (float(values.sum(dtype=np.float64)) for values in (end, start))
     if of_end + of_start == 0:

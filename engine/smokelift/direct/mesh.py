@@ -52,25 +52,16 @@ class Crossings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A surface of triangles as an obstacle.
+    """A surface of triangles (n, 3, 3), corners in metres, as an obstacle.
 
-    Attributes
-    ----------
-    triangles : (n, 3, 3)
-        Corners in metres. Which way they turn does not matter, as long as it is the same over each part.
+    Which way they turn does not matter, as long as it is the same over each part.
     """
 
     triangles: npt.NDArray[np.float32]
 
     @staticmethod
     def read(path: Path) -> Mesh:
-        """Read a binary STL file, in metres, Z up.
-
-        Raises
-        ------
-        ValueError
-            With the path, if it cannot be read, is damaged or of another kind.
-        """
+        """Read a binary STL file, in metres, Z up; ValueError if it cannot be read, is damaged or of another kind."""
         if not path.is_file():
             raise ValueError(f"{path}: is no file; give the path of a binary STL file.")
         try:
@@ -96,13 +87,7 @@ class Mesh:
         return (a, b, c), (d, e, f)
 
     def voxels(self, domain: Domain) -> Mask:
-        """The voxels whose centres it encloses, shape (nx, ny, nz).
-
-        Raises
-        ------
-        ValueError
-            If it is open, such as a plane, so that it encloses nothing.
-        """
+        """The voxels (nx, ny, nz) whose centres it encloses; ValueError if it is open, such as a plane."""
         return enclosed(self.crossings(domain), domain)
 
     def crossings(self, domain: Domain) -> list[Crossings]:
@@ -117,13 +102,7 @@ class Mesh:
 
 
 def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
-    """The voxels around whose centres a surface winds, by the majority of the axes.
-
-    Raises
-    ------
-    ValueError
-        If it is open, such as a plane, so that it encloses nothing.
-    """
+    """The voxels around whose centres a surface winds, by the majority of the axes; ValueError if it is open."""
     votes, crossed = np.zeros(domain.shape, np.int8), False
     for order, found in zip(ORDERS, crossings, strict=True):
         shape = tuple(domain.shape[d] for d in order)
@@ -157,21 +136,9 @@ def _crossings(places: Doubles, shape: tuple[int, ...]) -> Crossings:
 
 
 def _pairs(triangles: Integers, low: Integers, size: Integers) -> tuple[Integers, Integers]:
-    """Triangles, each with every column of a rectangle.
+    """Triangles (m,) by number, each with every column of a rectangle, as numbers (k,) and columns' places (k, 2).
 
-    Parameters
-    ----------
-    triangles : (m,)
-        Their numbers.
-    low, size : (n, 2)
-        The first column of each triangle's rectangle, and how many it has along both axes.
-
-    Returns
-    -------
-    triangle : (k,)
-        Numbers.
-    column : (k, 2)
-        Places of the columns.
+    `low` and `size` (n, 2) are the first column of each triangle's rectangle, and how many it has along both axes.
     """
     counts = size[triangles].prod(axis=1)
     triangle = np.repeat(triangles, counts)

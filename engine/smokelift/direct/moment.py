@@ -8,7 +8,7 @@ import numpy as np
 
 from smokelift.direct.constraint import FaceMasks, project_with_given_faces
 from smokelift.output.sequence import Sequence
-from smokelift.transport import Array, Velocity, divergence
+from smokelift.transport import Array, Velocity, divergence, on_faces
 
 DIVERGENCE_TOLERANCE = 1e-3
 """Divergence times voxel size over the largest speed, below which a velocity counts as free of divergence."""
@@ -37,13 +37,7 @@ class Moment:
 
 
 def read_moment(sequence: Sequence, number: int) -> Moment:
-    """Read a frame of a sequence.
-
-    Raises
-    ------
-    SequenceError
-        If there is no such frame, or its file is missing or damaged.
-    """
+    """Read a frame of a sequence."""
     velocity = sequence.velocity(number)
     return Moment(sequence.density(number), complete_velocity(velocity), sequence.flame(number))
 
@@ -63,12 +57,6 @@ def complete_velocity(velocity: Velocity) -> Velocity:
 
 def _known(velocity: Velocity) -> FaceMasks:
     """The faces both of whose voxels have a velocity."""
-    known = velocity.centres().any(axis=-1)
-    pairs = []
-    for axis in range(3):
-        ends = [(1, 1) if d == axis else (0, 0) for d in range(3)]
-        padded = np.pad(known, ends, mode="edge")
-        count = padded.shape[axis]
-        pairs.append(padded.take(range(count - 1), axis) & padded.take(range(1, count), axis))
-    x, y, z = pairs
+    known = velocity.centres().any(axis=-1, keepdims=True).astype(np.float32)
+    x, y, z = (both == 1 for both in on_faces(np.broadcast_to(known, (*velocity.shape, 3))))
     return x, y, z

@@ -20,18 +20,9 @@ from smokelift.transport import Array, Faces
 
 @dataclass(frozen=True, eq=False)
 class MovingMesh:
-    """A mesh that is an obstacle, at one place after another.
+    """A mesh that is an obstacle, at one place after another, with the same triangles in the same order.
 
-    Attributes
-    ----------
-    places
-        At the frame that the smoke starts from and at every frame after it, with the same triangles in the same order.
-        It stays at the last one.
-
-    Raises
-    ------
-    ValueError
-        If there are none, or their numbers of triangles differ.
+    The places are those at the frame that the smoke starts from and at every frame after it; it stays at the last one.
     """
 
     places: tuple[Mesh, ...]
@@ -46,13 +37,7 @@ class MovingMesh:
 
     @staticmethod
     def read(path: Path) -> MovingMesh:
-        """Read numbered binary STL files from a pattern ``crate_####.stl`` (each # a digit at least).
-
-        Raises
-        ------
-        ValueError
-            If there are none or one is missing or damaged, or their numbers of triangles differ.
-        """
+        """Read numbered binary STL files from a pattern ``crate_####.stl`` (each # a digit at least)."""
         named = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
         if named is None or not path.parent.is_dir():
             raise ValueError(f"{path}: is no file, and no pattern crate_####.stl of numbered files; give one of them.")
@@ -89,12 +74,8 @@ class MovingMesh:
         """The voxels that it encloses after a step, and how fast it has moved there in m/s, on all faces.
 
         On a face between a voxel inside and one outside, the speed is that of the surface where it crosses the line
-        between their centres; on others it is that of the nearest such face.
-
-        Raises
-        ------
-        ValueError
-            If it is open, so that it encloses nothing.
+        between their centres; on others it is that of the nearest such face. A mesh that is open is refused by a
+        ValueError.
         """
         before, now = self.at(step - 1).triangles, self.at(step).triangles
         speeds = (now.astype(np.float64) - before) / dt

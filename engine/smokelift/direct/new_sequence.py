@@ -14,7 +14,6 @@ from smokelift.checks import counted
 from smokelift.checks.array_types import Mask
 from smokelift.direct.moment import Moment
 from smokelift.output.checksum import checksum
-from smokelift.output.index import Origins
 from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -29,13 +28,7 @@ Written = tuple[int, Mapping[str, Any]]
 
 
 def open_source(directory: str | Path) -> Sequence:
-    """Open the sequence that is directed.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or it has too few frames.
-    """
+    """Open the sequence that is directed; ValueError if there is none, or it has too few frames."""
     sequence = Sequence.open(directory)
     if len(sequence.frames) < SHORTEST:
         raise ValueError(
@@ -59,10 +52,6 @@ def directed_writer(
 
     Parameters
     ----------
-    sequence
-        The other.
-    out
-        Directory to write to.
     job, settings
         What is done to it; kept in the settings under ``direct``.
     how
@@ -70,8 +59,6 @@ def directed_writer(
     camera_frames
         For every frame that is written, the number of the frame of `sequence` whose camera it has; between frames the
         nearest, beyond them the last.
-    npz, resume
-        As in `SequenceWriter`.
     """
     scene = replace(sequence.scene, camera=_camera_at(sequence.scene.camera, camera_frames))
     return SequenceWriter(
@@ -80,11 +67,9 @@ def directed_writer(
         {**sequence.settings, "direct": {"job": job, **settings}},
         npz=npz,
         resume=resume,
-        origins=Origins(
-            choices=sequence.choices,
-            provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
-            sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},
-        ),
+        choices=sequence.choices,
+        provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
+        sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},
     )
 
 
@@ -105,20 +90,10 @@ def write_copy(
 def simulated_figures(
     moment: Moment, began: float, origin: str, further: Mapping[str, float], solid: Mask | None = None
 ) -> dict[str, Any]:
-    """The figures of a frame that no picture shows.
+    """The figures of a frame that no picture shows, and further ones.
 
-    Parameters
-    ----------
-    moment
-        The frame.
-    began
-        `time.perf_counter` when work on it began.
-    origin
-        In a word.
-    further
-        Further figures.
-    solid : (nx, ny, nz) bool, optional
-        Obstacles, inside which nothing counts.
+    Work on it began at `began` of `time.perf_counter`; its origin is a word. Inside obstacles, `solid` (nx, ny, nz),
+    nothing counts.
     """
     return {
         "origin": origin,

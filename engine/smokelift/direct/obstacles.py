@@ -19,15 +19,7 @@ from smokelift.transport import Faces, Velocity, divergence, face_shapes, outflo
 
 @dataclass(frozen=True)
 class Ball:
-    """A round obstacle or, moving, a fan.
-
-    Attributes
-    ----------
-    centre
-        In metres.
-    radius
-        In metres, above 0.
-    """
+    """A round obstacle or, moving, a fan: its centre and radius in metres."""
 
     centre: Vector
     radius: float
@@ -46,13 +38,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class BoxObstacle:
-    """A box as obstacle.
-
-    Attributes
-    ----------
-    low, high
-        Corners in metres.
-    """
+    """A box as obstacle, by its corners in metres."""
 
     low: Vector
     high: Vector
@@ -111,27 +97,13 @@ class Solid(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Everything in a box that smoke cannot go through.
-
-    Attributes
-    ----------
-    domain
-        The box.
-    things
-        In it, or outside.
-    """
+    """Everything that smoke cannot go through, in a box or outside it."""
 
     domain: Domain
     things: tuple[Obstacle, ...]
 
     def at(self, step: int, dt: float) -> Solid | None:
-        """What is solid after so many steps, which last `dt` seconds each; None if nothing is.
-
-        Raises
-        ------
-        ValueError
-            If it fills the box, or a mesh is open.
-        """
+        """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
         if not self.things:
             return None
         solid = Solid(self._still, None)
@@ -160,23 +132,9 @@ def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
 
 
 def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> None:
-    """Refuse a thing that no smoke can meet.
+    """Refuse a thing of that name that no smoke can meet, or a mesh that is open.
 
-    Parameters
-    ----------
-    what
-        Its name.
-    thing
-        The thing.
-    domain
-        The box at the start.
-    reach
-        How far it can grow.
-
-    Raises
-    ------
-    ValueError
-        If the thing holds no voxel of the box and does not stand where the box can grow to, or is a mesh that is open.
+    It has to hold a voxel of the box at the start, or to stand where the box can grow to.
     """
     low, high = thing.bounds()
     meets = all(a < d and b > c for a, b, c, d in zip(low, high, reach.min, reach.max, strict=True))

@@ -20,18 +20,9 @@ STEPS = 64
 
 
 def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
-    """Return the times of a clip that are shown at some speeds, one after the other.
+    """Return the times (n,) that are shown, in frames of the clip from 0, and the speed at each.
 
-    Parameters
-    ----------
-    count
-        Frames of the clip.
-    speeds
-        1 is the clip's own speed. Several lie evenly from its first frame to its last, and change linearly in between.
-
-    Returns
-    -------
-    The times in frames of the clip from 0, shape (n,), and the speed at each.
+    A speed of 1 is the clip's own. Several lie evenly from its first frame to its last, and change linearly in between.
     """
     clip_time = np.linspace(0, count - 1, STEPS * (count - 1) + 1)
     speed = np.interp(clip_time, np.linspace(0, count - 1, len(speeds)), speeds)
@@ -45,29 +36,10 @@ def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
 def retime_sequence(
     sequence: Sequence, out: str | Path, speeds: tuple[float, ...], *, npz: bool = False, resume: bool = False
 ) -> Iterator[Written]:
-    """Write a sequence at another pace: frames between the clip's own are interpolated from both neighbours.
+    """Write a sequence at the speeds of `playback`; the rest is as in `continue_sequence`.
 
-    Velocities are scaled with the speed: at half the speed they are half of the smoke's.
-
-    Parameters
-    ----------
-    sequence
-        See `smokelift.direct.new_sequence.open_source`.
-    out
-        Directory to write to.
-    speeds
-        See `playback`.
-    npz, resume
-        As in `smokelift.output.writer.SequenceWriter`.
-
-    Yields
-    ------
-    The number and the figures of every frame, which is written already.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot be read or written.
+    Frames between the clip's own are interpolated from both neighbours. Velocities are scaled with the speed: at half
+    the speed they are half of the smoke's.
     """
     times, pace = playback(len(sequence.frames), speeds)
     first, dt = sequence.frames[0], 1 / sequence.fps

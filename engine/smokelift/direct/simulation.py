@@ -26,12 +26,23 @@ from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.obstacles import Solid
-from smokelift.direct.physics import Physics, lift
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Array, Velocity, advect, on_faces, project
 
 TRACE = np.float32(1e-4)
 """Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What acts on the smoke of a clip.
+
+    The buoyancy is the upward acceleration at density 1, in m/s2, below zero for smoke that sinks; the dissipation is
+    the rate at which smoke dissolves, in 1/s, at least 0.
+    """
+
+    buoyancy: float
+    dissipation: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +87,9 @@ class Simulation:
         return self._driven(moment, step, self.surroundings.solid(step, self.dt))
 
     def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
-        """The simulation in a larger box.
+        """The simulation in a larger box with what is placed there.
 
-        Parameters
-        ----------
-        ends
-            Voxels by which the low side and the high side move outwards, along x, y and z.
-        surroundings
-            What is placed there.
+        The low and the high side move outwards by these ends, in voxels, along x, y and z.
         """
         first = tuple(start + low for start, (low, _) in zip(self.inflow.first, ends, strict=True))
         inflow = replace(self.inflow, first=first)
@@ -110,7 +116,8 @@ class Simulation:
 
     def _with_forces(self, moved: Velocity, moment: Moment, step: int) -> list[Array]:
         """The velocity on faces after forces, inlets and fans, before the projection."""
-        rising = lift(moment.density, moved).faces
+        rising = [np.zeros_like(component) for component in moved.faces]  # at a buoyancy of 1
+        rising[2][:, :, 1:-1] = 0.5 * (moment.density[:, :, 1:] + moment.density[:, :, :-1])
         faces = []
         for axis in range(3):
             driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis]

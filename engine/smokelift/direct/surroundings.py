@@ -19,15 +19,7 @@ RISE = 0.5
 
 @dataclass(frozen=True)
 class Fan:
-    """Air that is blown, in a ball.
-
-    Attributes
-    ----------
-    place
-        The ball.
-    velocity
-        Of the air in it, in m/s.
-    """
+    """Air that is blown, in a ball, at a velocity in m/s."""
 
     place: Ball
     velocity: Vector

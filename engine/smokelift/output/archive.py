@@ -32,13 +32,7 @@ MAX_VALUES = 2**32
 
 
 def write_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed: bool = True) -> None:
-    """Write arrays by name as a ``.npz``, one after the other: copies of all may not fit into memory.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write arrays by name as a ``.npz``, one after the other: copies of all may not fit into memory."""
     kind = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
     # not by NumPy, which an interrupt leaves with an open zip file that raises a second error when it is collected
     with atomic_path(path) as aside, aside.open("wb") as file, zipfile.ZipFile(file, "w", kind) as archive:
@@ -71,10 +65,8 @@ def read_arrays(
 
     Raises
     ------
-    FileNotFoundError
-        If there is no such file.
     OSError
-        With the path and the reason, if it is damaged, lacks an array, or holds others than expected.
+        With the path and the reason, if it is missing or damaged, lacks an array, or holds others than expected.
     """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")

@@ -8,13 +8,7 @@ from pathlib import Path
 
 
 def checksum(paths: Iterable[Path]) -> str:
-    """Return the SHA-256 of the content of files, one after the other, as hexadecimal digits.
-
-    Raises
-    ------
-    OSError
-        If one cannot be read.
-    """
+    """Return the SHA-256 of the content of files, one after the other, as hexadecimal digits."""
     total = hashlib.sha256()
     for path in paths:
         with path.open("rb") as file:

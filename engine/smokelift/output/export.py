@@ -73,14 +73,9 @@ class ExportSettings:
     velocity
         Whether to export the velocity, which motion blur needs.
     proxy
-        How many times coarser a second sequence for viewports is, of the density alone; 1 for none.
+        How many times coarser a second sequence for viewports is, of the density alone: 1 (none) to 16.
     host
         The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``.
-
-    Raises
-    ------
-    ValueError
-        If the proxy is not 1 to 16.
     """
 
     precision: Precision = "half"
@@ -100,25 +95,8 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
     There is no USD file for a program whose axes are left-handed. An earlier export in the folder is replaced. The
     sequence stays as it is.
 
-    Parameters
-    ----------
-    sequence
-        What is exported, with all its frames.
-    out
-        The folder, which is made if it is missing.
-    settings
-        What of it.
-
-    Yields
-    ------
-    The number of every frame, which is written already, and the bytes of its files.
-
-    Raises
-    ------
-    SequenceError
-        If there are no frames, the folder holds other files, or a file cannot be read or written.
-    VdbUnavailable
-        If there is no OpenVDB module.
+    It yields the number of every frame, which is written already, and the bytes of its files. It raises VdbUnavailable,
+    and SequenceError if there are no frames, the folder holds other files, or a file cannot be read or written.
     """
     out = Path(out)
     require_export(sequence, out)
@@ -140,10 +118,7 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
 def require_export(sequence: Sequence, out: Path) -> None:
     """Check, before anything is spent or written, that a sequence can be exported to a folder.
 
-    Raises
-    ------
-    SequenceError, VdbUnavailable
-        As `export_sequence`.
+    It raises what `export_sequence` would.
     """
     vdb_module()
     if not sequence.frames:
@@ -158,13 +133,7 @@ def require_export(sequence: Sequence, out: Path) -> None:
 
 
 def export_size(sequence: Sequence, settings: ExportSettings) -> int:
-    """Estimate the bytes of an export, from frames that are evenly spaced over the sequence.
-
-    Raises
-    ------
-    SequenceError, VdbUnavailable
-        As `export_sequence`.
-    """
+    """Estimate the bytes of an export, from frames that are evenly spaced over the sequence."""
     places = np.unique(np.linspace(0, len(sequence.frames) - 1, SAMPLED_FRAMES).round().astype(int))
     numbers = [sequence.frames[place] for place in places]
     peak = _peak(sequence, numbers, settings)
@@ -174,13 +143,7 @@ def export_size(sequence: Sequence, settings: ExportSettings) -> int:
 
 
 def require_space(out: Path, size: int) -> None:
-    """Check that so many bytes are free where a folder will be.
-
-    Raises
-    ------
-    SequenceError
-        If they are not.
-    """
+    """Check that so many bytes are free where a folder will be; SequenceError if not."""
     there = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
     free = shutil.disk_usage(there).free
     if free < size:

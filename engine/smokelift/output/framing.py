@@ -59,11 +59,6 @@ def frame_smoke(sequence: Sequence) -> Framing:
     """Find where the smoke of a sequence is, from the scene's camera and from that camera turned about the smoke.
 
     It reads every frame.
-
-    Raises
-    ------
-    SequenceError
-        If a frame is missing or damaged.
     """
     scene = sequence.scene
     box = _smoke_box(sequence)
@@ -100,12 +95,8 @@ def _smoke_box(sequence: Sequence) -> Domain:
         side |= opacity * density.sum(0) > VISIBLE
     if not (front.any() and side.any()):
         return domain
-    spans = [np.flatnonzero(line)[[0, -1]] for line in (front.any(1), side.any(1), front.any(0))]
-    low = np.array([first for first, _ in spans])
-    x, y, z = (int(last - first) + 1 for first, last in spans)
-    corner = np.array(domain.min) + low * domain.voxel_size
-    far = corner + np.array([x, y, z]) * domain.voxel_size
-    return Domain((corner[0], corner[1], corner[2]), (far[0], far[1], far[2]), (x, y, z))
+    x, y, z = (np.flatnonzero(line) for line in (front.any(1), side.any(1), front.any(0)))
+    return domain.part(tuple(slice(int(seen[0]), int(seen[-1]) + 1) for seen in (x, y, z)))
 
 
 def _rim(box: Domain) -> NDArray[np.float64]:

@@ -21,23 +21,11 @@ def eight_bit(image: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 
 
 def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) -> None:
-    """Write a linear picture as EXR (linear) or PNG (8 bit sRGB, clipped to 0..1).
+    """Write a linear picture, (height, width, 3) or (height, width), as EXR or as PNG (8 bit sRGB, clipped to 0..1).
 
-    Parameters
-    ----------
-    path
-        Ends in ``.exr`` or ``.png``. The file appears whole or not at all.
-    image
-        Linear values, shape (height, width, 3) or (height, width).
-    half
-        EXR: 16 bit floats, else 32 bit ones.
-
-    Raises
-    ------
-    ImageError
-        If the suffix or the shape is another, or a value is not finite.
-    OSError
-        If the file cannot be written.
+    The path ends in ``.exr`` or ``.png``; the file appears whole or not at all. An EXR has 16 bit floats if `half` is
+    true, else 32 bit ones. It raises ImageError if the suffix or the shape is another or a value is not finite, and
+    OSError if the file cannot be written.
     """
     path = Path(path)
     values = np.asarray(image, np.float32)

@@ -6,12 +6,12 @@ import json
 import math
 import platform
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin, get_type_hints
 
 import numpy as np
 
@@ -62,26 +62,6 @@ def software_versions() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Origins:
-    """Where a result comes from, in values that JSON can hold.
-
-    Attributes
-    ----------
-    choices
-        What was chosen for the clip and why. Not compared when a run goes on: what they decided is in the scene and the
-        settings.
-    provenance
-        What of the result is measured, estimated, assumed and made up. Not compared either.
-    sources
-        Size and content of the files that the run reads, by their table in a scene file.
-    """
-
-    choices: Sequence[Mapping[str, Any]] = ()
-    provenance: Sequence[Mapping[str, Any]] = ()
-    sources: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class Index:
     """The content of the file, as plain values.
 
@@ -91,8 +71,13 @@ class Index:
         The tables of a scene file.
     settings
         All settings that decide the result.
-    choices, provenance, sources
-        As in `Origins`.
+    choices
+        What was chosen for the clip and why. Not compared when a run goes on: what they decided is in the scene and the
+        settings.
+    provenance
+        What of the result is measured, estimated, assumed and made up. Not compared either.
+    sources
+        Size and content of the files that the run reads, by their table in a scene file.
     frames
         The figures of every finished frame, by its number as text.
     checksums
@@ -119,13 +104,7 @@ class Index:
         return tuple(sorted(map(int, self.frames)))
 
     def box(self, number: int, otherwise: Domain) -> Domain:
-        """The box of a frame's files, where it is not the scene's.
-
-        Raises
-        ------
-        SequenceError
-            If its voxels are not those of the scene's.
-        """
+        """The box of a frame's files, where it is not the scene's; its voxels are those of the scene's."""
         given = self.frames[str(number)].get(BOX)
         if given is None:
             return otherwise
@@ -146,13 +125,7 @@ class Index:
 
     @staticmethod
     def read(directory: Path) -> Index:
-        """Read the file of a directory.
-
-        Raises
-        ------
-        SequenceError
-            If it is missing or damaged, or of another format.
-        """
+        """Read the file of a directory; SequenceError if it is missing, damaged or of another format."""
         path = directory / INDEX
         try:
             data = json.loads(read_text(path))
@@ -166,17 +139,7 @@ class Index:
             raise SequenceError(f"{path}: cannot be read: {error}") from error
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise SequenceError(f"{path}: is not a sequence of format {FORMAT}, which this version reads")
-        kinds = {
-            "scene": dict,
-            "settings": dict,
-            "choices": list,
-            "provenance": list,
-            "frames": dict,
-            "sources": dict,
-            "checksums": dict,
-            "complete": bool,
-            "versions": dict,
-        }
+        kinds = {key: get_origin(hint) or hint for key, hint in get_type_hints(Index).items()}
         for key, kind in kinds.items():
             if not isinstance(data.get(key), kind):
                 raise SequenceError(f"{path}: is damaged: {key} is missing or of another type")

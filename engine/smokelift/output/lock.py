@@ -12,13 +12,7 @@ from pathlib import Path
 
 
 class Lock:
-    """An exclusive lock on a file.
-
-    Parameters
-    ----------
-    path
-        The file, which exists while the lock is held.
-    """
+    """An exclusive lock on a file, which exists while the lock is held."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -27,10 +21,7 @@ class Lock:
     def acquire(self) -> bool:
         """Take the lock; False if another process has it.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be made, or its file system has no locks.
+        It raises OSError if the file cannot be made, or its file system has no locks.
         """
         while True:
             file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)

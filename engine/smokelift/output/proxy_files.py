@@ -30,46 +30,21 @@ def write_proxy(
     flame: Array | None = None,
     lattice: Domain | None = None,
 ) -> None:
-    """Write the coarse copy of a frame: its density, and its emission where it has one.
+    """Write the coarse copy of a frame: its density, and its emission where it has one, (nx, ny, nz) each.
 
-    Parameters
-    ----------
-    path
-        The ``.vdb`` file.
-    density, flame : (nx, ny, nz)
-        As `write_vdb` takes them.
-    domain
-        Their box.
-    times
-        How many times as large the voxels are.
-    lattice
-        As `write_vdb` takes it; a multiple of `times` voxels before the box, if it is not the box itself.
-
-    Raises
-    ------
-    VdbUnavailable
-        If there is no OpenVDB module.
-    OSError
-        If the file cannot be written.
+    The voxels of the copy are `times` as large as those of the domain. A `lattice` as in `write_vdb` begins a multiple
+    of `times` voxels before the domain, if it is not the same. It raises VdbUnavailable, and OSError if the file cannot
+    be written.
     """
     rho, wide = coarser(density, domain, times)
     fire = None if flame is None else coarser(flame, domain, times)[0]
-    write_vdb(path, rho, None, wide, flame=fire, lattice=None if lattice is None else _wide(lattice, times))
+    write_vdb(path, rho, None, wide, flame=fire, lattice=None if lattice is None else lattice.coarser(times))
 
 
 def write_proxies(sequence: Sequence) -> Iterator[int]:
-    """Write the coarse copies of all frames of a sequence into its directory.
+    """Write the coarse copies of all frames of a sequence into its directory, and yield their numbers.
 
-    Yields
-    ------
-    The number of every frame whose copy is written.
-
-    Raises
-    ------
-    SequenceError
-        If there are no frames, or a file cannot be read or written.
-    VdbUnavailable
-        If there is no OpenVDB module.
+    It raises SequenceError if there are no frames, or a file cannot be read or written, and VdbUnavailable.
     """
     vdb_module()
     if not sequence.frames:
@@ -84,26 +59,9 @@ def write_proxies(sequence: Sequence) -> Iterator[int]:
 
 
 def coarser(values: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
-    """Return the means of a volume over cubes of voxels, and the box of those, which may be larger.
-
-    Parameters
-    ----------
-    values : (nx, ny, nz)
-    domain
-        Its box.
-    times
-        Voxels along a side of a cube.
-    """
+    """Return the means of a volume (nx, ny, nz) over cubes of voxels, and the box of those, which may be larger."""
     counts = tuple(-(-n // times) for n in domain.resolution)
     padded = np.pad(values, [(0, count * times - n) for count, n in zip(counts, values.shape, strict=True)])
     x, y, z = counts
     coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
-    return coarse, _wide(domain, times)
-
-
-def _wide(domain: Domain, times: int) -> Domain:
-    """The box of the cubes of a domain's voxels, which may be larger."""
-    x, y, z = (-(-n // times) for n in domain.resolution)
-    edge = times * domain.voxel_size
-    a, b, c = (low + count * edge for low, count in zip(domain.min, (x, y, z), strict=True))
-    return Domain(domain.min, (a, b, c), (x, y, z))
+    return coarse, domain.coarser(times)

@@ -59,19 +59,9 @@ class ResumeState:
 
     @staticmethod
     def read(path: Path, shape_of: Callable[[int], tuple[int, int, int]]) -> ResumeState | None:
-        """Read the state, or return None if no frame was finished.
+        """Read the state, or return None if no frame was finished; OSError if the file is damaged.
 
-        Parameters
-        ----------
-        path
-            The file.
-        shape_of
-            Gives the voxels of a frame, by its number.
-
-        Raises
-        ------
-        OSError
-            If the file is damaged.
+        `shape_of` gives the voxels of a frame, by its number.
         """
         if not path.is_file():
             return None

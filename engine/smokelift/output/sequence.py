@@ -14,7 +14,7 @@ from smokelift.output.archive import FLAME, VELOCITY, read_arrays
 from smokelift.output.checksum import checksum
 from smokelift.output.index import Index, SequenceError, directory_path
 from smokelift.output.layout import INDEX, frame_path
-from smokelift.output.vdb import read_flame, read_vdb
+from smokelift.output.vdb import read_grid
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from_dict
@@ -27,6 +27,8 @@ USUAL_FPS = 24.0
 @dataclass(frozen=True)
 class Sequence:
     """A finished or growing sequence on disk; made by :meth:`open`.
+
+    Its methods raise a SequenceError if there is no frame of a number, or its file is missing or damaged.
 
     Attributes
     ----------
@@ -62,13 +64,7 @@ class Sequence:
 
     @classmethod
     def open(cls, directory: str | Path) -> Sequence:
-        """Open a directory that a reconstruction wrote.
-
-        Raises
-        ------
-        SequenceError
-            If there is no sequence, or it is damaged.
-        """
+        """Open a directory that a reconstruction wrote; SequenceError if there is no sequence, or it is damaged."""
         directory = directory_path(directory)
         if directory.is_file():
             raise SequenceError(f"{directory}: is a file; give the directory of the sequence")
@@ -99,13 +95,7 @@ class Sequence:
         return (clip.fps if clip is not None else None) or USUAL_FPS
 
     def box(self, number: int) -> Domain:
-        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame.
-        """
+        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing."""
         self._check(number)
         return self._boxes[int(number)]
 
@@ -114,14 +104,8 @@ class Sequence:
         return replace(self, scene=replace(self.scene, domain=box))
 
     def density(self, number: int) -> Array:
-        """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, its file is missing or damaged, or a density is negative.
-        """
-        density = self._read(number, "density")["density"]
+        """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one."""
+        density = self._read(number, ("density",))["density"]
         if density.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds negative densities; write it again")
         return density
@@ -130,16 +114,11 @@ class Sequence:
         """Return the emission of fire in a frame, shape (nx, ny, nz); None where the clip or the file has none.
 
         It is radiance per metre, of the color ``scene.medium.flame_color``.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, its file is missing or damaged, or an emission is negative.
         """
         self._check(number)
         if self.scene.medium.flame_color is None:  # the clip shows no fire: the file need not be read again
             return None
-        flame = self._read(number, FLAME).get(FLAME)
+        flame = self._read(number, (FLAME,)).get(FLAME)
         if flame is not None and flame.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds a negative emission")
         return flame
@@ -149,13 +128,8 @@ class Sequence:
 
         It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centres beside a face, zero
         further than two voxels from smoke and not free of divergence.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
         """
-        arrays = self._read(number, *VELOCITY)
+        arrays = self._read(number, VELOCITY)
         if "velocity" in arrays:
             x, y, z = on_faces(arrays["velocity"])
         else:
@@ -167,23 +141,12 @@ class Sequence:
 
         These are the values of an OpenVDB file as it holds them; those of :meth:`velocity` are smoothed by the way to
         faces and back.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
         """
-        arrays = self._read(number, *VELOCITY)
+        arrays = self._read(number, VELOCITY)
         return arrays["velocity"] if "velocity" in arrays else self.velocity(number).centres()
 
     def files(self, number: int) -> Mapping[str, Path]:
-        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or a file is not the one that was written.
-        """
+        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``; all are as they were written."""
         self._check(number)
         paths = {kind: frame_path(self.directory, number, kind) for kind in ("vdb", "npz")}
         there = {kind: path for kind, path in paths.items() if path.is_file()}
@@ -207,22 +170,11 @@ class Sequence:
         -------
         (rows, columns, 3) float32
             Linear radiance before the background that :class:`Viewer` describes.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
         """
         return Viewer(self.scene, camera).image(number, self.density(number), self.flame(number))
 
     def figures(self, number: int) -> Mapping[str, Any]:
-        """Return what was noted about a frame.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame.
-        """
+        """Return what was noted about a frame."""
         self._check(number)
         return self._figures[str(number)]
 
@@ -238,29 +190,28 @@ class Sequence:
                 f"{path}: is not the file that was written: it is damaged, or was changed since; copy or make it again"
             )
 
-    def _read(self, number: int, *names: str) -> Mapping[str, Array]:
-        """The arrays of these names from a NumPy twin, or else from OpenVDB; emission where it is there."""
+    def _read(self, number: int, names: tuple[str, ...]) -> Mapping[str, Array]:
+        """Arrays of a NumPy twin, or else the OpenVDB grid that holds the same; emission where it is there."""
         self._check(number)
         twin, grids = (frame_path(self.directory, number, kind) for kind in ("npz", "vdb"))
         whole, box = self.scene.domain, self._boxes[int(number)]
-        shape = box.shape
         path = twin if twin.is_file() else grids
         if not path.is_file():
             raise SequenceError(f"{path}: is missing")
         try:
             self._check_sum(path)
             if path is twin:
-                shapes = {"density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
-                others = {FLAME: shape} if FLAME in names else None
+                shapes = {"density": box.shape, **dict(zip(VELOCITY, face_shapes(box.shape), strict=True))}
+                others = {FLAME: box.shape} if FLAME in names else None
                 arrays = read_arrays(path, {name: shapes[name] for name in names if name != FLAME}, others=others)
                 return {name: _placed(values, box, whole) for name, values in arrays.items()}
-            if FLAME in names:
-                flame = read_flame(path, whole)
-                return {} if flame is None else {FLAME: flame}
-            density, velocity = read_vdb(path, whole)
+            name = "velocity" if names == VELOCITY else names[0]
+            values = read_grid(path, name, whole)
         except OSError as error:
             raise SequenceError(str(error)) from error
-        return {"density": density, "velocity": velocity}
+        if values is None and name != FLAME:
+            raise SequenceError(f"{path}: lacks {name}")
+        return {} if values is None else {name: values}
 
 
 def _around(domain: Domain, boxes: Iterable[Domain]) -> Domain:

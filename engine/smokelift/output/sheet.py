@@ -21,18 +21,10 @@ _LINE = 16
 
 
 def write_sheet(path: Path, rows: Sequence[Sequence[Tile]], titles: Sequence[str], labels: Sequence[str]) -> None:
-    """Write rows of tiles as a PNG.
+    """Write rows of tiles as a PNG, whatever the file's suffix, with titles above columns and labels above rows.
 
-    Parameters
-    ----------
-    path
-        The file, whatever its suffix.
-    rows
-        sRGB tiles (rows, columns, 3) of one height in a row, as wide as those of the first row or across all columns.
-    titles
-        Above the columns.
-    labels
-        Above the rows.
+    Tiles are sRGB (rows, columns, 3), of one height in a row, and as wide as those of the first row or across all
+    columns.
     """
     lefts = GAP + np.cumsum([0, *(tile.shape[1] + GAP for tile in rows[0])])
     tops = _LINE + np.cumsum([0, *(tiles[0].shape[0] + _LINE + GAP for tiles in rows)])

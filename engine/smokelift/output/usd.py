@@ -42,20 +42,10 @@ class UsdVolume:
 def usd_text(
     volumes: Sequence[UsdVolume], fps: float, medium: Medium, velocity: str = "velocity", up_axis: str = "Z"
 ) -> str:
-    """Return the text of a ``.usda`` file.
+    """Return the text of a ``.usda`` file of volumes with the same frames each.
 
-    Parameters
-    ----------
-    volumes
-        With the same frames each, at least one.
-    fps
-        Frames a second.
-    medium
-        Optical properties of smoke of density 1: the material, and custom data.
-    velocity
-        Name of the grid that holds vectors.
-    up_axis
-        ``"Z"`` or ``"Y"``.
+    Smoke of density 1 is the medium, for the material and custom data; `velocity` names the grid that holds vectors,
+    and `up_axis` is ``"Z"`` or ``"Y"``.
     """
     numbers = sorted(volumes[0].files)
     known = {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}

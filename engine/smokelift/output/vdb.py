@@ -53,10 +53,7 @@ class VdbUnavailable(RuntimeError):  # noqa: N818  (it says what is the matter b
 def vdb_module() -> ModuleType:
     """Return the OpenVDB module, looking inside an installed bpy wheel if need be.
 
-    Raises
-    ------
-    VdbUnavailable
-        If there is none, with what to install.
+    Without one it raises VdbUnavailable, which says what to install.
     """
     for name in ("openvdb", "pyopenvdb"):
         try:
@@ -109,18 +106,14 @@ def write_vdb(
 
     Parameters
     ----------
-    path
-        The ``.vdb`` file.
-    density
-        Shape (nx, ny, nz), not negative.
+    density : (nx, ny, nz)
+        Not negative.
     velocity
         m/s, on faces or at voxel centres, shape (nx, ny, nz, 3); None for a file of the density alone.
-    domain
-        Where the voxels lie.
     metadata
         Settings to keep with the density grid, as JSON can hold them.
-    flame
-        Emission, radiance per metre, shape (nx, ny, nz), not negative; None for a file without that grid.
+    flame : (nx, ny, nz), optional
+        Emission, radiance per metre, not negative; None for a file without that grid.
     velocity_name
         Name of the grid of the velocity.
     facts
@@ -135,10 +128,8 @@ def write_vdb(
     ------
     ValueError
         If a shape does not fit the domain, a value is not finite, or a density or an emission negative.
-    VdbUnavailable
-        If there is no OpenVDB module.
-    OSError
-        If the file cannot be written.
+    VdbUnavailable, OSError
+        If there is no OpenVDB module, or the file cannot be written.
     """
     vdb = vdb_module()
     rho = checked_volume(density, domain.shape, "density")
@@ -182,10 +173,7 @@ def write_vdb(
 def checked_volume(values: npt.ArrayLike, shape: tuple[int, int, int], name: str) -> Array:
     """Return a volume as OpenVDB takes it, which silently scrambles arrays of any other layout or type.
 
-    Raises
-    ------
-    ValueError
-        With its name, if it has another shape, or holds values that are not finite or negative.
+    It raises ValueError, with its name, if it has another shape, or holds values that are not finite or negative.
     """
     volume = np.ascontiguousarray(values, np.float32)
     if volume.shape != shape:
@@ -247,65 +235,25 @@ def _ensure_written(path: Path) -> None:
         file.truncate(size)
 
 
-def read_vdb(path: str | Path, domain: Domain) -> tuple[Array, Array]:
-    """Read the density and the velocity that :func:`write_vdb` wrote.
+def read_grid(path: str | Path, name: str, domain: Domain) -> Array | None:
+    """Read a grid, (nx, ny, nz) float32, that :func:`write_vdb` wrote; None if the file has none of that name.
 
-    Parameters
-    ----------
-    path
-        The ``.vdb`` file.
-    domain
-        The box that is read, with voxels in line with those of the file.
-
-    Returns
-    -------
-    Density, shape (nx, ny, nz), and velocity in m/s at voxel centres, shape (nx, ny, nz, 3); both float32 and
-    zero where nothing is stored.
-
-    Raises
-    ------
-    OSError
-        If the file is missing or damaged, or lacks one of the grids.
-    VdbUnavailable
-        If there is no OpenVDB module.
+    The name is ``"density"``, ``"flame"`` or ``"velocity"``, which is (nx, ny, nz, 3) in m/s. The box that is read has
+    voxels in line with those of the file; where nothing is stored they are zero. It raises OSError if the file is
+    missing or damaged, and VdbUnavailable.
     """
     vdb = vdb_module()
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path}: no such file")
-    density = np.zeros(domain.shape, np.float32)
-    velocity = np.zeros((*domain.shape, 3), np.float32)
-    try:
-        for name, array in (("density", density), ("velocity", velocity)):
-            _copy(vdb.read(str(path), gridname=name), array, domain)
-    except (RuntimeError, LookupError, TypeError) as error:
-        raise OSError(f"{path}: is damaged or lacks density or velocity: {error}") from error
-    return density, velocity
-
-
-def _copy(grid: Any, array: Array, domain: Domain) -> None:
-    """Copy the values of a grid in a box to an array of its voxels."""
-    origin = grid.transform.indexToWorld((0, 0, 0))
+    values = np.zeros((*domain.shape, 3) if name == "velocity" else domain.shape, np.float32)
     h = domain.voxel_size
-    corner = tuple(round((low + 0.5 * h - at) / h) for low, at in zip(domain.min, origin, strict=True))
-    grid.copyToArray(array, ijk=corner)
-
-
-def read_flame(path: str | Path, domain: Domain) -> Array | None:
-    """Read the emission that :func:`write_vdb` wrote, radiance per metre, shape (nx, ny, nz); None if it wrote none.
-
-    Raises
-    ------
-    OSError, VdbUnavailable
-        As :func:`read_vdb`.
-    """
-    vdb = vdb_module()
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"{path}: no such file")
-    flame = np.zeros(domain.shape, np.float32)
     try:
-        if not any(grid.name == FLAME for grid in vdb.readAllGridMetadata(str(path))):
+        if not any(grid.name == name for grid in vdb.readAllGridMetadata(str(path))):
             return None
-        _copy(vdb.read(str(path), gridname=FLAME), flame, domain)
+        grid = vdb.read(str(path), gridname=name)
+        origin = grid.transform.indexToWorld((0, 0, 0))
+        corner = tuple(round((low + 0.5 * h - at) / h) for low, at in zip(domain.min, origin, strict=True))
+        grid.copyToArray(values, ijk=corner)
     except (OSError, RuntimeError, LookupError, TypeError) as error:
         raise OSError(f"{path}: is damaged: {error}") from error
-    return flame
+    return values

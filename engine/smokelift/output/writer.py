@@ -10,7 +10,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -28,7 +28,6 @@ from smokelift.output.index import (
     BOX,
     DirectoryBusyError,
     Index,
-    Origins,
     SequenceError,
     changed,
     plain,
@@ -62,8 +61,8 @@ class SequenceWriter:
         Whether to go on from the finished frames in the directory. An empty directory starts a new run.
     background : (rows, columns, 3), optional
         An estimated background of the scene's picture, kept as `background.exr`.
-    origins
-        Where the result comes from. Kept.
+    choices, provenance, sources
+        Where the result comes from, in values that JSON can hold: see `smokelift.output.index.Index`. Kept.
 
     Attributes
     ----------
@@ -86,7 +85,9 @@ class SequenceWriter:
         npz: bool = False,
         resume: bool = False,
         background: Array | None = None,
-        origins: Origins | None = None,
+        choices: Sequence[Mapping[str, Any]] = (),
+        provenance: Sequence[Mapping[str, Any]] = (),
+        sources: Mapping[str, Any] | None = None,
     ) -> None:
         self.directory = Path(directory)
         self.state: ResumeState | None = None
@@ -96,7 +97,8 @@ class SequenceWriter:
             scene = replace(scene, background=Background(image=self.directory.resolve() / BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
-        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **plain(vars(origins or Origins())))
+        origins = plain({"choices": choices, "provenance": provenance, "sources": sources or {}})
+        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **origins)
         self._npz = npz
         self._kinds: tuple[str, ...] = ()
         self._resume = resume
@@ -184,8 +186,7 @@ class SequenceWriter:
         Raises
         ------
         ValueError
-            If a shape does not fit the domain, a value is not finite, a density or an emission negative, or the
-            number out of order.
+            If a shape, a value or the number does not fit.
         SequenceError
             If the frame cannot be written; the finished ones stay.
         """
@@ -279,18 +280,7 @@ class SequenceWriter:
 
 
 def check_directory(directory: Path, *, resume: bool) -> None:
-    """Refuse, before anything is computed or written, a directory that a `SequenceWriter` would refuse for itself.
-
-    Parameters
-    ----------
-    directory, resume
-        As in `SequenceWriter`.
-
-    Raises
-    ------
-    SequenceError
-        With the reason.
-    """
+    """Refuse, before anything is computed or written, a directory that a `SequenceWriter` would refuse for itself."""
     if directory.is_dir():
         _begun(directory, resume)
     nearest = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
@@ -299,17 +289,9 @@ def check_directory(directory: Path, *, resume: bool) -> None:
 
 
 def written_kinds(npz: bool) -> tuple[str, ...]:
-    """Return the kinds of files of a frame: without an OpenVDB module the NumPy twin alone.
+    """Return the kinds of files of a frame: without an OpenVDB module the NumPy twin alone, if twins are asked for.
 
-    Parameters
-    ----------
-    npz
-        Whether twins are asked for.
-
-    Raises
-    ------
-    SequenceError
-        If nothing could be written.
+    It raises SequenceError if nothing could be written.
     """
     try:
         vdb_module()

@@ -54,23 +54,10 @@ class BesideClip:
 def beside_clip(
     view: ShotView, optics: Optics, frame: int, density: Volume, step: int | None = None
 ) -> BesideClip | None:
-    """Render a density beside a frame of a view's clip, at the clip's own pixels.
+    """Render a density (nx, ny, nz) beside a frame, from 0, of a view's clip, at the clip's own pixels.
 
-    Parameters
-    ----------
-    view
-        The camera, its clip and its plates.
-    optics
-        How light travels through the domain.
-    frame
-        Counted from 0.
-    density : (nx, ny, nz) float32
-    step
-        Every so many pixels along and across, an odd number; 1 for all. By default as many as leave `RAYS_A_VOXEL`.
-
-    Returns
-    -------
-    None if nothing of the domain is in the frame's picture.
+    Only every so many pixels along and across are taken, an odd number; by default as many as leave `RAYS_A_VOXEL`. It
+    is None if nothing of the domain is in the frame's picture.
     """
     working = view.working_at(frame, optics.domain)
     if working is None:
@@ -100,20 +87,10 @@ def beside_clip(
 
 
 def clip_psnr(shot: Shot, frame: int, density: Volume) -> dict[str, float]:
-    """Return the PSNR of a frame's density at its clips' own pixels inside the smoke.
+    """Return the PSNR of a frame's density (nx, ny, nz) at its clips' own pixels inside the smoke; frames from 0.
 
-    Parameters
-    ----------
-    shot
-        With its cameras.
-    frame
-        Counted from 0.
-    density : (nx, ny, nz) float32
-
-    Returns
-    -------
-    ``psnr`` of the input, ``psnr_view_1``, ... of further views, in dB of linear radiance with peak 1; each absent
-    where its picture shows no smoke. Smoke alone: fire is left out of the pictures before.
+    It is ``psnr`` of the input, ``psnr_view_1``, ... of further views, in dB of linear radiance with peak 1; each
+    absent where its picture shows no smoke. Smoke alone: fire is left out of the pictures before.
     """
     figures = {}
     for number, view in enumerate(shot.views):

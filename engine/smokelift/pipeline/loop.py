@@ -74,14 +74,9 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """What a frame needs of the one before: not its velocity on the fine grid, which takes much memory.
+    """What a frame needs of the one before, by the names of `Frame`.
 
-    Attributes
-    ----------
-    number
-        Of the one before, from 1.
-    density, estimated, smooth, steady, followed
-        As in `Frame`.
+    Its velocity on the fine grid, which takes much memory, is not needed.
     """
 
     number: int

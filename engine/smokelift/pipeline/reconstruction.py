@@ -8,7 +8,7 @@ from pathlib import Path
 
 from smokelift.checks import require_kind
 from smokelift.footage.clip import Clip
-from smokelift.output.index import Origins, directory_path
+from smokelift.output.index import directory_path
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -86,11 +86,9 @@ class Reconstruction:
             npz=npz,
             resume=resume,
             background=shot.estimated_background,
-            origins=Origins(
-                choices=[record(estimate) for estimate in shot.estimates],
-                provenance=[part.as_dict() for part in provenance(shot)],
-                sources=sources(shot),
-            ),
+            choices=[record(estimate) for estimate in shot.estimates],
+            provenance=[part.as_dict() for part in provenance(shot)],
+            sources=sources(shot),
         ) as writer:
             if writer.state is not None or not writer.finished:
                 self._write_rest(writer, on_frame)

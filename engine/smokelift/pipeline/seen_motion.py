@@ -53,20 +53,9 @@ def with_seen_motion(
 ) -> Velocity:
     """A velocity that moves the smoke in the picture as the camera saw it move, averaged along the line of sight.
 
-    Parameters
-    ----------
-    velocity
-        On the density's grid or on one that was halved from it.
-    before, after
-        What `followed_picture` gives of two frames that follow one another.
-    camera
-        Of both pictures.
-    domain
-        Of the density.
-    density : (nx, ny, nz)
-        Of the second frame.
-    dt
-        Time between the frames in seconds.
+    The velocity is on the density's grid or on one that was halved from it. `before` and `after` are what
+    `followed_picture` gives of two frames of the camera, `dt` seconds apart; domain and density (nx, ny, nz) are those
+    of the second.
     """
     middle = np.array(domain.centre)
     ray = np.array(camera.matrix)[:3, 2] if camera.type == "orthographic" else middle - camera.position

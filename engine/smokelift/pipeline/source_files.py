@@ -12,13 +12,7 @@ from smokelift.setup.shot import Shot, ShotView
 
 
 def sources(shot: Shot) -> dict[str, dict[str, Any]]:
-    """Return size and content of what a shot is read from, by its table in a scene file.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be read any more.
-    """
+    """Return size and content of what a shot is read from, by its table in a scene file."""
     files: dict[str, tuple[Path, ...]] = {}
     for number, view in enumerate(shot.views):
         table = f"views.{number - 1}." if number else ""

@@ -20,16 +20,9 @@ from smokelift.render.plan import RenderPlan
 
 @dataclass(frozen=True, eq=False)
 class RaySupport:
-    """Where a camera's rays meet the voxels that may hold smoke.
+    """Where a camera's rays meet the voxels that may hold smoke, and the rays as far as such voxels are around them.
 
     It takes as long to find as a picture, so that renderers of the same camera, domain, support and lights share it.
-
-    Attributes
-    ----------
-    support
-        The voxels.
-    rays
-        The rays, as far as voxels around them may hold smoke.
     """
 
     support: _core.Support

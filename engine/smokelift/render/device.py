@@ -78,23 +78,10 @@ def has_taichi() -> bool:
 
 
 def start(device: DeviceName = "auto") -> str:
-    """Choose the device of this process, once, and say which it is.
+    """Choose the device of this process, once, and return ``"cpu"``, ``"cuda"``, ``"metal"`` or ``"vulkan"``.
 
-    Parameters
-    ----------
-    device
-        ``"auto"`` takes a GPU if there is one, else the CPU. A Vulkan device in software is taken for
-        ``"gpu"`` only.
-
-    Returns
-    -------
-    str
-        ``"cpu"``, ``"cuda"``, ``"metal"`` or ``"vulkan"``.
-
-    Raises
-    ------
-    DeviceError
-        If a GPU is asked for and there is none, or if another device is already in use.
+    ``"auto"`` takes a GPU if there is one, else the CPU; a Vulkan device in software is taken for ``"gpu"`` only. It
+    raises DeviceError if a GPU is asked for and there is none, or if another device is already in use.
     """
     global _running
     if _running is not None:

@@ -25,23 +25,10 @@ from smokelift.scene.projection import project_points
 
 
 def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:
-    """The light of a flame as a camera sees it through smoke, without what the smoke scatters of it.
+    """The light of a flame as a camera that stands still sees it through smoke, radiance (rows, columns).
 
-    Parameters
-    ----------
-    flame : (nx, ny, nz)
-        Emission, radiance per metre, not negative.
-    density : (nx, ny, nz)
-        Of the smoke.
-    camera
-        That stands still.
-    optics
-        The grid's domain, and the smoke's extinction.
-
-    Returns
-    -------
-    (rows, columns) float32
-        Radiance.
+    What the smoke scatters of it is left out. The flame (nx, ny, nz), radiance per metre, is not negative; the optics
+    give the domain, and the smoke's extinction.
     """
     width, height = camera.size
     picture = np.zeros(width * height)
@@ -54,20 +41,10 @@ def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> I
 
 
 def emission_matrix(density: Volume, camera: Camera, optics: Optics, pixels: Mask, voxels: Mask) -> sparse.csr_array:
-    """The matrix that turns the emission of some voxels into the light that some pixels get of it.
+    """The matrix, in metres, that turns the emission of some voxels into the light that some pixels get of it.
 
-    Parameters
-    ----------
-    density, camera, optics
-        As in `emitted`.
-    pixels : (rows, columns) bool
-        Those of the matrix's rows, in the order of `numpy.flatnonzero`.
-    voxels : (nx, ny, nz) bool
-        Those of its columns, in the same order.
-
-    Returns
-    -------
-    (number of pixels, number of voxels), in metres
+    Its rows are the marked pixels (rows, columns), its columns the marked voxels (nx, ny, nz), in the order of
+    `numpy.flatnonzero`. Density, camera and optics are as in `emitted`.
     """
     shape = np.count_nonzero(pixels), np.count_nonzero(voxels)
     number = np.full(voxels.size, -1)

@@ -31,33 +31,17 @@ ROUNDING = 1e-9
 
 
 def environment_lights(light: EnvironmentLight, count: int) -> tuple[DirectionalLight, ...]:
-    """Turn an environment picture into parallel lights.
+    """Turn an environment picture into parallel lights, at most `count` of them; fewer for one with fewer bright parts.
 
     The picture is read as Blender reads it: towards a direction (x, y, z) lies the point u = 1/2 - atan2(y, x) / 2 pi
     from the left, v = 1/2 + asin(z) / pi from the bottom. ``rotation_degrees`` is the Z rotation of Blender's Mapping
-    node (type Point) before an Environment Texture: it turns the direction that is looked up counter-clockwise, so
-    the surroundings turn clockwise, seen from above. Radiance is constant over a texel. Negative values, which
-    resampling filters leave in pictures, count as 0.
+    node (type Point) before an Environment Texture: it turns the direction that is looked up counter-clockwise, so the
+    surroundings turn clockwise, seen from above. Radiance is constant over a texel. Negative values, which resampling
+    filters leave in pictures, count as 0.
 
-    Parameters
-    ----------
-    light
-        Picture, rotation, strength.
-    count
-        Lights at most, at least 1. A picture with fewer bright parts gives fewer.
-
-    Returns
-    -------
-    tuple of DirectionalLight
-        Empty for a black picture. Directions are directions of travel, irradiance in W/m^2 (perpendicular to the
-        direction) a channel; their sum is the integral of the radiance over the sphere. Every machine finds the same.
-
-    Raises
-    ------
-    smokelift.footage.images.ImageError
-        If the picture cannot be read or holds values that are not finite.
-    ValueError
-        If ``count`` is below 1.
+    The lights' irradiance is in W/m^2 (perpendicular to the direction) a channel; their sum is the integral of the
+    radiance over the sphere. Every machine finds the same. An ImageError is raised if the picture cannot be read or
+    holds values that are not finite.
     """
     return EnvironmentCells(light).lights(count)
 

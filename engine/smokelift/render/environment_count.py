@@ -33,16 +33,6 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
     until doubling their number changes the picture by at most `TOLERANCE`, or the number is 256. Under six kinds of
     surroundings, a plume then came within 0.2 to 1.3 % of its picture with 512 lights
     (docs/experiments/environment-directions.md).
-
-    Returns
-    -------
-    int
-        The number of lights that doubling did not change any more.
-
-    Raises
-    ------
-    smokelift.footage.images.ImageError
-        As `smokelift.render.environment.environment_lights`.
     """
     small = _coarse(domain)
     view = _coarse_camera(camera, small)

@@ -137,21 +137,11 @@ def lighting(
     scattered: Vector = (1.0, 1.0, 1.0),
     split: bool = False,
 ) -> Lighting:
-    """Lights over a box of a domain's voxels; those without energy are left out.
+    """Lights over a box of a domain's voxels, by its first voxel and its size; those without energy are left out.
 
-    Parameters
-    ----------
-    corner, shape
-        First voxel of the box, and its size in voxels.
-    scattered
-        Share of red, green and blue light by which the lights' energy is multiplied: the colour of the smoke.
-    split
-        Whether each colour has a channel of its own, although one may do.
-
-    Raises
-    ------
-    SceneError
-        If a point light stands inside the domain or too far away.
+    The lights' energy is multiplied by a share of red, green and blue, the colour of the smoke. With `split` each
+    colour has a channel of its own, although one may do. A point light inside the domain or too far away raises a
+    SceneError.
     """
     bright = [light for light in lights if (np.array(_colour(light)) * scattered).max() >= DARKEST]
     if not bright:

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.given_background import background_picture
 from smokelift.render.cpu_backend import RaySupport
-from smokelift.render.light_sampling import sampled_lights
+from smokelift.render.environment import environment_lights
+from smokelift.render.environment_count import environment_count
 from smokelift.render.renderer import Image, Renderer
-from smokelift.scene import Camera, CompleteScene, Domain, FiniteLight, Medium, PointLight, Scattering
+from smokelift.scene import (
+    Camera,
+    CompleteScene,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    FiniteLight,
+    Medium,
+    PointLight,
+    Scattering,
+)
 
 
 @dataclass(frozen=True)
@@ -69,15 +81,31 @@ def scene_optics(scene: CompleteScene) -> Optics:
 
 
 def scene_renderer(scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> Renderer:
-    """The renderer of a scene: by default for its own camera, before its own background.
-
-    Raises
-    ------
-    ValueError
-        If the camera moves.
-    """
+    """The renderer of a scene: by default for its own camera, which must not move, before its own background."""
     view = camera or scene.camera
     if view.moves:
         raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")
     behind = background_picture(scene, view) if background is None else background
     return scene_optics(scene).renderer(view, behind)
+
+
+def sampled_lights(scene: CompleteScene) -> tuple[FiniteLight, ...]:
+    """The lights of a scene, in which an environment has become as many parallel lights as it needs.
+
+    That number is found with the scene's own camera, where it is in the first frame. It is the same for every other
+    camera and frame, so that a sequence is lit alike from all sides.
+    """
+    lights: list[FiniteLight] = []
+    for light in scene.lights:
+        if isinstance(light, EnvironmentLight):
+            lights += _environment(light, scene.camera.at(0), scene.domain, scene.medium)
+        else:
+            lights += light.samples()
+    return tuple(lights)
+
+
+@lru_cache(maxsize=4)
+def _environment(
+    light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
+) -> tuple[DirectionalLight, ...]:
+    return environment_lights(light, light.directions or environment_count(light, camera, domain, medium))

@@ -15,8 +15,6 @@ from smokelift.render.light_sweeps import Lighting, Shape, Voxel, lighting
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Scattering
 from smokelift.scene.domain import box_around
 
-Slices = tuple[slice, slice, slice]
-
 
 @dataclass(frozen=True, eq=False)
 class RenderPlan:
@@ -86,7 +84,7 @@ def plan_render(
         support = np.broadcast_to(np.True_, domain.resolution)
     # with the neighbours of the voxels that may hold smoke; one voxel if none may
     x, y, z = part = box_around(support, 1) if support.any() else (slice(0, 1),) * 3
-    corner, box = (x.start, y.start, z.start), _part_of(domain, part)
+    corner, box = (x.start, y.start, z.start), domain.part(part)
     scatters = () if scattering == "absorption" else lights
     # light that is scattered again takes on more of the smoke's colour
     split = scattering == "multiple" and not medium.is_grey
@@ -102,14 +100,6 @@ def plan_render(
         shadows=scattering in SHADOWED and found.channels > 0,
         diffuse=scattering == "multiple" and found.channels > 0,
     )
-
-
-def _part_of(domain: Domain, part: Slices) -> Domain:
-    h = domain.voxel_size
-    low = [start + h * span.start for start, span in zip(domain.min, part, strict=True)]
-    high = [start + h * span.stop for start, span in zip(domain.min, part, strict=True)]
-    x, y, z = (span.stop - span.start for span in part)
-    return Domain((low[0], low[1], low[2]), (high[0], high[1], high[2]), (x, y, z))
 
 
 def _to_eye(camera: Camera, domain: Domain) -> NDArray[np.float64]:

@@ -118,13 +118,7 @@ class Camera:
         return bool(self.matrices)
 
     def require_outside(self, domain: Box) -> None:
-        """Refuse a perspective camera that stands inside a box in any frame: nothing bounds the smoke around it.
-
-        Raises
-        ------
-        SceneError
-            With the position.
-        """
+        """Refuse a perspective camera that stands inside a box in any frame: nothing bounds the smoke around it."""
         for matrix in self.matrices or (self.matrix,):
             x, y, z = (row[3] for row in matrix[:3])
             if self.type == "perspective" and domain.contains((x, y, z)):
@@ -135,13 +129,7 @@ class Camera:
                 )
 
     def at(self, frame: int) -> Camera:
-        """Return the camera as it stands in a frame, counted from 0 at the first that is used.
-
-        Raises
-        ------
-        SceneError
-            If it moves, and has no matrix for that frame.
-        """
+        """Return the camera as it stands in a frame, counted from 0 at the first that is used."""
         if not self.moves:
             return self
         if not 0 <= frame < len(self.matrices):
@@ -225,14 +213,8 @@ def as_matrix(values: NDArray[np.float64]) -> Matrix:
 def orbit(camera: Camera, domain: Box, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
     """Return the camera turned about the domain's centre, which stays at the same distance and place of the picture.
 
-    A camera that moves is turned in every frame.
-
-    Parameters
-    ----------
-    yaw_degrees
-        Turn about the world's Z, counter-clockwise seen from above: 90 looks from the right side.
-    pitch_degrees
-        Then the rise of the camera about its own horizontal axis; negative lowers it.
+    The yaw is about the world's Z, counter-clockwise seen from above: 90 looks from the right side. The pitch then
+    raises the camera about its own horizontal axis; negative lowers it. A camera that moves is turned in every frame.
     """
     matrices = [_turned(np.array(matrix), domain, yaw_degrees, pitch_degrees) for matrix in camera.matrices]
     first = _turned(np.array(camera.matrix), domain, yaw_degrees, pitch_degrees)
@@ -240,17 +222,9 @@ def orbit(camera: Camera, domain: Box, yaw_degrees: float, pitch_degrees: float 
 
 
 def shared_part(whole: Camera, camera: Camera) -> tuple[slice, slice] | None:
-    """Return which part of a camera's picture another camera shows.
+    """Return which rows and columns of a camera's picture another camera shows, to the nearest pixel.
 
-    Parameters
-    ----------
-    whole, camera
-        Neither moves.
-
-    Returns
-    -------
-    Rows and columns of the first camera's picture, to the nearest pixel. None if the second stands elsewhere, looks
-    elsewhere or shows more than that picture.
+    Neither moves. It is None if the second stands elsewhere, looks elsewhere or shows more than that picture.
     """
     if camera.type != whole.type or not np.allclose(camera.matrix, whole.matrix, rtol=0, atol=1e-9):
         return None

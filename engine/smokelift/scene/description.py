@@ -179,18 +179,7 @@ class Scene:
 def scene_from_dict(data: Mapping[str, Any], name: str = "scene", base: Path | None = None) -> Scene:
     """Return the scene that the tables of a scene file describe, as a sequence keeps them in its JSON.
 
-    Parameters
-    ----------
-    data
-        The tables.
-    name
-        What messages call the source.
-    base
-        Folder that relative paths are relative to; None is the current one.
-
-    Raises
-    ------
-    SceneError
-        For the same reasons as `Scene.load`.
+    `name` is what messages call the source, and relative paths are relative to `base`, by default the current folder.
+    It raises SceneError for the same reasons as `Scene.load`.
     """
     return from_tables(data, Scene, name, base)

@@ -146,12 +146,20 @@ class Domain(Box):
         x, y, z = (slice(first, first + n) for first, n in zip(starts, self.resolution, strict=True))
         return x, y, z
 
-    def halved(self) -> Domain:
-        """The box with voxels twice as wide; along an odd number of them it is larger by one."""
-        x, y, z = ((count + 1) // 2 for count in self.resolution)
-        edge = 2 * self.voxel_size
+    def coarser(self, times: int) -> Domain:
+        """The box with voxels so many times as wide; where they do not divide it evenly, it is larger."""
+        x, y, z = (-(-count // times) for count in self.resolution)
+        edge = times * self.voxel_size
         a, b, c = (low + count * edge for low, count in zip(self.min, (x, y, z), strict=True))
         return Domain(self.min, (a, b, c), (x, y, z))
+
+    def part(self, voxels: tuple[slice, ...]) -> Domain:
+        """The box of some of the voxels."""
+        h = self.voxel_size
+        a, b, c = (low + h * span.start for low, span in zip(self.min, voxels, strict=True))
+        d, e, f = (low + h * span.stop for low, span in zip(self.min, voxels, strict=True))
+        x, y, z = (span.stop - span.start for span in voxels)
+        return Domain((a, b, c), (d, e, f), (x, y, z))
 
     def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""

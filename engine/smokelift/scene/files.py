@@ -11,12 +11,7 @@ LARGEST_TEXT = 64 * 2**20
 def read_text(path: Path) -> str:
     """Read a text file in UTF-8.
 
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    OSError
-        With the path, if it cannot be read, is no regular file, is too large or holds no text.
+    It raises OSError with the path, if it cannot be read, is no regular file, is too large or holds no text.
     """
     if not path.is_file() and path.exists():
         raise OSError(f"{path}: cannot be read: it is a folder, a pipe or a device, not a file")

@@ -23,14 +23,10 @@ def world_to_pixel(camera: Camera) -> Doubles:
 
 
 def project_points(camera: Camera, points: Doubles) -> tuple[Doubles, Doubles]:
-    """Project world points (..., 3) to pixels.
+    """Project world points (..., 3) to pixels, x and y (..., 2), and depths (...).
 
-    Returns
-    -------
-    pixels : (..., 2)
-        x and y in pixels.
-    depth : (...)
-        Distance along the optical axis for a perspective camera (negative: behind it), 1 for an orthographic one.
+    The depth is the distance along the optical axis for a perspective camera (negative: behind it), 1 for an
+    orthographic one.
     """
     matrix = world_to_pixel(camera)
     homogeneous = points @ matrix[:, :3].T + matrix[:, 3]

@@ -130,14 +130,10 @@ class _Reader:
         return read
 
     def _part(self, kind: type[Any], *beside: str) -> Callable[[Place, Table], Any]:
-        """Return a reader of a dataclass whose fields are the keys of its table.
+        """Return a reader of a dataclass whose fields are the keys of its table, with some further keys beside them.
 
-        Parameters
-        ----------
-        kind
-            The dataclass. A field without a default has to be given; a path is relative to the file.
-        beside
-            Further keys, which are no fields of it. A table that holds nothing else leaves the part open.
+        A field without a default has to be given; a path is relative to the file. A table that holds nothing but
+        further keys leaves the part open.
         """
 
         def read(place: Place, data: Table) -> Any:

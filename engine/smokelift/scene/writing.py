@@ -45,12 +45,8 @@ def write_file(scene: Scene | CompleteScene, path: Path, comments: Sequence[str]
 def scene_to_dict(scene: Scene | CompleteScene, base: Path | None = None) -> Table:
     """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
 
-    Parameters
-    ----------
-    scene
-        Any scene. A complete one is what `completed` makes of the description that is read back.
-    base
-        Paths below this folder become relative to it; all others absolute.
+    A complete scene is what `completed` makes of the description that is read back. Paths below the folder `base`
+    become relative to it; all others absolute.
     """
     tables: Table = {
         "clip": _table(scene.clip, base),

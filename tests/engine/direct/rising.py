@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.direct import Ball, Moment, Simulation
 from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
-from smokelift.direct.physics import Physics
+from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed

@@ -7,7 +7,7 @@ import pytest
 
 from smokelift.direct import Ball, Moment, fit_simulation, spun_up
 from smokelift.direct.inflow import Inflow, find_inflow
-from smokelift.direct.physics import Physics
+from smokelift.direct.simulation import Physics
 from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 

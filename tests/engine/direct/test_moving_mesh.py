@@ -6,7 +6,7 @@ import pytest
 from smokelift.direct import Continuation, Mesh, MovingMesh, continue_sequence, open_source
 from smokelift.direct.constraint import faces_between
 from smokelift.direct.obstacles import Obstacles, require_place
-from smokelift.direct.physics import Physics
+from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence

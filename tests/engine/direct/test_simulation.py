@@ -6,7 +6,7 @@ import pytest
 from smokelift.direct import Ball, Moment, Simulation, fit_simulation
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.obstacles import Obstacles
-from smokelift.direct.physics import Physics
+from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import divergence
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.direct import Moment, Turbulence
-from smokelift.direct.physics import Physics
+from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Velocity, divergence
 from tests.engine.direct.rising import DOMAIN, at_rest, blob, course, free

@@ -70,7 +70,7 @@ def test_files_share_one_transform_and_proxies_and_exports_one_box(tmp_path):
     assert coarse[0].transform == coarse[1].transform
     assert coarse[0].evalActiveVoxelBoundingBox()[0] == (8 // TIMES, 0, 0)
     list(export_sequence(made, tmp_path / "export", ExportSettings()))
-    rho, _ = vdb.read_vdb(tmp_path / "export" / "smoke_0001.vdb", GROWN)
+    rho = vdb.read_grid(tmp_path / "export" / "smoke_0001.vdb", "density", GROWN)
     np.testing.assert_array_equal(rho[DOMAIN.slices_in(GROWN)], frame(DOMAIN)[0])
 
 

@@ -53,7 +53,7 @@ def test_the_files_of_an_export(sequence: Sequence, tmp_path: Path) -> None:
 @needs_vdb
 def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Path) -> None:
     exported(sequence, tmp_path / "out")
-    rho, u = vdb.read_vdb(tmp_path / "out" / "smoke_0002.vdb", DOMAIN)
+    rho, u = (vdb.read_grid(tmp_path / "out" / "smoke_0002.vdb", name, DOMAIN) for name in ("density", "velocity"))
     assert not rho[:, :, 6:].any() and not u[:, :, 8:].any()
     np.testing.assert_allclose(rho[:, :, :6], sequence.density(2)[:, :, :6], atol=1e-3)
     np.testing.assert_allclose(u[:, :, :6], sequence.velocity_at_centres(2)[:, :, :6], atol=2e-3)
@@ -62,7 +62,7 @@ def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Pa
 @needs_vdb
 def test_quantised_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: Path) -> None:
     exported(sequence, tmp_path / "out", precision="quantised")
-    rho, u = vdb.read_vdb(tmp_path / "out" / "smoke_0001.vdb", DOMAIN)
+    rho, u = (vdb.read_grid(tmp_path / "out" / "smoke_0001.vdb", name, DOMAIN) for name in ("density", "velocity"))
     true = sequence.density(1)
     assert not np.array_equal(rho, true)
     for axis in range(3):
@@ -96,7 +96,7 @@ def test_fire_is_exported(tmp_path: Path, precision: str) -> None:
         writer.write(1, *frame(1), flame=flame)
         writer.write(2, *frame(2))
     exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", precision=precision)
-    np.testing.assert_allclose(vdb.read_flame(tmp_path / "out" / "smoke_0001.vdb", DOMAIN), flame, atol=4e-3)
+    np.testing.assert_allclose(vdb.read_grid(tmp_path / "out" / "smoke_0001.vdb", "flame", DOMAIN), flame, atol=4e-3)
     assert set(grids(tmp_path / "out" / "smoke_0002.vdb")) == {"density", "velocity", "flame"}
     assert 'OpenVDBAsset "flame"' in (tmp_path / "out" / "smoke.usda").read_text()
     assert json.loads((tmp_path / "out" / "export.json").read_text())["grids"] == ["density", "velocity", "flame"]
@@ -140,7 +140,9 @@ def test_files_for_unreal(sequence: Sequence, tmp_path: Path) -> None:
     assert medium["extinction"] == pytest.approx(EXTINCTION * peak)
     for number in sequence.frames:
         path = tmp_path / "out" / f"smoke_{number:04d}.vdb"
-        rho, u = (grid[:, ::-1] for grid in vdb.read_vdb(path, DOMAIN))  # its axes are left-handed
+        rho, u = (
+            vdb.read_grid(path, name, DOMAIN)[:, ::-1] for name in ("density", "velocity")
+        )  # its axes are left-handed
         assert np.abs(rho * 255 - np.round(rho * 255)).max() < 0.1, "to the precision of 16 bits"
         assert rho.max() <= 1.0
         np.testing.assert_allclose(rho[:, :, :6] * peak, sequence.density(number)[:, :, :6], atol=peak / 400)

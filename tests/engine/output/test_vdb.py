@@ -29,7 +29,7 @@ def frame() -> tuple[np.ndarray, np.ndarray]:
 def test_a_frame_comes_back(tmp_path: Path, order: Any) -> None:
     density, velocity = frame()
     vdb.write_vdb(tmp_path / "a.vdb", np.asarray(density, order=order), np.asarray(velocity, np.float64, order), DOMAIN)
-    rho, u = vdb.read_vdb(tmp_path / "a.vdb", DOMAIN)
+    rho, u = (vdb.read_grid(tmp_path / "a.vdb", name, DOMAIN) for name in ("density", "velocity"))
     np.testing.assert_allclose(rho, density, rtol=1e-3, atol=1e-7)
     near = np.zeros(DOMAIN.shape, bool)
     near[1:11, 0:9, 8:22] = True
@@ -61,19 +61,19 @@ def test_a_flame_comes_back(tmp_path: Path) -> None:
     density, velocity = frame()
     flame = np.roll(density, (8, 0, 7), (0, 1, 2))
     vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=flame)
-    np.testing.assert_allclose(vdb.read_flame(tmp_path / "a.vdb", DOMAIN), flame, rtol=1e-3, atol=1e-7)
-    np.testing.assert_allclose(vdb.read_vdb(tmp_path / "a.vdb", DOMAIN)[0], density, rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(vdb.read_grid(tmp_path / "a.vdb", "flame", DOMAIN), flame, rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(vdb.read_grid(tmp_path / "a.vdb", "density", DOMAIN), density, rtol=1e-3, atol=1e-7)
     vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=0 * flame)
-    assert not vdb.read_flame(tmp_path / "a.vdb", DOMAIN).any()
+    assert not vdb.read_grid(tmp_path / "a.vdb", "flame", DOMAIN).any()
     vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN)
-    assert vdb.read_flame(tmp_path / "a.vdb", DOMAIN) is None
+    assert vdb.read_grid(tmp_path / "a.vdb", "flame", DOMAIN) is None
     with pytest.raises(ValueError, match="flame must be finite and not negative"):
         vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=-flame)
     with pytest.raises(FileNotFoundError, match="no such file"):
-        vdb.read_flame(tmp_path / "b.vdb", DOMAIN)
+        vdb.read_grid(tmp_path / "b.vdb", "flame", DOMAIN)
     (tmp_path / "a.vdb").write_bytes(b"nonsense")
     with pytest.raises(OSError, match="is damaged"):
-        vdb.read_flame(tmp_path / "a.vdb", DOMAIN)
+        vdb.read_grid(tmp_path / "a.vdb", "flame", DOMAIN)
 
 
 @needs_vdb
@@ -84,7 +84,9 @@ def test_a_velocity_on_faces_is_stored_at_centres(tmp_path: Path) -> None:
     velocity = StaggeredGrid((x, y, z), DOMAIN.voxel_size)
     for name, given in (("faces", velocity), ("centres", velocity.centres())):
         vdb.write_vdb(tmp_path / f"{name}.vdb", density, given, DOMAIN)
-    of_faces, of_centres = (vdb.read_vdb(tmp_path / f"{name}.vdb", DOMAIN)[1] for name in ("faces", "centres"))
+    of_faces, of_centres = (
+        vdb.read_grid(tmp_path / f"{name}.vdb", "velocity", DOMAIN) for name in ("faces", "centres")
+    )
     assert of_faces.any()
     np.testing.assert_array_equal(of_faces, of_centres)
     with pytest.raises(ValueError, match="does not fit the domain"):
@@ -96,7 +98,7 @@ def test_a_frame_without_smoke_holds_both_grids_empty(tmp_path: Path) -> None:
     vdb.write_vdb(tmp_path / "a.vdb", np.zeros(DOMAIN.shape), np.ones((*DOMAIN.shape, 3)), DOMAIN)
     grids = vdb.vdb_module().readAll(str(tmp_path / "a.vdb"))[0]
     assert sorted((grid.name, grid.activeVoxelCount()) for grid in grids) == [("density", 0), ("velocity", 0)]
-    rho, u = vdb.read_vdb(tmp_path / "a.vdb", DOMAIN)
+    rho, u = (vdb.read_grid(tmp_path / "a.vdb", name, DOMAIN) for name in ("density", "velocity"))
     assert not rho.any()
     assert not u.any()
 

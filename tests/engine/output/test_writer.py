@@ -16,7 +16,7 @@ import pytest
 from small_sequence import SCENE, SETTINGS, frame, has_vdb, names, write
 
 from smokelift.output.archive import VELOCITY
-from smokelift.output.index import Origins, SequenceError
+from smokelift.output.index import SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -59,12 +59,12 @@ def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: 
 
 def test_choices_and_provenance_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
     choices, provenance = [{"what": "scattering", "measured": {"error": math.nan}}], [{"origin": "estimated"}]
-    cut_off(tmp_path, [1], origins=Origins(choices=choices, provenance=provenance))
+    cut_off(tmp_path, [1], choices=choices, provenance=provenance)
     begun = Sequence.open(tmp_path)
     assert begun.choices == ({"what": "scattering", "measured": {"error": None}},)
     assert begun.provenance == tuple(provenance)
     other, assumed = ({"what": "scattering", "measured": {"error": 0.2}},), ({"origin": "assumed"},)
-    write(tmp_path, [2], resume=True, origins=Origins(choices=other, provenance=assumed))
+    write(tmp_path, [2], resume=True, choices=other, provenance=assumed)
     assert (Sequence.open(tmp_path).choices, Sequence.open(tmp_path).provenance) == (other, assumed)
 
 
@@ -176,17 +176,17 @@ def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
 def test_other_files_and_other_software_are_not_resumed(
     tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cut_off(tmp_path, [1], origins=Origins(sources={"clip": {"bytes": 9, "sha256": "ab"}}))
+    cut_off(tmp_path, [1], sources={"clip": {"bytes": 9, "sha256": "ab"}})
     with pytest.raises(SequenceError, match=r'sources\.clip\.sha256 was "ab" and is now "cd"; choose another'):
-        write(tmp_path, [2], resume=True, origins=Origins(sources={"clip": {"bytes": 9, "sha256": "cd"}}))
+        write(tmp_path, [2], resume=True, sources={"clip": {"bytes": 9, "sha256": "cd"}})
     index = json.loads((tmp_path / "sequence.json").read_text())
     newer = {**index, "versions": {**index["versions"], "numpy": "1.0"}}
     (tmp_path / "sequence.json").write_text(json.dumps(newer))
     with pytest.raises(SequenceError, match=r'versions\.numpy was "1.0" and is now'):
-        write(tmp_path, [2], resume=True, origins=Origins(sources=index["sources"]))
+        write(tmp_path, [2], resume=True, sources=index["sources"])
     patched = {**index, "versions": {**index["versions"], "python": "3.11.0"}}
     (tmp_path / "sequence.json").write_text(json.dumps(patched))
-    write(tmp_path, [2], resume=True, origins=Origins(sources=index["sources"]))
+    write(tmp_path, [2], resume=True, sources=index["sources"])
     assert Sequence.open(tmp_path).frames == (1, 2)
 
 

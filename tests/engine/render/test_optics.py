@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.render import Optics, scene_optics, scene_renderer
-from smokelift.render.light_sampling import sampled_lights
+from smokelift.render.optics import sampled_lights
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight, Scene, completed
 from tests.engine.render.environments import sky
 

@@ -38,15 +38,8 @@ def supported_gpu() -> str | None:
 def start(backend: str) -> str:
     """Start Taichi on ``"cpu"`` or one of `GPU_BACKENDS`; on the back end that already runs, do nothing.
 
-    Returns
-    -------
-    str
-        The name of the Vulkan device, if it is one and has just been started.
-
-    Raises
-    ------
-    RuntimeError
-        If Taichi already runs on another back end.
+    It returns the name of the Vulkan device, if it is one and has just been started, and raises RuntimeError if Taichi
+    already runs on another back end.
     """
     global _running
     if _running is not None:
