@@ -100,18 +100,11 @@ class GpuBackend:
     def _shade(self) -> None:
         add = 0
         for sweep in self._plan.lighting.lights:
-            scatters = (self._energy(sweep), self._to_eye, *self._phase, add)
             if isinstance(sweep, ParallelSweep):
-                columns = self._sweep(self._medium, sweep, sweep.travel)
-                light.shade_parallel(
-                    columns, self._near, self._medium, *_slopes(sweep), sweep.step,
-                    taichi.vector(sweep.direction), *scatters,
-                )  # fmt: skip
-                add = 1
-                continue
-            for face in sweep.faces:
-                columns = self._cast(sweep, face)
-                light.shade_point(columns, self._near, self._medium, *_rays(sweep, face), *scatters)
+                self._scatter(sweep, self._medium, self._medium, add, adjoint=False)
+            else:
+                for face in sweep.faces:
+                    self._scatter_face(sweep, face, self._medium, self._medium, add, adjoint=False)
             add = 1
         camera.extend_into_border(self._medium)
 
@@ -119,23 +112,33 @@ class GpuBackend:
         if self._scratch is None:
             self._scratch = taichi.zeros((*self._padded, 1))
         for sweep in self._plan.lighting.lights:
-            scatters = (self._energy(sweep), self._to_eye, *self._phase)
             if isinstance(sweep, ParallelSweep):
-                columns = self._sweep(self._medium, sweep, sweep.travel)
-                light.parallel_depth_gradient(
-                    columns, self._near, self._gradient, self._scratch, *_slopes(sweep), sweep.step,
-                    taichi.vector(sweep.direction), *scatters,
-                )  # fmt: skip
+                self._scatter(sweep, self._gradient, self._scratch, 0, adjoint=True)
                 # the adjoint of the sweep is that of the light that travels the other way
                 columns = self._sweep(self._scratch, sweep, -sweep.travel)
                 light.add_parallel_shadow(columns, self._near, self._gradient, *_slopes(sweep), sweep.step)
                 continue
             for face in sweep.faces:
+                columns = self._scatter_face(sweep, face, self._gradient, self._scratch, 0, adjoint=True)
                 rays = _rays(sweep, face)
-                columns = self._cast(sweep, face)
-                light.point_depth_gradient(columns, self._near, self._gradient, self._scratch, *rays, *scatters)
                 light.gather_rays(self._scratch, columns, *rays, sweep.voxel_size)
                 light.add_point_shadow(columns, self._near, self._gradient, *rays)
+
+    def _scatter(self, sweep: ParallelSweep, source: Any, result: Any, add: int, *, adjoint: bool) -> None:
+        columns = self._sweep(self._medium, sweep, sweep.travel)
+        light.scatter_parallel(
+            columns, self._near, source, result, *_slopes(sweep), sweep.step, taichi.vector(sweep.direction),
+            self._energy(sweep), self._to_eye, *self._phase, add, adjoint,
+        )  # fmt: skip
+
+    def _scatter_face(self, sweep: PointSweep, face: Face, source: Any, result: Any, add: int, *, adjoint: bool) -> Any:
+        """Scatter through one face of a point light, and return its columns."""
+        columns = self._cast(sweep, face)
+        light.scatter_point(
+            columns, self._near, source, result, *_rays(sweep, face),
+            self._energy(sweep), self._to_eye, *self._phase, add, adjoint,
+        )  # fmt: skip
+        return columns
 
     def _sweep(self, voxels: Any, sweep: ParallelSweep, travel: int) -> Any:
         x, y, z = (n + (axis != sweep.axis) for axis, n in enumerate(self._plan.shape))

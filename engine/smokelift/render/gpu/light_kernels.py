@@ -83,12 +83,13 @@ def _write_inscatter(medium: ti.template(), index, energy, lit, add):
 
 
 @ti.func
-def _depth_gradient(gradient: ti.template(), index, energy, lit):
+def _write_depth_gradient(gradient: ti.template(), result: ti.template(), index, energy, lit):
     """Derivative by the optical depth to the light: -E p V dJ."""
+    i, j, k = index[0] + 1, index[1] + 1, index[2] + 1
     value = 0.0
     for channel in range(gradient.shape[3] - 1):
-        value -= energy[channel] * lit * gradient[index[0] + 1, index[1] + 1, index[2] + 1, channel + 1]
-    return value
+        value -= energy[channel] * lit * gradient[i, j, k, channel + 1]
+    result[i, j, k, 0] = value
 
 
 @ti.kernel
@@ -143,10 +144,11 @@ def parallel_at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slop
 
 
 @ti.kernel
-def shade_parallel(
+def scatter_parallel(
     columns: ndarray3,
     near: mask3,
-    medium: ndarray4,
+    source: ndarray4,
+    result: ndarray4,
     axis: ti.template(),
     slope_b: ti.f32,
     slope_c: ti.f32,
@@ -158,38 +160,20 @@ def shade_parallel(
     anisotropy: ti.f32,
     albedo: ti.f32,
     add: ti.i32,
+    adjoint: ti.template(),
 ):
-    """J = E p V, or J += E p V, in and next to voxels that may hold smoke."""
+    """J = E p V, or J += E p V, in the result, in and next to voxels that may hold smoke.
+
+    Its adjoint: from the derivative by J in the source that by the optical depth to the light, in the result.
+    """
     for index in ti.grouped(ti.ndrange(*near.shape)):
         if near[index] != 0:
             lit = phase(index, to_eye, direction, anisotropy, albedo)
             lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
-            _write_inscatter(medium, index, energy, lit, add)
-
-
-@ti.kernel
-def parallel_depth_gradient(
-    columns: ndarray3,
-    near: mask3,
-    gradient: ndarray4,
-    scratch: ndarray4,
-    axis: ti.template(),
-    slope_b: ti.f32,
-    slope_c: ti.f32,
-    first: ti.i32,
-    step: ti.f32,
-    direction: vec3,
-    energy: vec3,
-    to_eye: affine,
-    anisotropy: ti.f32,
-    albedo: ti.f32,
-):
-    """Scratch = derivative by the optical depth to the light."""
-    for index in ti.grouped(ti.ndrange(*near.shape)):
-        if near[index] != 0:
-            lit = phase(index, to_eye, direction, anisotropy, albedo)
-            lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
-            scratch[index[0] + 1, index[1] + 1, index[2] + 1, 0] = _depth_gradient(gradient, index, energy, lit)
+            if ti.static(adjoint):
+                _write_depth_gradient(source, result, index, energy, lit)
+            else:
+                _write_inscatter(result, index, energy, lit, add)
 
 
 @ti.kernel
@@ -290,10 +274,11 @@ def accumulate_rays(
 
 
 @ti.kernel
-def shade_point(
+def scatter_point(
     columns: ndarray3,
     near: mask3,
-    medium: ndarray4,
+    source: ndarray4,
+    result: ndarray4,
     axis: ti.template(),
     travel: ti.i32,
     first: ti.i32,
@@ -305,43 +290,21 @@ def shade_point(
     anisotropy: ti.f32,
     albedo: ti.f32,
     add: ti.i32,
+    adjoint: ti.template(),
 ):
-    """J = E p V, or J += E p V, for the voxels seen through one face."""
-    for index in ti.grouped(ti.ndrange(*near.shape)):
-        if near[index] != 0 and faces_voxel(axis, travel, position, index):
-            away = index - position
-            lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
-            lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
-            _write_inscatter(medium, index, energy, lit, add)
-
-
-@ti.kernel
-def point_depth_gradient(
-    columns: ndarray3,
-    near: mask3,
-    gradient: ndarray4,
-    scratch: ndarray4,
-    axis: ti.template(),
-    travel: ti.i32,
-    first: ti.i32,
-    far: ti.f32,
-    begin: vec2,
-    position: vec3,
-    energy: vec3,
-    to_eye: affine,
-    anisotropy: ti.f32,
-    albedo: ti.f32,
-):
-    """Scratch = derivative by the optical depth to the light, 0 for voxels seen through other faces."""
+    """Do `scatter_parallel` for the voxels seen through one face; others have the derivative 0."""
     for index in ti.grouped(ti.ndrange(*near.shape)):
         if near[index] != 0:
-            value = 0.0
             if faces_voxel(axis, travel, position, index):
                 away = index - position
                 lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
                 lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
-                value = _depth_gradient(gradient, index, energy, lit)
-            scratch[index[0] + 1, index[1] + 1, index[2] + 1, 0] = value
+                if ti.static(adjoint):
+                    _write_depth_gradient(source, result, index, energy, lit)
+                else:
+                    _write_inscatter(result, index, energy, lit, add)
+            elif ti.static(adjoint):
+                result[index[0] + 1, index[1] + 1, index[2] + 1, 0] = 0.0
 
 
 @ti.kernel
