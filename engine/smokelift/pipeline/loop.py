@@ -72,27 +72,7 @@ class Frame:
     followed: Picture | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """What a frame needs of the one before, by the names of `Frame`.
-
-    Its velocity on the fine grid, which takes much memory, is not needed.
-    """
-
-    number: int
-    density: Volume
-    estimated: Velocity
-    smooth: Volume | None
-    steady: Volume | None
-    followed: Picture | None = None
-
-    @staticmethod
-    def of(frame: Frame) -> Carried:
-        """Return what the next frame needs of a frame."""
-        return Carried(frame.number, frame.density, frame.estimated, frame.smooth, frame.steady, frame.followed)
-
-
-def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator[Frame]:
+def frames_after(before: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
     """Yield a shot's frames after one, or all; the first waits until the second gives it a velocity."""
     count = len(shot.clip)
     follows = method.follows_picture and shot.alone
@@ -105,7 +85,7 @@ def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
             frame = _frame(index, before, shot, method, follows=follows)
-        before = Carried.of(frame)
+        before = carried_on(frame)
         if index == 0 and count > 1:
             first = frame
             continue
@@ -116,7 +96,12 @@ def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator
         del frame  # velocities take most of the memory
 
 
-def _frame(index: int, before: Carried | None, shot: Shot, method: Method, *, follows: bool) -> Frame:
+def carried_on(frame: Frame) -> Frame:
+    """What the next frame needs of one: not its velocity on the fine grid, which takes much memory, nor its fire."""
+    return replace(frame, velocity=frame.estimated, figures={}, flame=None)
+
+
+def _frame(index: int, before: Frame | None, shot: Shot, method: Method, *, follows: bool) -> Frame:
     """One frame, counted from 0, from its pictures and the frame before."""
     began = time.perf_counter()
     domain, dt = shot.optics.domain, 1.0 / shot.clip.fps
@@ -171,7 +156,7 @@ def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, flo
     return {**clip_psnr(shot, index, fitted.density), **working}
 
 
-def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
+def _measured(before: Frame, fitted: FittedDensity) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
     if before.smooth is None or fitted.smooth is None:
         return before.density, fitted.density
@@ -179,7 +164,7 @@ def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
 
 
 def _density(
-    views: ViewSet | None, before: Carried | None, predicted: Velocity | None, shot: Shot, method: Method
+    views: ViewSet | None, before: Frame | None, predicted: Velocity | None, shot: Shot, method: Method
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     if views is None:
@@ -199,7 +184,7 @@ def _density(
     return fitted, start.figures
 
 
-def _carried(before: Carried | None, predicted: Velocity | None, shot: Shot) -> Smoke | None:
+def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> Smoke | None:
     """The smoke of the frame before, carried along; None where there is none or no prediction."""
     if before is None or predicted is None:
         return None

@@ -12,7 +12,7 @@ from smokelift.output.index import directory_path
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.pipeline.loop import Carried, Frame, frames_after
+from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.pipeline.source_files import sources
 from smokelift.report.provenance import provenance, record
@@ -108,7 +108,7 @@ class Reconstruction:
                     frame.velocity.faces,
                     frame.figures,
                     flame=frame.flame,
-                    state=_state(Carried.of(frame)),
+                    state=_state(frame),
                 )
                 if on_frame is not None:
                     on_frame(frame)
@@ -146,7 +146,7 @@ def reconstruct(
     return Reconstruction(shot, method or compose(shot.settings))
 
 
-def _state(carried: Carried) -> ResumeState:
+def _state(carried: Frame) -> ResumeState:
     """What is carried to the next frame, for a run that goes on."""
     memory = carried.estimated.residual
     kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
@@ -155,7 +155,7 @@ def _state(carried: Carried) -> ResumeState:
     return ResumeState(carried.number, carried.density, carried.estimated.faces, kept)
 
 
-def _resumed(state: ResumeState, shot: Shot) -> Carried:
+def _resumed(state: ResumeState, shot: Shot) -> Frame:
     """The inverse of `_state`."""
     mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
     residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
@@ -163,4 +163,5 @@ def _resumed(state: ResumeState, shot: Shot) -> Carried:
     shape = shot.optics.domain.resolution
     while shape != velocity.shape:
         shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
-    return Carried(state.number, state.density, velocity, state.extra.get("smooth"), state.extra.get("steady"))
+    smooth, steady = (state.extra.get(name) for name in ("smooth", "steady"))
+    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)

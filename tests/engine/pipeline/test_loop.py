@@ -22,7 +22,7 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
-from smokelift.pipeline.loop import Carried, frames_after
+from smokelift.pipeline.loop import frames_after
 from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
@@ -303,7 +303,7 @@ def test_where_no_picture_is_followed_a_run_goes_on_without_the_frame_before(two
         method = compose(shot.settings)
         first = next(frames_after(None, shot, method))
         monkeypatch.setattr(Shot, "observe", lambda shot, frame: observed.append(frame) or observe(shot, frame))
-        next(frames_after(Carried.of(first), shot, method))
+        next(frames_after(first, shot, method))
     assert observed == [1]
 
 
