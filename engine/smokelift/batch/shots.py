@@ -25,7 +25,7 @@ from typing import Any
 
 from smokelift.checks import shown
 from smokelift.scene.files import read_text
-from smokelift.scene.toml_lines import Place, find_lines
+from smokelift.scene.toml_lines import Place, find_lines, line_of
 
 OPTIONS = (
     "quality",
@@ -166,7 +166,4 @@ class _Reader:
                 raise self._error((*place, key), f"there is no key {shown(key)} here; known are {', '.join(keys)}")
 
     def _error(self, place: Place, message: str) -> ValueError:
-        while place and place not in self.lines:
-            place = place[:-1]
-        line = f", line {self.lines[place]}" if place else ""
-        return ValueError(f"{self.path.name}{line}: {message}")
+        return ValueError(f"{self.path.name}{line_of(place, self.lines)}: {message}")

@@ -3,10 +3,8 @@
 ``description`` holds `Scene`, what a user gives, and ``complete`` holds `CompleteScene`, in which nothing is left open.
 """
 
-from smokelift.scene.background import Background
 from smokelift.scene.camera import LARGEST_PICTURE, Camera, as_matrix, look_at_matrix, orbit, shared_part
 from smokelift.scene.checks import SceneError
-from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed, require_scene
 from smokelift.scene.description import Scene, scene_from_dict
 from smokelift.scene.domain import SIDES, Box, Domain, Inlet, Side
@@ -14,7 +12,7 @@ from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import SCATTERINGS, SHADOWED, Medium, Scattering
-from smokelift.scene.view import View
+from smokelift.scene.view import Background, ClipSource, View
 from smokelift.scene.writing import scene_to_dict
 
 __all__ = [

@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks import require_kind
-from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import file_path
-from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.description import Scene
 from smokelift.scene.domain import Domain, Inlet, Side
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import Medium, Scattering
-from smokelift.scene.view import View
+from smokelift.scene.view import Background, ClipSource, View
 from smokelift.scene.writing import write_file
 
 

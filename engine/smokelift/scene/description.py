@@ -16,10 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from smokelift.checks import listed, require_kind, shown
-from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, file_path, integer, set_fields
-from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Box, Inlet, Side, checked_sides
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import PointLight
@@ -27,7 +25,7 @@ from smokelift.scene.lights import Light
 from smokelift.scene.medium import Medium, Scattering, checked_scattering
 from smokelift.scene.projection import sees
 from smokelift.scene.reading import from_tables, read_file
-from smokelift.scene.view import View
+from smokelift.scene.view import Background, ClipSource, View
 from smokelift.scene.writing import write_file
 
 MAX_LISTED = 256

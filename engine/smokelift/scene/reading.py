@@ -21,16 +21,14 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from smokelift.checks import one_of, shown
-from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
 from smokelift.scene.checks import SceneError, file_path, positive, unexpected
-from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Box, Domain, Inlet
 from smokelift.scene.files import read_text
 from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
-from smokelift.scene.toml_lines import Place, find_lines
-from smokelift.scene.view import View
+from smokelift.scene.toml_lines import Place, find_lines, line_of
+from smokelift.scene.view import Background, ClipSource, View
 
 Table = Mapping[str, Any]
 Described = TypeVar("Described")
@@ -90,10 +88,7 @@ class _Reader:
 
     def _error(self, place: Place, message: str, key: str = "") -> SceneError:
         """Return an error that names the file, the line of the key (or of its table) and the table."""
-        where = (*place, key) if key else place
-        while where and where not in self.lines:
-            where = where[:-1]
-        line = f", line {self.lines[where]}" if where else ""
+        line = line_of((*place, key) if key else place, self.lines)
         header = ".".join(part for part in place if isinstance(part, str))
         if place:
             header = f"[[{header}]] " if isinstance(place[-1], int) else f"[{header}] "

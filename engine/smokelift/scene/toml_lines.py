@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 Place = tuple[str | int, ...]
 """Names of nested tables and a key, with the index of a table in a list of them: ``("lights", 1, "direction")``."""
@@ -43,6 +44,13 @@ def find_lines(text: str) -> dict[Place, int]:
         bare = re.sub(r'"(\\.|[^"\\])*"|\'[^\']*\'|#.*', "", line)
         depth += bare.count("[") + bare.count("{") - bare.count("]") - bare.count("}")
     return lines
+
+
+def line_of(place: Place, lines: Mapping[Place, int]) -> str:
+    """Return ", line 12" for a key or, where that has no line, for its table; nothing without either."""
+    while place and place not in lines:
+        place = place[:-1]
+    return f", line {lines[place]}" if place else ""
 
 
 def _names(dotted: str) -> list[str]:
