@@ -16,7 +16,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import counted
@@ -38,7 +37,7 @@ from smokelift.output.proxy_files import MIN_PROXY_VOXELS, write_proxy
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
-from smokelift.transport import Array, Faces, Velocity, face_shapes
+from smokelift.transport import Array, Faces, Velocity, require_same_shape
 
 
 class SequenceWriter:
@@ -154,7 +153,7 @@ class SequenceWriter:
         self,
         number: int,
         density: npt.ArrayLike,
-        velocity_faces: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
+        velocity_faces: Faces,
         figures: Mapping[str, Any] | None = None,
         *,
         flame: npt.ArrayLike | None = None,
@@ -195,11 +194,13 @@ class SequenceWriter:
         if number < 0:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
         box = box or self._domain
-        rho, faces = _checked(density, velocity_faces, box.shape)
+        rho = checked_volume(density, box.shape, "density")
+        velocity = Velocity(velocity_faces, self._domain.voxel_size)
+        require_same_shape("the velocity", velocity.shape, box.shape)
         fire = None if flame is None else checked_volume(flame, box.shape, FLAME)
         own_box = {} if box == self._domain else {BOX: {"min": box.min, "max": box.max, "resolution": box.resolution}}
         self.state = None  # a run has gone on by now, and the arrays are large
-        state = state or ResumeState(number, rho, faces)
+        state = state or ResumeState(number, rho, velocity.faces)
         try:
             paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
             for kind, path in zip(self._kinds, paths, strict=True):
@@ -207,7 +208,7 @@ class SequenceWriter:
                     with atomic_path(path) as aside:
                         shutil.copyfile(ready[kind], aside)
                 else:
-                    self._write_arrays(path, rho, faces, fire, box)
+                    self._write_arrays(path, rho, velocity, fire, box)
             if "vdb" in self._kinds and math.prod(self._domain.shape) >= MIN_PROXY_VOXELS:  # of all frames or of none
                 write_proxy(proxy_path(self.directory, number), rho, box, flame=fire, lattice=self._domain)
             frames = {**self._index.frames, str(number): plain({**(figures or {}), **own_box})}
@@ -220,12 +221,11 @@ class SequenceWriter:
         except OSError as error:
             raise self._failed(f"frame {number}", error) from error
 
-    def _write_arrays(self, path: Path, density: Array, faces: Faces, flame: Array | None, box: Domain) -> None:
+    def _write_arrays(self, path: Path, density: Array, velocity: Velocity, flame: Array | None, box: Domain) -> None:
         if path.suffix == ".npz":
             fire = {} if flame is None else {FLAME: flame}
-            write_arrays(path, {"density": density, **dict(zip(VELOCITY, faces, strict=True)), **fire})
+            write_arrays(path, {"density": density, **dict(zip(VELOCITY, velocity.faces, strict=True)), **fire})
         else:
-            velocity = Velocity(faces, self._domain.voxel_size)
             write_vdb(path, density, velocity, box, self._index.settings, flame, lattice=self._domain)
 
     def _take_over(self) -> None:
@@ -319,16 +319,3 @@ def _begun(directory: Path, resume: bool) -> Index | None:
         count = counted(len(there.frames), "finished frame")
         raise SequenceError(f"{directory}: holds {count}; resume the run, or choose another directory")
     return None
-
-
-def _checked(density: npt.ArrayLike, faces: Any, shape: tuple[int, int, int]) -> tuple[Array, Faces]:
-    rho, x, y, z = arrays = [np.ascontiguousarray(values, np.float32) for values in (density, *faces)]
-    wanted = [shape, *face_shapes(shape)]
-    if [array.shape for array in arrays] != wanted:
-        found = ", ".join(str(array.shape) for array in arrays)
-        raise ValueError(f"density and velocity on faces must have shapes {wanted}, not {found}")
-    if not all(np.isfinite(array).all() for array in arrays):
-        raise ValueError("density and velocity must be finite; set other values to 0")
-    if rho.min() < 0.0:
-        raise ValueError("density must not be negative; set such values to 0")
-    return rho, (x, y, z)

@@ -316,7 +316,7 @@ def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
             (6, rho[1:], (x, y, z)),
             (6, rho, (y, x, z)),
         ):
-            with pytest.raises(ValueError, match=r"follow|negative|finite|shapes"):
+            with pytest.raises(ValueError, match=r"follow|negative|finite|fit|one box"):
                 writer.write(*bad)
     assert Sequence.open(tmp_path).frames == (5,)
 
