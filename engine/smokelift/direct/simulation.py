@@ -116,14 +116,12 @@ class Simulation:
 
     def _with_forces(self, moved: Velocity, moment: Moment, step: int) -> list[Array]:
         """The velocity on faces after forces, inlets and fans, before the projection."""
-        rising = [np.zeros_like(component) for component in moved.faces]  # at a buoyancy of 1
-        rising[2][:, :, 1:-1] = 0.5 * (moment.density[:, :, 1:] + moment.density[:, :, :-1])
-        faces = []
-        for axis in range(3):
-            driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis]
-            for fan_faces, fan_velocity in self.surroundings.blown:
-                driven[fan_faces[axis]] = fan_velocity[axis]
-            faces.append(driven)
+        faces = [component.copy() for component in moved.faces]
+        lifted = 0.5 * (moment.density[:, :, 1:] + moment.density[:, :, :-1])
+        faces[2][:, :, 1:-1] += np.float32(self.dt * self.physics.buoyancy) * lifted
+        for fan_faces, fan_velocity in self.surroundings.blown:
+            for component, inside, speed in zip(faces, fan_faces, fan_velocity, strict=True):
+                component[inside] = speed
         self.inflow.velocity_into(faces, step)
         return [u + a for u, a in zip(faces, self.surroundings.air(moved, step * self.dt), strict=True)]
 
