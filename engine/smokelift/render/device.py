@@ -11,13 +11,13 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Literal
 
 from smokelift.render.cpu_backend import CpuBackend, RaySupport
 from smokelift.render.plan import RenderPlan
+
+if TYPE_CHECKING:
+    from smokelift.render.gpu.backend import GpuBackend
 
 DeviceName = Literal["auto", "cpu", "gpu"]
 
@@ -43,25 +43,6 @@ NO_TAICHI = (
 
 class DeviceError(RuntimeError):
     """The device that was asked for is not there."""
-
-
-class Backend(Protocol):
-    """Picture and derivative of one `RenderPlan`, in channels; `Renderer` makes colours of them."""
-
-    @property
-    def ray_support(self) -> RaySupport | None:
-        """What another backend of the same rays and voxels can take over."""
-
-    def image(self, density: NDArray[np.float32], keep_record: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
-
-    def gradient(
-        self,
-        scattered_gradient: NDArray[np.float32],
-        transmittance_gradient: NDArray[np.float32],
-        out: NDArray[np.float32] | None = None,
-    ) -> NDArray[np.float32]:
-        """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); see `Renderer.gradient`."""
 
 
 def available_gpu() -> str | None:
@@ -108,11 +89,11 @@ def start(device: DeviceName = "auto") -> str:
     return _running
 
 
-def backend(plan: RenderPlan, ray_support: RaySupport | None = None) -> Backend:
+def backend(plan: RenderPlan, ray_support: RaySupport | None = None) -> CpuBackend | GpuBackend:
     """What renders a plan on the device of this process; a GPU needs no `RaySupport`."""
     if start() == "cpu":
         return CpuBackend(plan, ray_support)
-    on_gpu: Backend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
+    on_gpu: GpuBackend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
     return on_gpu
 
 
