@@ -8,7 +8,6 @@ camera or a lamp.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,7 @@ from smokelift.direct.moment import Moment
 from smokelift.direct.surroundings import Surroundings
 from smokelift.scene import SIDES, Box, CompleteScene, Domain, EnvironmentLight, PointLight, Side
 from smokelift.scene.checks import Vector
-from smokelift.scene.domain import MAX_SIDE_VOXELS, box_around
+from smokelift.scene.domain import MAX_SIDE_VOXELS, box_around, open_sides
 from smokelift.transport import Array, Velocity, advect, at_centres
 
 BLOCK = 8
@@ -78,7 +77,7 @@ class Growth:
         """The box for the step that follows a moment, whose smoke may be near a side of its own."""
         smoke = box_around(moment.density > SEEN * moment.density.max(), 0)
         grown = box
-        for side, axis, is_high in _open(self.closed):
+        for side, axis, is_high in open_sides(self.closed):
             if smoke[axis].stop == 0:
                 break
             fastest = float(np.abs(moment.velocity.faces[axis]).max()) * dt / box.voxel_size
@@ -91,7 +90,7 @@ class Growth:
     def around(self, box: Domain, thing: Box) -> Domain:
         """The box, grown until it holds another; as it is where that would be too large."""
         larger = box
-        for side, axis, is_high in _open(self.closed):
+        for side, axis, is_high in open_sides(self.closed):
             beyond = thing.max[axis] - box.max[axis] if is_high else box.min[axis] - thing.min[axis]
             blocks = math.ceil(beyond / (BLOCK * box.voxel_size))
             if blocks > 0:
@@ -100,13 +99,13 @@ class Growth:
 
     def stopped(self, box: Domain) -> tuple[Side, ...]:
         """The open sides that cannot move."""
-        return tuple(side for side, _, _ in _open(self.closed) if not self._fits(_moved(box, side, 1)))
+        return tuple(side for side, _, _ in open_sides(self.closed) if not self._fits(_moved(box, side, 1)))
 
     def reach(self) -> Box:
         """The box that holds every box there can be."""
         times = self.voxels / math.prod(self.clip.resolution) - 1
         low, high = list(self.clip.min), list(self.clip.max)
-        for _, axis, is_high in _open(self.closed):
+        for _, axis, is_high in open_sides(self.closed):
             way = times * (self.clip.max[axis] - self.clip.min[axis])
             if is_high:
                 high[axis] += way
@@ -162,7 +161,7 @@ def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float, first: tuple
         return moment
     left = np.ones((), np.float32)
     shape = moment.density.shape
-    for side, axis, is_high in _open(()):
+    for side, axis, is_high in open_sides(()):
         if side not in stopped:
             continue
         count, band = shape[axis], np.float32(FADE * shape[axis])
@@ -199,7 +198,7 @@ def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step
     inside[clip] = 1
     from_inside = advect(inside, moment.velocity, dt, scheme="semi-lagrangian")
     left = np.ones_like(inside)
-    for side, axis, is_high in _open(()):
+    for side, axis, is_high in open_sides(()):
         if side in cut:
             beyond = [slice(None)] * 3
             beyond[axis] = slice(clip[axis].stop, None) if is_high else slice(None, clip[axis].start)
@@ -210,19 +209,12 @@ def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step
 def cut_sides(density: Array, closed: tuple[Side, ...]) -> tuple[Side, ...]:
     """The sides of the box of a density (nx, ny, nz), but for the walls, at which there is smoke."""
     seen = density > SEEN * density.max()
-    return tuple(side for side, axis, is_high in _open(closed) if seen.take(-is_high, axis).any())
+    return tuple(side for side, axis, is_high in open_sides(closed) if seen.take(-is_high, axis).any())
 
 
 def _thinned(moment: Moment, left: Array) -> Moment:
     flame = None if moment.flame is None else moment.flame * left
     return replace(moment, density=moment.density * left, flame=flame)
-
-
-def _open(closed: tuple[Side, ...]) -> Iterator[tuple[Side, int, bool]]:
-    """The sides that are no walls, each with its axis and whether it is a high one."""
-    for number, side in enumerate(SIDES):
-        if side not in closed:
-            yield side, number // 2, number % 2 == 1
 
 
 def _moved(box: Domain, side: Side, blocks: int) -> Domain:

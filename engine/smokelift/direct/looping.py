@@ -15,7 +15,8 @@ from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, simulated_figures, write_copy
 from smokelift.output.sequence import Sequence
-from smokelift.scene import SIDES, Side
+from smokelift.scene import Side
+from smokelift.scene.domain import open_sides
 from smokelift.transport import Array, Velocity
 from smokelift.velocity import estimate_velocity
 
@@ -156,12 +157,9 @@ def mix_by_edges(end: Array, start: Array, share: float, closed: tuple[Side, ...
 def _sooner(shape: tuple[int, ...], closed: tuple[Side, ...]) -> Array:
     """How many times as dense smoke counts as the usual, 1 away from the open sides."""
     factor = np.ones((), np.float32)
-    for number, side in enumerate(SIDES):
-        if side in closed:
-            continue
-        axis, count = number // 2, shape[number // 2]
-        places = np.arange(count, dtype=np.float32)
-        distance = (places[::-1] if number % 2 else places) / np.float32(BORDER * count)
+    for _, axis, is_high in open_sides(closed):
+        places = np.arange(shape[axis], dtype=np.float32)
+        distance = (places[::-1] if is_high else places) / np.float32(BORDER * shape[axis])
         rise = 1 + np.float32(BORDER_FACTOR - 1) * np.square(np.maximum(1 - distance, 0))
         factor = np.maximum(factor, rise.reshape([-1 if d == axis else 1 for d in range(3)]))
     return factor

@@ -62,14 +62,6 @@ class MovingMesh:
         (a, b, c), (d, e, f) = np.min(lows, axis=0).tolist(), np.max(highs, axis=0).tolist()
         return (a, b, c), (d, e, f)
 
-    def ever_in(self, domain: Domain) -> bool:
-        """Whether it ever reaches into a box, as far as its own bounds tell."""
-        for place in self.places:
-            corners = place.triangles.reshape(-1, 3)
-            if (corners.max(axis=0) > domain.min).all() and (corners.min(axis=0) < domain.max).all():
-                return True
-        return False
-
     def solid(self, domain: Domain, step: int, dt: float) -> tuple[Mask, Faces]:
         """The voxels that it encloses after a step, and how fast it has moved there in m/s, on all faces.
 

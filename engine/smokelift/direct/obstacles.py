@@ -137,11 +137,19 @@ def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> Non
     It has to hold a voxel of the box at the start, or to stand where the box can grow to.
     """
     low, high = thing.bounds()
-    meets = all(a < d and b > c for a, b, c, d in zip(low, high, reach.min, reach.max, strict=True))
     within = all(c <= a and b <= d for a, b, c, d in zip(low, high, domain.min, domain.max, strict=True))
-    here = thing.ever_in(domain) if isinstance(thing, MovingMesh) else bool(thing.voxels(domain).any())
-    if not here and (within or not meets):
+    if isinstance(thing, MovingMesh):
+        here = any(_overlap(place, domain) for place in thing.places)
+    else:
+        here = bool(thing.voxels(domain).any())
+    if not here and (within or not _overlap(thing, reach)):
         raise ValueError(
             f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m, nor of what the box can grow "
             "to; move it in, make it larger, or give the box more room."
         )
+
+
+def _overlap(thing: Obstacle, box: Box) -> bool:
+    """Whether a thing reaches into a box, as far as its own bounds tell."""
+    low, high = thing.bounds()
+    return all(a < d and b > c for a, b, c, d in zip(low, high, box.min, box.max, strict=True))

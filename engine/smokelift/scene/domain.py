@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -207,6 +208,13 @@ def checked_sides(value: Any) -> tuple[Side, ...]:
     if not isinstance(given, list) or any(name not in SIDES for name in given):
         raise unexpected(given, "closed", f"a list of sides of the box, of {one_of(SIDES)}", "domain")
     return tuple(side for side in SIDES if side in given)
+
+
+def open_sides(closed: Iterable[Side]) -> Iterator[tuple[Side, int, bool]]:
+    """The sides that are no walls, each with its axis and whether it is a high one."""
+    for number, side in enumerate(SIDES):
+        if side not in closed:
+            yield side, number // 2, number % 2 == 1
 
 
 def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, slice]:
