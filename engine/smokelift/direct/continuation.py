@@ -93,10 +93,26 @@ def continue_sequence(
 ) -> Iterator[Written]:
     """Write a sequence up to a frame, and then what a simulation makes of it.
 
-    The sequence is one of `open_source`; `npz` and `resume` are those of `smokelift.output.writer.SequenceWriter`. It
-    yields the number and the figures of every frame, which is written already. It raises ValueError if there is no such
-    frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies are too small for the
-    voxels, or a file cannot be read or written.
+    Parameters
+    ----------
+    sequence
+        See `smokelift.direct.new_sequence.open_source`.
+    out
+        Directory to write to.
+    continuation
+        How it goes on.
+    npz, resume
+        As in `smokelift.output.writer.SequenceWriter`.
+
+    Yields
+    ------
+    The number and the figures of every frame, which is written already.
+
+    Raises
+    ------
+    ValueError
+        If there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies
+        are too small for the voxels, or a file cannot be read or written.
     """
     start = sequence.frames[-1] if continuation.start is None else continuation.start
     kept = tuple(number for number in sequence.frames if number <= start)

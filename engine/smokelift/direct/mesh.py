@@ -61,7 +61,13 @@ class Mesh:
 
     @staticmethod
     def read(path: Path) -> Mesh:
-        """Read a binary STL file, in metres, Z up; ValueError if it cannot be read, is damaged or of another kind."""
+        """Read a binary STL file, in metres, Z up.
+
+        Raises
+        ------
+        ValueError
+            With the path, if it cannot be read, is damaged or of another kind.
+        """
         if not path.is_file():
             raise ValueError(f"{path}: is no file; give the path of a binary STL file.")
         try:
@@ -87,7 +93,13 @@ class Mesh:
         return (a, b, c), (d, e, f)
 
     def voxels(self, domain: Domain) -> Mask:
-        """The voxels (nx, ny, nz) whose centres it encloses; ValueError if it is open, such as a plane."""
+        """The voxels whose centres it encloses, shape (nx, ny, nz).
+
+        Raises
+        ------
+        ValueError
+            If it is open, such as a plane, so that it encloses nothing.
+        """
         return enclosed(self.crossings(domain), domain)
 
     def crossings(self, domain: Domain) -> list[Crossings]:

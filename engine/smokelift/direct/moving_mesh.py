@@ -20,9 +20,18 @@ from smokelift.transport import Array, Faces
 
 @dataclass(frozen=True, eq=False)
 class MovingMesh:
-    """A mesh that is an obstacle, at one place after another, with the same triangles in the same order.
+    """A mesh that is an obstacle, at one place after another.
 
-    The places are those at the frame that the smoke starts from and at every frame after it; it stays at the last one.
+    Attributes
+    ----------
+    places
+        At the frame that the smoke starts from and at every frame after it, with the same triangles in the same order.
+        It stays at the last one.
+
+    Raises
+    ------
+    ValueError
+        If there are none, or their numbers of triangles differ.
     """
 
     places: tuple[Mesh, ...]
@@ -37,7 +46,13 @@ class MovingMesh:
 
     @staticmethod
     def read(path: Path) -> MovingMesh:
-        """Read numbered binary STL files from a pattern ``crate_####.stl`` (each # a digit at least)."""
+        """Read numbered binary STL files from a pattern ``crate_####.stl`` (each # a digit at least).
+
+        Raises
+        ------
+        ValueError
+            If there are none or one is missing or damaged, or their numbers of triangles differ.
+        """
         named = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
         if named is None or not path.parent.is_dir():
             raise ValueError(f"{path}: is no file, and no pattern crate_####.stl of numbered files; give one of them.")

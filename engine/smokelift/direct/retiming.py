@@ -36,10 +36,29 @@ def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
 def retime_sequence(
     sequence: Sequence, out: str | Path, speeds: tuple[float, ...], *, npz: bool = False, resume: bool = False
 ) -> Iterator[Written]:
-    """Write a sequence at the speeds of `playback`; the rest is as in `continue_sequence`.
+    """Write a sequence at another pace: frames between the clip's own are interpolated from both neighbours.
 
-    Frames between the clip's own are interpolated from both neighbours. Velocities are scaled with the speed: at half
-    the speed they are half of the smoke's.
+    Velocities are scaled with the speed: at half the speed they are half of the smoke's.
+
+    Parameters
+    ----------
+    sequence
+        See `smokelift.direct.new_sequence.open_source`.
+    out
+        Directory to write to.
+    speeds
+        See `playback`.
+    npz, resume
+        As in `smokelift.output.writer.SequenceWriter`.
+
+    Yields
+    ------
+    The number and the figures of every frame, which is written already.
+
+    Raises
+    ------
+    ValueError
+        If a file cannot be read or written.
     """
     times, pace = playback(len(sequence.frames), speeds)
     first, dt = sequence.frames[0], 1 / sequence.fps

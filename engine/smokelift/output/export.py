@@ -73,9 +73,14 @@ class ExportSettings:
     velocity
         Whether to export the velocity, which motion blur needs.
     proxy
-        How many times coarser a second sequence for viewports is, of the density alone: 1 (none) to 16.
+        How many times coarser a second sequence for viewports is, of the density alone; 1 for none.
     host
         The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``.
+
+    Raises
+    ------
+    ValueError
+        If the proxy is not 1 to 16.
     """
 
     precision: Precision = "half"
@@ -95,8 +100,25 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
     There is no USD file for a program whose axes are left-handed. An earlier export in the folder is replaced. The
     sequence stays as it is.
 
-    It yields the number of every frame, which is written already, and the bytes of its files. It raises VdbUnavailable,
-    and SequenceError if there are no frames, the folder holds other files, or a file cannot be read or written.
+    Parameters
+    ----------
+    sequence
+        What is exported, with all its frames.
+    out
+        The folder, which is made if it is missing.
+    settings
+        What of it.
+
+    Yields
+    ------
+    The number of every frame, which is written already, and the bytes of its files.
+
+    Raises
+    ------
+    SequenceError
+        If there are no frames, the folder holds other files, or a file cannot be read or written.
+    VdbUnavailable
+        If there is no OpenVDB module.
     """
     out = Path(out)
     require_export(sequence, out)

@@ -64,7 +64,13 @@ class Sequence:
 
     @classmethod
     def open(cls, directory: str | Path) -> Sequence:
-        """Open a directory that a reconstruction wrote; SequenceError if there is no sequence, or it is damaged."""
+        """Open a directory that a reconstruction wrote.
+
+        Raises
+        ------
+        SequenceError
+            If there is no sequence, or it is damaged.
+        """
         directory = directory_path(directory)
         if directory.is_file():
             raise SequenceError(f"{directory}: is a file; give the directory of the sequence")
@@ -95,7 +101,13 @@ class Sequence:
         return (clip.fps if clip is not None else None) or USUAL_FPS
 
     def box(self, number: int) -> Domain:
-        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing."""
+        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame.
+        """
         self._check(number)
         return self._boxes[int(number)]
 
@@ -104,7 +116,13 @@ class Sequence:
         return replace(self, scene=replace(self.scene, domain=box))
 
     def density(self, number: int) -> Array:
-        """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one."""
+        """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, its file is missing or damaged, or a density is negative.
+        """
         density = self._read(number, ("density",))["density"]
         if density.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds negative densities; write it again")
@@ -114,6 +132,11 @@ class Sequence:
         """Return the emission of fire in a frame, shape (nx, ny, nz); None where the clip or the file has none.
 
         It is radiance per metre, of the color ``scene.medium.flame_color``.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, its file is missing or damaged, or an emission is negative.
         """
         self._check(number)
         if self.scene.medium.flame_color is None:  # the clip shows no fire: the file need not be read again
@@ -128,6 +151,11 @@ class Sequence:
 
         It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centres beside a face, zero
         further than two voxels from smoke and not free of divergence.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or its file is missing or damaged.
         """
         arrays = self._read(number, VELOCITY)
         if "velocity" in arrays:
@@ -141,12 +169,23 @@ class Sequence:
 
         These are the values of an OpenVDB file as it holds them; those of :meth:`velocity` are smoothed by the way to
         faces and back.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or its file is missing or damaged.
         """
         arrays = self._read(number, VELOCITY)
         return arrays["velocity"] if "velocity" in arrays else self.velocity(number).centres()
 
     def files(self, number: int) -> Mapping[str, Path]:
-        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``; all are as they were written."""
+        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or a file is not the one that was written.
+        """
         self._check(number)
         paths = {kind: frame_path(self.directory, number, kind) for kind in ("vdb", "npz")}
         there = {kind: path for kind, path in paths.items() if path.is_file()}
@@ -170,11 +209,22 @@ class Sequence:
         -------
         (rows, columns, 3) float32
             Linear radiance before the background that :class:`Viewer` describes.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or its file is missing or damaged.
         """
         return Viewer(self.scene, camera).image(number, self.density(number), self.flame(number))
 
     def figures(self, number: int) -> Mapping[str, Any]:
-        """Return what was noted about a frame."""
+        """Return what was noted about a frame.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame.
+        """
         self._check(number)
         return self._figures[str(number)]
 

@@ -120,7 +120,10 @@ class Camera:
     def require_outside(self, domain: Box) -> None:
         """Refuse a perspective camera that stands inside a box in any frame: nothing bounds the smoke around it.
 
-        It raises a SceneError with the position.
+        Raises
+        ------
+        SceneError
+            With the position.
         """
         for matrix in self.matrices or (self.matrix,):
             x, y, z = (row[3] for row in matrix[:3])
@@ -134,7 +137,10 @@ class Camera:
     def at(self, frame: int) -> Camera:
         """Return the camera as it stands in a frame, counted from 0 at the first that is used.
 
-        It raises a SceneError if the camera moves, and has no matrix for that frame.
+        Raises
+        ------
+        SceneError
+            If it moves, and has no matrix for that frame.
         """
         if not self.moves:
             return self

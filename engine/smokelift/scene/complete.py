@@ -65,9 +65,19 @@ def require_scene(scene: object) -> None:
 
 
 def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> CompleteScene:
-    """Complete a description with defaults, without any footage; a camera that is given replaces the scene's.
+    """Complete a description with defaults, without any footage.
 
-    A complete scene stays as it is, but for the camera. It raises ValueError if there is no camera or no domain.
+    Parameters
+    ----------
+    scene
+        Needs a domain, and a camera unless one is given. A complete scene stays as it is, but for the camera.
+    camera
+        Takes the place of the scene's.
+
+    Raises
+    ------
+    ValueError
+        If there is no camera or no domain.
     """
     require_scene(scene)
     camera = camera or scene.camera

@@ -35,7 +35,20 @@ Described = TypeVar("Described")
 
 
 def read_file(path: Path, build: Callable[..., Described]) -> Described:
-    """Read a scene file, of whose fields `build` makes the scene; see `smokelift.scene.Scene.load`."""
+    """Read a scene file; relative paths in it are relative to the file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    build
+        Makes the scene from its fields, given by name.
+
+    Raises
+    ------
+    SceneError
+        With the file, the line, the key, what was expected and what was found.
+    """
     try:
         text = read_text(path)
     except OSError as error:

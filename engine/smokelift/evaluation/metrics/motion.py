@@ -28,6 +28,11 @@ def velocity_error(
     The relative L2 error, and the mean cosine of the angle between both, over voxels where the truth moves
     faster than a millionth of its largest speed; a velocity of zero there has the cosine 0. Without any such
     voxel the cosine is 1.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a value is not finite, or no voxel counts.
     """
     found, true = pair(velocity, truth)
     counts = counted(mask, found.shape[:-1])
@@ -57,6 +62,11 @@ def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayL
         Edge of a voxel in metres.
     mask
         Which voxels count, shape (nx, ny, nz): a corner counts if all of its eight do. None counts all.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, the size not positive, a shape does not fit, or no corner counts.
     """
     require_positive("voxel_size", voxel_size)
     u = finite_array(velocity)
@@ -89,6 +99,11 @@ def warp_error(
         The way u from one to the other in voxels at the points of arrival, shape (nx, ny, nz, 3).
     mask
         Which voxels count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, a value is not finite, or no voxel counts.
     """
     start, end = pair(before, after)
     way = finite_array(displacement)
@@ -101,8 +116,17 @@ def warp_error(
 def flicker(series: npt.ArrayLike) -> float:
     """Return the unsteadiness of something in time: mean size of its second differences over that of its values.
 
-    Detail that moves on has some; detail that appears and dissolves has more. The series has the shape (frames, ...),
-    at least three frames.
+    Detail that moves on has some; detail that appears and dissolves has more.
+
+    Parameters
+    ----------
+    series
+        Shape (frames, ...), at least three frames.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or there are fewer than three frames.
     """
     values = finite_array(series)
     if len(values) < 3:

@@ -50,7 +50,13 @@ class PatchStatistics:
 
     @staticmethod
     def of(picture: npt.ArrayLike) -> PatchStatistics:
-        """Return the statistics of a picture (rows, columns) of smoke before black."""
+        """Return the statistics of a picture (rows, columns) of smoke before black.
+
+        Raises
+        ------
+        ValueError
+            If a value is not finite or the picture has not two axes.
+        """
         values = finite_array(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
@@ -64,8 +70,9 @@ class PatchStatistics:
         Elnekave and Weiss, "Generating natural images with direct patch distributions matching" (ECCV 2022). Every
         random direction holds something of every wave, so what is strongest decides: outlines and slow shading.
 
-        It is 0 for equal distributions, about 1 if only the reference has smoke; infinity if only the reference has
-        none.
+        Returns
+        -------
+        0 for equal distributions, about 1 if only the reference has smoke; infinity if only the reference has none.
         """
         away, spread = (np.sqrt(np.mean(values[:, :DIRECTIONS] ** 2, axis=1)) for values in self._beside(reference))
         return _mean_ratio(away, spread)
@@ -85,7 +92,13 @@ class PatchStatistics:
 
 
 def mean_gradient(picture: npt.ArrayLike) -> float:
-    """Return the sum of a picture's gradients over that of its values: how sharp it is; 0 for a black one."""
+    """Return the sum of a picture's gradients over that of its values: how sharp it is; 0 for a black one.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or the picture has not two axes of two pixels at least.
+    """
     values = finite_array(picture)
     down, right = np.gradient(values)
     total = float(values.sum())

@@ -13,7 +13,7 @@ from smokelift.transport import require_positive
 
 
 def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, peak: float = 1.0) -> float:
-    """Return the peak signal-to-noise ratio of two pictures in dB; infinity for equal pictures.
+    """Return the peak signal-to-noise ratio of two pictures in dB.
 
     Parameters
     ----------
@@ -23,6 +23,15 @@ def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, 
         Which pixels count, shape (rows, columns) or that of the pictures; None counts all.
     peak
         The value of white.
+
+    Returns
+    -------
+    Decibels; infinity for equal pictures.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a value is not finite, no pixel counts, or the peak is not positive.
     """
     require_positive("peak", peak)
     first, second = pair(a, b)
@@ -34,7 +43,8 @@ def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, 
 def ssim(a: npt.ArrayLike, b: npt.ArrayLike, peak: float = 1.0) -> float:
     """Return the structural similarity of two pictures (Wang 2004), the mean over pixels and channels.
 
-    The window is the usual Gaussian of 11 x 11 pixels and sigma 1.5; pixels nearer than 5 to an edge do not count.
+    The window is the usual Gaussian of 11 x 11 pixels and sigma 1.5; pixels nearer than 5 to an edge do not
+    count.
 
     Parameters
     ----------
@@ -42,6 +52,11 @@ def ssim(a: npt.ArrayLike, b: npt.ArrayLike, peak: float = 1.0) -> float:
         Pictures of one shape, (rows, columns) or (rows, columns, channels), at least 11 x 11.
     peak
         The value of white.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, the pictures are too small, a value is not finite, or the peak is not positive.
     """
     require_positive("peak", peak)
     first, second = pair(a, b)

@@ -12,14 +12,21 @@ from smokelift.transport import require_positive
 def volume_error(density: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
     """Return the relative L2 error of a density, |density - truth| / |truth|.
 
-    It is 0 for equal arrays; infinity if only the truth is zero everywhere.
-
     Parameters
     ----------
     density, truth
         Arrays of one shape.
     mask
         Which voxels count; None counts all.
+
+    Returns
+    -------
+    0 for equal arrays; infinity if only the truth is zero everywhere.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a value is not finite, or no voxel counts.
     """
     found, true = pair(density, truth)
     counts = counted(mask, found.shape)
@@ -27,7 +34,13 @@ def volume_error(density: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLi
 
 
 def mass(density: npt.ArrayLike, voxel_size: float) -> float:
-    """Return the volume integral of a density, in density times cubic metres; the voxel size is in metres."""
+    """Return the volume integral of a density, in density times cubic metres.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or the size not positive.
+    """
     require_positive("voxel_size", voxel_size)
     return float(finite_array(density).sum()) * voxel_size**3
 
@@ -35,8 +48,19 @@ def mass(density: npt.ArrayLike, voxel_size: float) -> float:
 def height_mass_error(density: npt.ArrayLike, truth: npt.ArrayLike) -> float:
     """Return how much mass is at a wrong height: sum |m - m_true| / sum m_true over the layers along z.
 
-    Both arrays have one shape (nx, ny, nz). It is 0 for equal masses in every layer, 1 for no density at all, and
-    infinity if only the truth is empty.
+    Parameters
+    ----------
+    density, truth
+        Arrays of one shape (nx, ny, nz).
+
+    Returns
+    -------
+    0 for equal masses in every layer, 1 for no density at all; infinity if only the truth is empty.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ or a value is not finite.
     """
     found, true = pair(density, truth)
     layers, wanted = found.sum(axis=(0, 1)), true.sum(axis=(0, 1))
