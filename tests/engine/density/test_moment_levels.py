@@ -79,7 +79,7 @@ def test_a_wide_blur_on_coarser_grids_is_about_the_same(shot, deviation: float) 
             lambda values: fine.blurred(values, deviation),
         )
     )
-    np.testing.assert_allclose(seen, wanted, rtol=0.03)
+    np.testing.assert_allclose(seen, wanted, rtol=0.05)
 
 
 def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -> None:

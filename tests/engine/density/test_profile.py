@@ -1,5 +1,7 @@
 """The profile of smoke in depth, as compiled for millions of voxels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,3 +43,28 @@ def test_smoke_is_spread_about_its_axis(position, columns) -> None:
         assert (np.diff(middle[: np.argmax(middle)]) >= 0).all()
         assert (np.diff(middle[np.argmax(middle) :]) <= 0).all()
         assert density[16, :, 24].sum() * DOMAIN.voxel_size == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("depth", [-0.3, 0.0, 0.3])
+def test_enclosed_smoke_stands_where_its_ray_is_inside(depth: float) -> None:
+    """What shows beyond the domain's ends at the axis is nearer to the camera; elsewhere nothing moves."""
+    camera = Camera.look_at((0, -6, 1.5), (0, 0, 1.5), fov_y_degrees=35, size=(60, 80))
+    amount = np.zeros((80, 60), np.float32)
+    amount[:, 24:36] = 1
+    everywhere = np.ones(DOMAIN.resolution, np.bool_)
+    places = project_voxels(camera, DOMAIN).places(everywhere)
+    behind = (np.arange(32) + 0.5) / 16 - 1
+    shares, means = [], []
+    for enclosed in (False, True):
+        profile = DepthProfile(amount, camera, DOMAIN, replace(SmokeAxis.upright(depth), enclosed=enclosed))
+        share, shape = profile.share_inside()[:, 30], profile.shape(places, everywhere).reshape(DOMAIN.resolution)
+        shares.append(share)
+        means.append(behind @ shape[16] / shape[16].sum(0))
+    free, kept = shares
+    assert (kept >= free - 1e-6).all()
+    # but where the ray cuts the edge of the domain, along less than the smoke's depth
+    poor, well = (np.count_nonzero((share > 0) & (share < 0.6)) for share in shares)
+    assert well <= poor / 2
+    moved = means[1] - means[0]
+    assert np.abs(moved[10:38]).max() < 1e-6
+    assert max(moved[0], moved[-1]) < -0.02
