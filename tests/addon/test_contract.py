@@ -52,8 +52,8 @@ def test_resolutions() -> None:
 def test_directions() -> None:
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
-    for module in (continue_, retime, loop):
-        module.add_parser(commands, argparse.ArgumentParser(add_help=False))
+    for name, module in {"continue": continue_, "retime": retime, "loop": loop}.items():
+        module.add_options(commands.add_parser(name))
     values = {"--frames": {"continue": "9", "loop": "1:9"}, "--wind": "1 2 -3", "--fan": "1 2 3 1 -4 5 6"}
     values |= {"--turbulence": "1 2 3", "--closed": "x- z+"}
     for direction, options in contract.DIRECTIONS.items():

@@ -137,7 +137,7 @@ def command_parser() -> argparse.ArgumentParser:
         prog="smokelift", description="Turn a video of smoke into an OpenVDB sequence of density and velocity."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    common = argparse.ArgumentParser(add_help=False)
+    common = _Parser(add_help=False)
     common.add_argument(
         "--device",
         choices=("auto", "cpu", "gpu"),
@@ -153,8 +153,10 @@ def command_parser() -> argparse.ArgumentParser:
     common.add_argument(
         "--threads", type=_threads, default=0, metavar="N", help="use N processor threads at most; 0 (default): all"
     )
-    for add_parser in COMMANDS:
-        add_parser(commands, common)
+    for name, module in COMMANDS.items():
+        command = commands.add_parser(name, parents=[common], help=module.HELP)
+        module.add_options(command)
+        command.set_defaults(run=module.run)
     return parser
 
 

@@ -6,16 +6,17 @@ import errno
 import json
 import os
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from statistics import median
-from types import TracebackType
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from smokelift.checks import Doubt, Remark, printable
+from smokelift.checks import Doubt, Figures, Remark, printable
 from smokelift.report.sentences import all_figures, sentence
 
 Style = Literal["text", "json"]
@@ -52,11 +53,15 @@ def _output() -> Iterator[None]:
 class Reporter(Protocol):
     """Receives what happens; a context manager around the frames."""
 
-    def __enter__(self) -> Reporter: ...
+    def __enter__(self) -> Self:
+        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    def __exit__(self, *error: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """Nothing more is shown of the frames."""
+        return
 
     def note(self, said: Remark | str) -> None:
         """Something that was assumed or noticed."""
@@ -79,15 +84,29 @@ def reporter(style: Style) -> Reporter:
     return _Json() if style == "json" else _Text()
 
 
-def say_frames(say: Reporter, written: Iterable[tuple[int, Mapping[str, Any]]], first: int, total: int) -> None:
-    """Say every frame of a sequence of so many while it is written, by number and figures."""
-    written = iter(written)
-    for number, figures in written:
-        say.start(total, number - first)
-        say.frame(number, figures)
-        break
-    for number, figures in written:
-        say.frame(number, figures)
+def say_sequence(
+    say: Reporter,
+    written: Iterable[tuple[int, Mapping[str, Any]]],
+    *,
+    kind: str,
+    directory: Path,
+    start: int = 1,
+    total: int,
+    **figures: float,
+) -> None:
+    """Say every frame of a sequence while it is written, from number ``start`` on, by its figures; and how it ends.
+
+    The last sentence is a remark of a kind, with more figures of its own.
+    """
+    began, started = time.monotonic(), False
+    for number, of_frame in written:
+        if not started:
+            say.start(total, number - start)
+            started = True
+        say.frame(number, of_frame)
+    seconds = round(time.monotonic() - began, 1)
+    result: Figures = {"directory": str(directory), "frames": total, "seconds": seconds}
+    say.finish(Remark(kind, {**result, **figures}), result)
 
 
 def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
@@ -106,7 +125,7 @@ def _fields(said: Remark | str) -> dict[str, Any]:
     return {"text": _words(said), **known}
 
 
-class _Text:
+class _Text(Reporter):
     def __init__(self) -> None:
         self._console = _Console(highlight=False)
         self._errors = _Console(stderr=True, highlight=False)
@@ -122,15 +141,7 @@ class _Text:
         self._shown: list[Mapping[str, Any]] = []
         self._task = self._bar.add_task("frames", start=False, fit="")
 
-    def __enter__(self) -> _Text:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stop()
-
-    def _stop(self) -> None:
+    def stop(self) -> None:
         with _output():
             if self._bar.live.is_started:  # a bar that never started would leave an empty line
                 self._bar.stop()
@@ -154,15 +165,15 @@ class _Text:
             self._bar.update(self._task, advance=1, fit=fit)
 
     def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
-        self._stop()
+        self.stop()
         self.note(said)
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
-        self._stop()
+        self.stop()
         self._errors.print(printable(text), markup=False, soft_wrap=True)
 
 
-class _Json:
+class _Json(Reporter):
     """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, each with its fields, one a line.
 
     What is said has its ``text``, and where `smokelift.report.sentences` has the words its ``kind`` and ``figures``.
@@ -172,14 +183,6 @@ class _Json:
     def __init__(self) -> None:
         self._total = self._done = 0
         self._spent: list[float] = []
-
-    def __enter__(self) -> _Json:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        return None
 
     def note(self, said: Remark | str) -> None:
         self._say("note", **_fields(said), doubt=isinstance(said, Doubt))

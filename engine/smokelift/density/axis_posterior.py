@@ -43,25 +43,8 @@ BOX_DEVIATION = 0.165
 """Standard deviation, in reaches, of the smoke's depth about the middle of its box
 (docs/experiments/axis-uncertainty.md)."""
 
-BOX_COUNT = 2.0
-"""Number of boxes that `BOX_DEVIATION` counts as, beside the one at hand, which shows how far off its middle the smoke
-is across the picture (docs/experiments/axis-uncertainty.md)."""
-
-MAX_KNOWN_DEVIATION = 0.95
-"""Largest standard deviation of a depth that counts as determined by a floor contact, over that of the depth by the box
-alone: a contact that leaves about as much spread as the box shows nothing."""
-
-MIN_CONTACT_SHARE = 0.6
-"""Smallest share of the frames that show a floor contact where there is one."""
-
-FLOOR_PROBABILITY = 0.6
-"""Probability that smoke which seems to touch the floor does."""
-
 CONTACT_DEVIATION = 0.08
 """Standard deviation, in reaches, of the depth that a floor contact shows."""
-
-BASE_HEIGHT = 0.3
-"""Mean height above the floor, in reaches, of smoke that only seems to touch it (exponential)."""
 
 LEANING_PROBABILITY = 0.2
 """Probability that a column leans, before anything is seen of it."""
@@ -102,11 +85,7 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
             return None
         first, domain = seen[0].camera, clip.optics.domain
         return estimate_axis([], first, domain, base=depth_at(distance, first, domain))
-    camera, domain = seen[len(seen) // 2].camera, clip.optics.domain
-    block = -(-max(domain.resolution) // MAX_VOXELS)
-    if block > 1:
-        x, y, z = (n // block for n in domain.resolution)
-        domain = domain.about_centre((x, y, z), block * domain.voxel_size)
+    camera, domain = seen[len(seen) // 2].camera, clip.optics.domain.coarsened(MAX_VOXELS)
     optics = replace(clip.optics, domain=domain)
     amounts = [
         apparent_optical_depth(each.image, each.plate, matte(each.image, each.plate).mask, optics) for each in seen
@@ -118,7 +97,7 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
         amounts = [
             seen_at(points, amount, each.camera).astype(np.float32) for amount, each in zip(amounts, seen, strict=True)
         ]
-    base = None if distance is None else depth_at(distance, camera, clip.optics.domain)
+    base = None if distance is None else depth_at(distance, camera, domain)
     return estimate_axis(amounts, camera, domain, clip.inlets, base)
 
 
@@ -145,14 +124,13 @@ def estimate_axis(
     screens = [screen for amount in amounts if (screen := upright_screen(amount, camera, domain)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
     cue: Cue = "box" if base is None else "distance"
+    deviation = BOX_DEVIATION * reach
     if not screens:
-        return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, BOX_DEVIATION * reach)
+        return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, deviation)
     mean = replace(screens[0], values=np.mean([screen.values for screen in screens], 0))
     total = mean.values.sum(1)
     smoky = total > 0.02 * total.max()
     middle = np.interp(mean.heights, mean.heights[smoky], mean.rows().mean[smoky])
-    aside = np.average(middle**2, weights=total)
-    deviation = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + aside) / (BOX_COUNT + 1))
     depths = np.linspace(-reach, reach, CANDIDATES)
     if base is not None:
         lowest, widths = int(np.argmax(smoky)), np.zeros_like(middle)
@@ -162,14 +140,14 @@ def estimate_axis(
     else:
         columns = _floor_column(screens, len(amounts), middle, depths, camera, domain)
     if not columns:
-        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(deviation))
+        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, deviation)
     # several columns lean towards one another
     leans = LEANING_PROBABILITY if len(columns) == 1 else 0.0
     known = [_posterior(column, depths, total, deviation, leans) for column in columns]
     error = np.sqrt(np.average(np.mean([variance for _, variance in known], 0), weights=total))
     axis = _axis(columns, [depth for depth, _ in known], mean)
     depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
-    if cue == "box" and error < MAX_KNOWN_DEVIATION * deviation:
+    if cue == "box" and error < deviation:
         cue = "floor contact"
     return AxisEstimate(axis, cue, depth, float(error))
 
@@ -232,10 +210,11 @@ def _at(depths: Doubles, known: Doubles | float) -> Doubles:
 def _floor_column(
     screens: Sequence[Screen], frames: int, middle: Doubles, depths: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
-    """The column that stands on the floor; none where too few of the frames show a contact.
+    """The column that stands on the floor; none where less than half of the frames show a contact.
 
     A disc of smoke on the floor begins in the picture where the ray through the floor meets it, within a few rows. What
-    begins nearer and above the floor shows the same.
+    begins nearer and above the floor shows the same, and is as likely: its height is exponential, as far from the floor
+    on the mean as smoke is from the middle of its box.
     """
     eye, (_, along, height) = np.array(camera.matrix, np.float64)[:3, 3], view_frame(camera)
     distance = float((np.array(domain.centre) - eye) @ along)
@@ -243,16 +222,16 @@ def _floor_column(
     if camera.type != "perspective" or abs(height[2]) < 1 or distance <= 0 or above <= 0:
         return []
     found = [contact for screen in screens if (contact := _floor_contact(screen, distance, above, camera, domain))]
-    if len(found) < MIN_CONTACT_SHARE * frames:
+    if 2 * len(found) < frames:
         return []
     contact, width, begins = np.median(found, 0)
     reach, heights = depths[-1], screens[0].heights
     # the line of sight rises towards the camera
-    nearer, rate = contact - depths, above / (distance + contact) / (BASE_HEIGHT * reach)
+    nearer, rate = contact - depths, above / (distance + contact) / (BOX_DEVIATION * reach)
     deviation = CONTACT_DEVIATION * reach
     on_floor = np.exp(_normal(nearer, deviation)) / np.sqrt(2 * np.pi)
     above_floor = np.where(nearer > 0, rate * np.exp(-rate * np.abs(nearer)), 0)
-    base = np.log(FLOOR_PROBABILITY * on_floor + (1 - FLOOR_PROBABILITY) * above_floor + 1e-300)
+    base = np.log(on_floor + above_floor + 1e-300)
     drifts = middle - np.interp(begins + width / 4, heights, middle)
     return [_Column(base, begins, middle, np.zeros_like(middle), drifts)]
 

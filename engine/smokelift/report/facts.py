@@ -140,9 +140,7 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     """The lines of the light: how strong it is, and what of it one picture does not show."""
     if shot.scene.scattering == "absorption":
         return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
-    strength, thickness = _estimate(shot, "light strength"), _estimate(shot, "smoke thickness")
-    if strength is not None and given.lights:
-        return (Fact("light", f"{strength.value} times as strong as given", "measured", sentence(strength)),)
+    thickness = _estimate(shot, "smoke thickness")
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
@@ -150,7 +148,7 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if thickness.source == "measured":
         hides, origin = f"hides {thickness.figures['hidden']:.0%} of what it covers", "measured"
     return (
-        Fact("light strength", f"smoke of radiance {colour}", origin, _said(shot, "light")),
+        Fact("light strength", f"smoke of radiance {colour}", origin, _said(shot, "assumed light")),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
         Fact("sun's direction", "no sun", UNDETERMINED, "Suns from many sides look the same. Give the lights."),
         Fact("sun's colour", "that of all light", UNDETERMINED),

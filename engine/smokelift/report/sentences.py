@@ -178,21 +178,9 @@ SENTENCES: Mapping[str, str] = {
         "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
         "{red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
     ),
-    "light as behind the smoke": (
-        "Light not given: light from everywhere is assumed, as strong as what comes from behind the smoke (irradiance "
-        "{irradiance:.2f}, with shadows)."
-    ),
-    "light as the smoke hides": (
-        "Light not given: light from everywhere is assumed, as strong as what the smoke adds for what it hides "
-        "(irradiance {irradiance:.2f}, without shadows)."
-    ),
-    "light as the thickest smoke": (
-        "Light not given: light from everywhere is assumed, as strong as the thickest smoke shows (irradiance "
-        "{irradiance:.2f}, without shadows)."
-    ),
-    "light without smoke": (
-        "Light not given: light from everywhere is assumed, so strong that thick smoke is white (irradiance "
-        "{irradiance:.2f}, without shadows)."
+    "assumed light": (
+        "Light not given: light from everywhere is assumed, as bright as smoke and background ask for (irradiance "
+        "{irradiance:.2f})."
     ),
     "likely wrong light": (
         "The assumed light is likely wrong, and the smoke too thick or too thin by half or more: {error:.0%} of what "
@@ -203,22 +191,14 @@ SENTENCES: Mapping[str, str] = {
         "contrast is left unexplained, so how thick the smoke near the fire is may be wrong. Hide the fire by a mask, "
         "or use frames with less fire."
     ),
-    "light strength": (
-        "Light: {factor:.2f} times as strong as given, because the smoke is brighter than the given light can make it. "
-        "The nearest densities asked for {asked_for_as_given:.2f} times as much, and now ask for {asked_for:.2f}. "
-        "Check the strength of the lights."
-    ),
     "smoke thickness": (
         "Smoke thickness: the texture behind the smoke shows that it hides {hidden:.0%} of what it covers, right to "
         "{spread:.0%}. The light is as strong as that asks for."
     ),
-    "smoke thickness without texture": (
-        "Smoke thickness: undetermined, because too little texture shows through it. Thinner smoke in stronger light "
-        "looks the same. Give the lights if you know them."
-    ),
     "uncertain smoke thickness": (
-        "Smoke thickness: undetermined, because the texture behind it shows it only to {spread:.0%} ({tolerance:.0%} "
-        "or less is needed). Thinner smoke in stronger light looks the same. Give the lights if you know them."
+        "Smoke thickness: undetermined, because the texture behind it, if any, shows it only to {spread:.0%} "
+        "({tolerance:.0%} or less is needed). Thinner smoke in stronger light looks the same. Give the lights if you "
+        "know them."
     ),
     "scattering": "Scattering: {value}.",
     "compared scattering": (

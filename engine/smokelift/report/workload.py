@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from statistics import fmean
 
 from smokelift.density import RoundDepth, ViewSet
-from smokelift.scene import Domain
 from smokelift.setup.first_estimate import SAMPLE_FRAMES
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -64,16 +62,9 @@ def _shares(shot: Shot, settings: Settings) -> list[float]:
     """Shares of the voxels that may hold smoke, in some of the frames that show smoke."""
     if settings.method == "paper":  # its densities are anywhere in the box
         return [1.0]
-    optics = replace(shot.optics, domain=_coarse(shot.optics.domain))
+    optics = replace(shot.optics, domain=shot.optics.domain.coarsened(MAX_SIDE_VOXELS))
     prior = RoundDepth().of_clip(shot)
     step = -(-len(shot.smoky) // LOOKED_AT) or 1
     moments = ((frame, shot.observe(frame)) for frame in shot.smoky[::step])
     seen = [ViewSet.of(observations, optics, frame) for frame, observations in moments if observations]
     return [float(prior.estimate(views).views.hull.mean()) for views in seen]
-
-
-def _coarse(domain: Domain) -> Domain:
-    """The box, or a little less of it, with voxels that do not depend on those of a large grid, nor do its shares."""
-    times = max(1.0, max(domain.resolution) / MAX_SIDE_VOXELS)
-    x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in domain.resolution)
-    return domain.about_centre((x, y, z), domain.voxel_size * times)

@@ -128,6 +128,15 @@ class Domain(Box):
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
+    def coarsened(self, longest: int) -> Domain:
+        """Return the box, or a little less of it, with larger voxels: so many along its longest side at most."""
+        # nor so large that a side has less than one; never beyond the box, where a light may stand
+        times = min(max(self.resolution) / longest, min(self.resolution))
+        if times <= 1:
+            return self
+        x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in self.resolution)
+        return self.about_centre((x, y, z), times * self.voxel_size)
+
     def grown(self, below: tuple[int, ...], above: tuple[int, ...]) -> Domain:
         """Return the domain with so many voxels more on its low sides and on its high sides, along x, y and z."""
         h = self.voxel_size

@@ -1,20 +1,29 @@
-"""A few frames of a clip at low resolution: what the light is judged on."""
+"""A few frames of a clip at low resolution, and the one judge of lights and scattering on them.
+
+A wrong light can still reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
+shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels. What they let through of the
+background is taken away from the other half, and the rest is light that the smoke scatters. How strong the lights have
+to be for that is the least-squares factor, zero at least.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
+from smokelift.density import DensitySettings, Observation, reconstruct_density
+from smokelift.density.hull import project_voxels, reached
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.footage.stored_picture import chequered_averages
 from smokelift.footage.working_picture import CameraError, working_picture
-from smokelift.render import Image
+from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Light, Scattering
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.shot import ShotView
@@ -28,6 +37,10 @@ SHORTEST = 4
 
 PIXELS = 2.0
 """Pixels of the clip along a voxel at least, so that each half of them shows every voxel."""
+
+MIN_CHANNEL_POWER = 1e-3
+"""Power of a channel's light over that of the brightest one, below which the channel has no strength of its own: its
+light is lost in 8 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +94,6 @@ class CoarseFrame:
         """The frame with other lights."""
         return replace(self, scene=replace(self.scene, lights=lights))
 
-    def scattered_by(self, scattering: Scattering) -> CoarseFrame:
-        """The frame with another model of scattering."""
-        return replace(self, scene=replace(self.scene, scattering=scattering))
-
 
 def coarse_frames(views: Sequence[ShotView], numbers: Sequence[int], scene: CompleteScene) -> tuple[CoarseFrame, ...]:
     """Return those of some frames in which every camera shows smoke; see `coarse_frame`."""
@@ -118,11 +127,7 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
         x, y, z = (n // times for n in domain.resolution)
         if most / 2 <= max(x, y, z) <= most and min(x, y, z) >= SHORTEST:
             return replace(domain, resolution=(x, y, z))
-    # nor so coarse that a side has less than one
-    times_finer = min(max(longest / max(most, SHORTEST), 1.0), min(domain.resolution))
-    # never beyond the box, where a light may stand
-    x, y, z = (max(1, math.floor(n / times_finer + 1e-6)) for n in domain.resolution)
-    return domain.about_centre((x, y, z), domain.voxel_size * times_finer)
+    return domain.coarsened(max(most, SHORTEST))
 
 
 def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
@@ -132,3 +137,56 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     halves = chequered_averages(view.clip.stored(number).cut(working.part), *working.camera.size, first)
     plate = view.plates.at(number).through(working.cut, working.pixels)
     return CoarseView(working.camera, plate, working.of(view.clip, number), *halves)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What densities show beside the other half of the pixels.
+
+    Attributes
+    ----------
+    error
+        Root mean square of the difference, in shares of what the smoke changes there; of several cameras the root mean
+        square of theirs.
+    colours : (cameras, 3)
+        Strength of the light, in multiples of the scene's, that brings the same densities nearest, by camera and
+        channel: more than 1 where they are too dark. 1 without scattered light.
+    """
+
+    error: float
+    colours: Doubles = field(default_factory=lambda: np.ones((1, 3)))
+
+
+def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:
+    """Fit a model's densities to one half of the pixels of all cameras, and let the judge show them to the other half.
+
+    Only pixels that the smoke's voxels can change count.
+    """
+    pixels: list[list[Doubles]] = [[] for _ in frames[0].views]
+    for frame in frames:
+        scene = replace(frame.scene, scattering=model)
+        own, *others = (Observation(view.camera, view.fitted, view.plate) for view in frame.views)
+        fitted = reconstruct_density(own.image, scene, settings=settings, plate=own.plate, views=others)
+        clear = Optics(scene.domain, scene.medium, (), "absorption")
+        lit = replace(scene_optics(scene), scattering=judge)
+        for view, of_camera in zip(frame.views, pixels, strict=True):
+            behind, shown = (
+                optics.renderer(view.camera, picture, fitted.hull).image(fitted.density)
+                for optics, picture in ((clear, view.plate.image), (lit, np.zeros(3, np.float32)))
+            )
+            reach = reached(view.smoke, project_voxels(view.camera, scene.domain))
+            parts = shown, view.held_out - behind, view.held_out - view.plate.image
+            of_camera.append(np.stack([part[reach].astype(np.float64) for part in parts]))
+    # of each camera and channel: squares of the light that is shown and its products with what is seen
+    power, product, wrong, contrast = (np.zeros((len(pixels), 3)) for _ in range(4))
+    for camera, parts_of in enumerate(pixels):
+        shown, seen, changed = np.concatenate(parts_of, 1)
+        power[camera], product[camera] = np.sum(shown**2, 0), np.sum(shown * seen, 0)
+        wrong[camera], contrast[camera] = np.sum((shown - seen) ** 2, 0), np.sum(changed**2, 0)
+    error = float(np.sqrt(np.mean(wrong.sum(1) / np.maximum(contrast.sum(1), 1e-30))))
+    if not power.sum() > 0:
+        return HeldOut(error, np.ones_like(power))
+    whole = np.maximum(product.sum(1, keepdims=True) / np.maximum(power.sum(1, keepdims=True), 1e-30), 0)
+    bright = power > MIN_CHANNEL_POWER * power.max(1, keepdims=True)
+    colours = np.where(bright, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
+    return HeldOut(error, colours)

@@ -10,9 +10,6 @@ from smokelift.checks import Figures, Remark
 UNDETERMINED = "undetermined"
 """Value of an estimate that nothing in the clip or the scene decides."""
 
-NOTHING: Figures = {}
-"""Figures where nothing was measured."""
-
 Value = TypeVar("Value", str, int, tuple[int, int, int], covariant=True)
 
 
@@ -23,7 +20,7 @@ class Estimate(Remark, Generic[Value]):
     Attributes
     ----------
     what
-        ``"scattering"``, ``"light strength"``, ``"resolution"``,
+        ``"scattering"``, ``"resolution"``,
         ``"velocity grid coarsening"``, ``"axis depth"``, ``"smoke colour"``, ``"smoke thickness"``,
         ``"gain of view 1"`` or ``"fire"``.
     value
@@ -53,21 +50,26 @@ def measured(
     value: Value,
     figures: Figures,
     *,
-    what: str | None = None,
+    what: str = "",
     spread: float | None = None,
     tolerance: float | None = None,
 ) -> Estimate[Value]:
     """Return what the clip shows; without more ado its kind is what it is about."""
-    return Estimate(
-        kind, figures, what=what or kind, value=value, source="measured", spread=spread, tolerance=tolerance
-    )
+    about = what or kind
+    return Estimate(kind, figures, what=about, value=value, source="measured", spread=spread, tolerance=tolerance)
 
 
 def undetermined(
-    kind: str, what: str, figures: Figures = NOTHING, *, spread: float | None = None, tolerance: float | None = None
+    kind: str,
+    what: str,
+    figures: Figures | None = None,
+    *,
+    spread: float | None = None,
+    tolerance: float | None = None,
 ) -> Estimate[str]:
     """Return what neither the user decides nor the clip shows well enough."""
-    return Estimate(kind, figures, what=what, value=UNDETERMINED, source="assumed", spread=spread, tolerance=tolerance)
+    unknown, known = UNDETERMINED, figures or {}
+    return Estimate(kind, known, what=what, value=unknown, source="assumed", spread=spread, tolerance=tolerance)
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,9 @@ from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_remarks import backdrop_remarks
-from smokelift.setup.coarse import coarse_frames
+from smokelift.setup.coarse import HeldOut, coarse_frames, held_out
 from smokelift.setup.estimate import Estimate, measured
 from smokelift.setup.geometry import fitting
-from smokelift.setup.held_out import HeldOut, held_out
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 

@@ -43,9 +43,6 @@ MIN_SIDE_VOXELS = 32
 """Voxels along the longest side at least: with fewer there is nothing more to save
 (docs/experiments/resolution-selection.md)."""
 
-DETAIL_FRAMES = 3
-"""Frames whose detail decides the resolution: those with the most smoke (docs/selection.md)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
@@ -280,7 +277,7 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
 def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
     """The detail of the smoke in some frames, at the clip's own pixels; None without smoke."""
     smoky, frames = estimate.samples.smoky, []
-    for number in smoky[:DETAIL_FRAMES]:
+    for number in estimate.samples.typical:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
             frames.append((part(estimate.clip.frame(number)), estimate.found.plates.at(number).through(part)))

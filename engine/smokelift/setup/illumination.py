@@ -1,16 +1,16 @@
 """The light of a shot and how its smoke scatters it, each question asked once, in the order in which they need answers.
 
     what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   first_light
-    coarse densities in it -> its strength, the model of scattering, shadows without a known light      measured_light
+    coarse densities in it -> the model of scattering, shadows without a known light                    measured_light
 
-The second is judged by `smokelift.setup.held_out`. Figures: docs/selection.md.
+The second is judged by `coarse.held_out`. Figures: docs/selection.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -20,11 +20,10 @@ from smokelift.density import DensitySettings
 from smokelift.footage.noise import Noise
 from smokelift.render.environment_count import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
-from smokelift.setup.coarse import CoarseFrame
+from smokelift.setup.coarse import CoarseFrame, HeldOut, held_out
 from smokelift.setup.estimate import Estimate, given, measured
 from smokelift.setup.first_estimate import SmokeSamples
 from smokelift.setup.geometry import Geometry
-from smokelift.setup.held_out import HeldOut, held_out
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
 from smokelift.setup.thickness import smoke_thickness
@@ -41,17 +40,6 @@ MAX_DESCENT_STEPS = 64
 """Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
 by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
-STEP = 1.25
-"""Ratio of one strength of given lights to the next that is tried: smoke nearly as bright as its light allows differs
-by as much in optical depth."""
-
-MAX_STRENGTH = 8.0
-"""Largest strength that is tried. Light given in other units than the picture's is a mistake, not a measurement."""
-
-MAX_MISSING_LIGHT = 0.05
-"""Light that may be missing before the given one is contradicted: blocks of multiple scattering are themselves up to as
-much too dark (docs/experiments/multiple-scattering.md)."""
-
 DOUBTFUL = 0.12
 """Error of held-out pixels, as a share of the smoke's contrast, from which the light that is taken before one colour is
 likely wrong: from there on the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
@@ -62,7 +50,6 @@ MAX_COLOUR_SPREAD = 0.1
 
 MAX_QUIET_NOISE = 2 / 255
 """Noise up to which what is left is not the noise's (docs/experiments/surroundings.md)."""
-
 
 AXES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
 """Directions of travel that stand for all: 14 find no other density (docs/experiments/surroundings.md)."""
@@ -83,23 +70,24 @@ class Illumination:
         nothing does.
     by_hand
         Whether the user gives the model of scattering.
-    measured
-        What was chosen on coarse densities.
     thickness
         What is known of the smoke's, where no light is given.
+    chosen
+        The model of scattering as an estimate, once it is measured.
     """
 
     lights: tuple[Light, ...]
     scattering: Scattering
     origin: Literal["given", "texture", "assumed"]
     by_hand: bool
-    measured: tuple[Estimate[Any], ...] = ()
-    thickness: tuple[Estimate[str], ...] = ()
+    thickness: Estimate[str] | None = None
+    chosen: Estimate[str] | None = None
 
     @property
-    def estimates(self) -> tuple[Estimate[Any], ...]:
+    def estimates(self) -> tuple[Estimate[str], ...]:
         """All that was measured of it, if its model of scattering asks for light."""
-        return self.measured if self.scattering == "absorption" else (*self.measured, *self.thickness)
+        known = (self.chosen, None if self.scattering == "absorption" else self.thickness)
+        return tuple(each for each in known if each is not None)
 
 
 def first_light(
@@ -126,7 +114,7 @@ def first_light(
     share = np.array(medium.albedos) / (4 * np.pi)
     red, green, blue = np.divide(source_radiance(samples, source), share, out=np.zeros(3), where=share > 0).tolist()
     sun = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
-    return Illumination((sun,), richest, "assumed" if source is None else "texture", by_hand, (), (thickness,))
+    return Illumination((sun,), richest, "assumed" if source is None else "texture", by_hand, thickness)
 
 
 def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
@@ -142,33 +130,26 @@ def measured_light(
     finer: Callable[[], CoarseFrame | None],
     settings: Settings,
 ) -> Illumination:
-    """Measure on coarse densities how strong the lights are and how they are scattered.
+    """Measure on coarse densities how light is scattered, and whether light that is not given casts shadows.
 
     Parameters
     ----------
     light
         With the richest model that is allowed, or the one that the user gives.
     frames
-        Those that models are tried on, one at least.
+        Those that models are tried on, one at least, in that light and with that model.
     finer
         Returns one of them on twice the voxels, for models that are nearly alike on these; None if there is none.
     settings
         How to fit, and what errors a cheaper model may have.
     """
-    richest, lights = light.scattering, light.lights
-    seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames]
-    found: tuple[Estimate[Any], ...] = ()
-    # what single scattering lacks would be taken for light that is missing
-    if richest == "multiple" or (_tries_multiple(richest, frames) and not light.by_hand):
-        lights, found = _strengthened(lights, seen, settings.density)
     if light.by_hand:
-        return replace(light, lights=lights, measured=(*found, given("scattering", richest)))
-    seen = [frame.lit_by(lights) for frame in seen]
-    chosen, scattered = _cheapest(seen, richest, finer, settings)
-    around = _surroundings(seen, scattered, settings.density) if light.origin == "assumed" else None
+        return replace(light, chosen=given("scattering", light.scattering))
+    scattering, chosen = _cheapest(frames, light.scattering, finer, settings)
+    around = _surroundings(frames, chosen, settings.density) if light.origin == "assumed" else None
     if around is not None:
-        (lights, scattered), chosen = around, "single"
-    return replace(light, lights=lights, scattering=chosen, measured=(*found, scattered))
+        return replace(light, lights=around[0], scattering="single", chosen=around[1])
+    return replace(light, scattering=scattering, chosen=chosen)
 
 
 def light_around(radiance: Doubles) -> tuple[DirectionalLight, ...]:
@@ -185,16 +166,9 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise, *, b
     """
     if light.origin == "given":
         return ()
-    if light.scattering in SHADOWED:
-        kind = "light as behind the smoke"
-    elif light.origin == "texture":
-        kind = "light as the smoke hides"
-    else:
-        kind = "light as the thickest smoke" if samples.smoky else "light without smoke"
     red, green, blue = np.sum([each.irradiance for each in light.lights if isinstance(each, DirectionalLight)], 0)
-    taken = Remark(kind, {"irradiance": (float(red), float(green), float(blue))})
-    scattered = next((each for each in light.measured if each.what == "scattering"), None)
-    error = 0.0 if scattered is None else scattered.figures.get(f"error_{scattered.value}", 0.0)
+    taken = Remark("assumed light", {"irradiance": (float(red), float(green), float(blue))})
+    error = 0.0 if light.chosen is None else light.chosen.figures.get(f"error_{light.chosen.value}", 0.0)
     assert isinstance(error, float)
     if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > MAX_QUIET_NOISE:
         return (taken,)
@@ -202,41 +176,6 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise, *, b
     if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
         return (taken,)
     return taken, Doubt("light of fire" if burns else "likely wrong light", {"error": error})
-
-
-def _strengthened(
-    lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], tuple[Estimate[Any], ...]]:
-    """Given lights as strong as the clip needs.
-
-    Given lights are measured or tracked, and a picture hardly contradicts them: stronger light with thinner smoke fits
-    it as well or better, since thin smoke is the simpler one to fit. So lights are too weak only where even the
-    densities that fit best are too dark, and stronger light leaves less dark: more smoke would only hide what is behind
-    it. Then the weakest light that leaves nothing dark is taken; where none does it is not the light that is wrong.
-    Densities of thin smoke that are wrong otherwise stay as dark in any light.
-    """
-
-    def tried(factor: float) -> HeldOut:
-        stronger = tuple(light.scaled(factor) for light in lights)
-        return held_out([frame.lit_by(stronger) for frame in frames], "multiple", "multiple", settings)
-
-    factor, found = 1.0, tried(1.0)
-    as_given = found
-    while found.light > 1 + MAX_MISSING_LIGHT and factor * STEP <= MAX_STRENGTH:
-        stronger = tried(factor * STEP)
-        if stronger.error >= found.error or stronger.light >= found.light:
-            break
-        factor, found = factor * STEP, stronger
-    if factor == 1.0 or found.light > 1 + MAX_MISSING_LIGHT:
-        return lights, ()
-    figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
-    strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MAX_MISSING_LIGHT)
-    return tuple(light.scaled(factor) for light in lights), (strength,)
-
-
-def _tries_multiple(richest: Scattering, frames: Sequence[CoarseFrame]) -> bool:
-    """Whether multiple scattering is tried as well: beside single scattering, by smoke that is isotropic."""
-    return richest == "single" and frames[0].scene.medium.anisotropy == 0.0
 
 
 def _cheapest(
@@ -254,13 +193,14 @@ def _cheapest(
     which what no model fits counts for both.
     """
     fit, tolerance = settings.density, settings.selection.scattering_error
-    rivals: tuple[Scattering, ...] = ("single", "multiple") if _tries_multiple(richest, frames) else (richest,)
+    isotropic = frames[0].scene.medium.anisotropy == 0.0
+    rivals: tuple[Scattering, ...] = ("single", "multiple") if richest == "single" and isotropic else (richest,)
     errors = {each: held_out(frames, each, each, fit).error for each in rivals}
     if len(rivals) > 1:
         alike = errors["multiple"] >= MAX_ERROR_RATIO * errors["single"]
         # the errors may be those of the coarse grid: either model seems to fit the smoke, or neither does
         if alike and (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
-            frames = [larger.lit_by(frames[0].scene.lights)]
+            frames = [larger]
             fit = replace(fit, descent_iterations=max(MAX_DESCENT_STEPS, fit.descent_iterations))
             errors = {each: held_out(frames, each, each, fit).error for each in rivals}
         if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:

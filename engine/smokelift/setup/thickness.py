@@ -74,7 +74,7 @@ def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate
     seen = np.array([frame for frame in frames if frame[1] > 0]).reshape(-1, 8)
     hidden, smoke, unsure, clear, missing, *added = (float(total) for total in seen.sum(0))
     if len(seen) < FRAMES or not (hidden > 0 and clear > 0):
-        return None, undetermined("smoke thickness without texture", "smoke thickness", tolerance=ERROR)
+        return None, undetermined("uncertain smoke thickness", "smoke thickness", spread=1.0, tolerance=ERROR)
     rest = seen.sum(0) - seen
     others = rest[:, 5:].sum(1) / np.maximum(rest[:, 0], 1e-12)
     spread = np.sqrt((len(seen) - 1) * np.var(others)) / max(sum(added) / hidden, 1e-12)

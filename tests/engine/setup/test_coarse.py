@@ -3,17 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.noise import EIGHT_BIT_NOISE
-from smokelift.footage.plate import Plate
+from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.working_picture import working_picture
 from smokelift.output.images import write_image
 from smokelift.scene import Domain, completed
-from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
+from smokelift.setup.coarse import COARSE_SIDE, CoarseFrame, coarse_domain, coarse_frame, held_out
 from smokelift.setup.shot import ShotView
 
 
@@ -55,3 +56,36 @@ def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
     np.testing.assert_allclose(dimmed.held_out, 0.25, atol=1e-5)
     away = scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
     assert coarse_frame([view, replace(view, camera=away)], 0, scene) is None
+
+
+# the judge
+
+
+@pytest.fixture
+def blob(plume) -> CoarseFrame:
+    """A coarse frame of the blob in its own light."""
+    scene, clip = completed(plume.scene), Clip.open(plume.scene.clip)
+    behind = np.zeros((*clip.size[::-1], 3), np.float32)
+    view = ShotView(clip, scene.camera, known_plate(behind, clip), working_picture(scene.camera, scene.domain))
+    found = coarse_frame([view], 2, scene)
+    assert found is not None
+    return found
+
+
+def test_the_right_light_and_model_leave_the_least(blob, draft) -> None:
+    right = held_out([blob], "single", "single", draft.density)
+    wrong = held_out([blob], "unshadowed", "single", draft.density)
+    assert right.error < 0.05 < wrong.error
+    np.testing.assert_allclose(right.colours, 1, atol=0.05)
+
+
+def test_a_light_of_another_colour_is_asked_to_change(blob, draft) -> None:
+    (sun,) = blob.scene.lights
+    red, green, blue = sun.irradiance
+    tinted = blob.lit_by((replace(sun, irradiance=(red, green, 2 * blue)),))
+    (colour,) = held_out([tinted], "single", "single", draft.density).colours
+    assert colour[2] / colour[0] == pytest.approx(0.5, rel=0.05)
+
+
+def test_absorption_asks_for_no_light(blob, draft) -> None:
+    assert (held_out([blob], "absorption", "absorption", draft.density).colours == 1).all()

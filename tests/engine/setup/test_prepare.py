@@ -75,7 +75,7 @@ def test_a_complete_scene_stays_as_it_is(plume, draft) -> None:
 
 def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
     assert [remark.kind for remark in estimated.remarks] == [
-        "black background", "assumed camera", "box around the smoke", "assumed medium", "light as the thickest smoke",
+        "black background", "assumed camera", "box around the smoke", "assumed medium", "assumed light",
     ]  # fmt: skip
 
 

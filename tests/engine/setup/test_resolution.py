@@ -15,7 +15,7 @@ from smokelift.output.images import write_image
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.resolution import DetailSpectrum, smoke_detail
+from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
 
@@ -149,4 +149,4 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     assert detail.lost(192) == detail.lost(192 // 4, 192 // 4) == 0
     assert detail.lost(100, 192) < 0.01
     assert detail.lost(192 // 4, 192) == detail.lost(192 // 4)
-    assert DetailSpectrum(np.zeros(96), 64).lost(32) == 0
+    assert DetailSpectrum(np.zeros(RINGS), 64).lost(32) == 0

@@ -1,6 +1,7 @@
 """The commands of the command line, a module each.
 
-A module's `add_parser` adds the command with its options to the parser; the option ``run`` is what runs it.
+A module has the command's help, ``add_options`` for its parser, and ``run``, which is given the options and says what
+happens.
 """
 
 from smokelift.app.commands import (
@@ -19,20 +20,19 @@ from smokelift.app.commands import (
     retime,
 )
 
-MODULES = (
-    reconstruct,
-    batch,
-    inspect,
-    render,
-    preview,
-    evaluate,
-    check,
-    continue_,
-    retime,
-    loop,
-    export,
-    proxy,
-    doctor,
-)
-
-COMMANDS = tuple(module.add_parser for module in MODULES)
+COMMANDS = {
+    "reconstruct": reconstruct,
+    "batch": batch,
+    "inspect": inspect,
+    "render": render,
+    "preview": preview,
+    "evaluate": evaluate,
+    "check": check,
+    "continue": continue_,
+    "retime": retime,
+    "loop": loop,
+    "export": export,
+    "proxy": proxy,
+    "doctor": doctor,
+}
+"""The modules by the names of their commands."""

@@ -37,12 +37,11 @@ from smokelift.report.cost import memory_free
 MEMORY_SHARE = 0.9
 """Part of the free memory that the shots may take together; what is foretold is right to a tenth or two."""
 
+HELP = "reconstruct a list of shots, as many at a time as memory allows"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "batch", parents=[common], help="reconstruct a list of shots, as many at a time as memory allows"
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     parser.add_argument("list", type=named_path, help="list of shots, such as shots.toml")
     parser.add_argument("--plan", action="store_true", help="say only what is left and how long it will take")
     parser.add_argument(
@@ -51,7 +50,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, as tcp://host:8786 (needs the extra [cluster])"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
@@ -221,10 +219,9 @@ class _RaisingParser(argparse.ArgumentParser):
 def _check_arguments(arguments: Sequence[str]) -> None:
     """Raise ValueError if ``smokelift reconstruct`` does not take the arguments."""
     parser = _RaisingParser()
-    common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("--device", choices=("auto", "cpu", "gpu"))
-    reconstruct.add_parser(parser.add_subparsers(), common)
-    parser.parse_args(["reconstruct", *arguments])
+    parser.add_argument("--device", choices=("auto", "cpu", "gpu"))
+    reconstruct.add_options(parser)
+    parser.parse_args(arguments)
 
 
 def _count(text: str) -> int:

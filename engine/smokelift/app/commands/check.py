@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
@@ -11,12 +10,12 @@ from smokelift.checks import counted
 from smokelift.output.sequence import Sequence
 from smokelift.report.shortcomings import count_empty, shortcomings
 
+HELP = "check that a sequence is complete and undamaged"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser("check", parents=[common], help="check that a sequence is complete and undamaged")
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from smokelift.app.options import add_directed_options, finite_number, named_path, require_new
-from smokelift.app.progress import Reporter, say_frames
-from smokelift.checks import Doubt, Figures, Remark
+from smokelift.app.progress import Reporter, say_sequence
+from smokelift.checks import Doubt
 from smokelift.direct import (
     DISSOLVED,
     ROOM,
@@ -36,12 +34,11 @@ from smokelift.scene import SIDES
 NOTICED = 1e-3
 """Share of the smoke that has to dissolve in a frame before its box's end to be worth a sentence."""
 
+HELP = "make what the smoke does after its clip, or in wind and around obstacles"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "continue", parents=[common], help="make what the smoke does after its clip, or in wind and around obstacles"
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     add_directed_options(parser)
     parser.add_argument("--frames", type=int, required=True, metavar="N", help="number of frames to add")
     parser.add_argument(
@@ -98,7 +95,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="TIMES",
         help="let the box grow with the smoke to at most so many times the clip's size; 1 keeps it",
     )
-    parser.set_defaults(run=run)
 
 
 def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[str, ...], what: str) -> None:
@@ -116,7 +112,6 @@ def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Continue the sequence, and say every frame."""
-    began = time.monotonic()
     continuation = _continuation(options)
     sequence = open_source(options.directory)
     require_new(options)
@@ -125,10 +120,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     written = continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
     written = _with_note(written, continuation.room, say)
     total = start - sequence.frames[0] + 1 + continuation.frames
-    say_frames(say, written, sequence.frames[0], total)
-    seconds = time.monotonic() - began
-    result: Figures = {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)}
-    say.finish(Remark("continued", {**result, "simulated": continuation.frames}), result)
+    first, simulated = sequence.frames[0], continuation.frames
+    say_sequence(say, written, kind="continued", directory=options.out, start=first, total=total, simulated=simulated)
 
 
 def _room(options: argparse.Namespace, sequence: Sequence, say: Reporter) -> float:

@@ -6,7 +6,6 @@ import argparse
 import os
 import platform
 from importlib import metadata
-from typing import Any
 
 import psutil
 
@@ -18,11 +17,11 @@ from smokelift.render import device
 
 LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 
+HELP = "list versions, devices and what is missing"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser("doctor", parents=[common], help="list versions, devices and what is missing")
-    parser.set_defaults(run=run)
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
 
 from smokelift.app.options import named_path, require_folder
 from smokelift.app.progress import Reporter
@@ -13,14 +12,11 @@ from smokelift.output.atomic import atomic_path
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 
+HELP = "compare the smoke from all around with its front or with known volumes, and with other cameras"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "evaluate",
-        parents=[common],
-        help="compare the smoke from all around with its front or with known volumes, and with other cameras",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
     parser.add_argument(
@@ -41,7 +37,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="FILE.png",
         help="draw the smoke from all around; with --truth, below the truth",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

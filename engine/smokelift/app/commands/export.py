@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from typing import Any, get_args
+from typing import get_args
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
@@ -20,10 +20,11 @@ from smokelift.output.export import (
 from smokelift.output.host import HostName
 from smokelift.output.sequence import Sequence
 
+HELP = "write small OpenVDB files, a proxy and a USD file"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser("export", parents=[common], help="write small OpenVDB files, a proxy and a USD file")
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--out", type=named_path, required=True, help="folder for the export")
     parser.add_argument(
@@ -48,7 +49,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         "vel; unreal, with densities from 0 to 1 and the box's corners in every frame",
     )
     parser.add_argument("--size", action="store_true", help="say the size, and write nothing")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

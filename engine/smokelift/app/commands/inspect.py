@@ -25,14 +25,11 @@ from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
 
+HELP = "say what a run would assume and choose, and what it would cost, without running it"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "inspect",
-        parents=[common],
-        help="say what a run would assume and choose, and what it would cost, without running it",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     add_run_options(parser)
     parser.add_argument(
         "--page",
@@ -48,7 +45,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="scene.toml",
         help="write every estimate into a scene file that you can edit",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from typing import Any
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
@@ -15,15 +14,13 @@ from smokelift.output.preview import write_contact_sheet, write_orbit, write_pre
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 
+HELP = "make three pictures and a video that show the smoke from all sides"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "preview", parents=[common], help="make three pictures and a video that show the smoke from all sides"
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--out", type=named_path, help="directory for these files (default: the sequence's own)")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

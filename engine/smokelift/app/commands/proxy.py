@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from typing import Any
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
@@ -12,18 +11,13 @@ from smokelift.checks import Remark
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS, TIMES, write_proxies
 from smokelift.output.sequence import Sequence
 
+HELP = f"write coarse copies of a sequence's frames for viewports, with voxels {TIMES} times as large, beside its files"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    text = f"coarse copies of a sequence's frames for viewports, with voxels {TIMES} times as large, beside its files"
-    parser = commands.add_parser(
-        "proxy",
-        parents=[common],
-        help=f"write {text}",
-        description=f"Write {text}. A run writes them itself from {MIN_PROXY_VOXELS:,} voxels on.",
-    )
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.description = f"{HELP.capitalize()}. A run writes them itself from {MIN_PROXY_VOXELS:,} voxels on."
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

@@ -6,7 +6,6 @@ import argparse
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -29,10 +28,11 @@ from smokelift.scene import Domain
 from smokelift.setup.backdrop_remarks import what_helps
 from smokelift.setup.shot import Shot
 
+HELP = "turn a clip or scene file into a VDB sequence"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser("reconstruct", parents=[common], help="turn a clip or scene file into a VDB sequence")
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     add_run_options(parser)
     parser.add_argument("--out", type=named_path, required=True, help="directory for the sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
@@ -43,7 +43,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         help="keep a picture of the newest frame beside the clip in this file",
     )
     parser.add_argument("--resume", action="store_true", help="go on after the frames that are finished")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import Any
 
 from smokelift.app.options import named_path, require_folder
 from smokelift.app.progress import Reporter
@@ -18,10 +17,11 @@ from smokelift.scene import Camera, CompleteScene, Scene, orbit
 SIDE_YAW = 90.0
 """Degrees about the vertical from the scene's camera to the view from the side."""
 
+HELP = "make an image or video of a sequence"
 
-def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser("render", parents=[common], help="make an image or video of a sequence")
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument(
         "--frame",
@@ -37,7 +37,6 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=named_path, required=True, help="file to write: image.exr, image.png or video.mp4"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
