@@ -43,6 +43,10 @@ BOX_DEVIATION = 0.165
 """Standard deviation, in reaches, of the smoke's depth about the middle of its box
 (docs/experiments/axis-uncertainty.md)."""
 
+MAX_KNOWN_DEVIATION = 0.95
+"""Largest standard deviation of a depth that counts as determined by a floor contact, over that of the depth by the box
+alone: a contact that leaves about as much spread as the box shows nothing."""
+
 CONTACT_DEVIATION = 0.08
 """Standard deviation, in reaches, of the depth that a floor contact shows."""
 
@@ -134,7 +138,15 @@ def estimate_axis(
     depths = np.linspace(-reach, reach, CANDIDATES)
     if base is not None:
         lowest, widths = int(np.argmax(smoky)), np.zeros_like(middle)
-        columns = [_Column(_at(depths, base), mean.heights[lowest], middle, widths, middle - middle[lowest])]
+        columns = [
+            _Column(
+                _normal(depths - base, depths[1] - depths[0]),
+                mean.heights[lowest],
+                middle,
+                widths,
+                middle - middle[lowest],
+            )
+        ]
     elif inlets:
         cue, columns = "inlets", _inlet_columns(inlets, mean, middle, depths, camera, domain)
     else:
@@ -147,7 +159,7 @@ def estimate_axis(
     error = np.sqrt(np.average(np.mean([variance for _, variance in known], 0), weights=total))
     axis = _axis(columns, [depth for depth, _ in known], mean)
     depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
-    if cue == "box" and error < deviation:
+    if cue == "box" and error < MAX_KNOWN_DEVIATION * deviation:
         cue = "floor contact"
     return AxisEstimate(axis, cue, depth, float(error))
 
@@ -200,11 +212,6 @@ def _posterior(column: _Column, depths: Doubles, total: Doubles, box: float, lea
 def _normal(value: Doubles | float, deviation: Doubles | float) -> Doubles:
     """Logarithm of a normal density about zero, but for a constant."""
     return np.asarray(-np.square(value / deviation) / 2 - np.log(deviation))
-
-
-def _at(depths: Doubles, known: Doubles | float) -> Doubles:
-    """Log-likelihood of the candidates (k,) where a depth is known, to within one of them."""
-    return np.asarray(-(((depths - known) / (depths[1] - depths[0])) ** 2) / 2)
 
 
 def _floor_column(
@@ -287,7 +294,7 @@ def _inlet_columns(
             now[begun] = (INERTIA * now[begun] + part @ mean.laterals) / (INERTIA + part.sum(1))
         middles[:, row] = now
     drifts = middles - (places @ lateral)[:, None]
-    bases = _at(depths, (places @ along)[:, None])
+    bases = _normal(depths - (places @ along)[:, None], depths[1] - depths[0])
     return [_Column(*column) for column in zip(bases, begins, middles, widths, drifts, strict=True)]
 
 

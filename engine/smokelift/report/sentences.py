@@ -105,13 +105,9 @@ SENTENCES: Mapping[str, str] = {
     "no smoke in one frame": (
         "One frame alone does not show what is behind its smoke: give a clean plate or a color as background."
     ),
-    "no smoke before a changing background": (
-        "The background changes by {codes:.0f} of 255 from frame to frame, so fainter smoke is not seen. If the camera "
-        "moves, track it in Blender, and give the camera and a clean plate. If it stands still, give a clean plate or "
-        "a color as background."
-    ),
     "no smoke before an estimated background": (
-        "Smoke that never moves counts as background: give a clean plate or a color as background."
+        "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is not "
+        "seen: give a clean plate or a color as background."
     ),
     "smoke of several colours": (
         "The smoke has more than one color, but one is assumed for all of it: on average its light is {degrees:.0f} "
@@ -204,10 +200,6 @@ SENTENCES: Mapping[str, str] = {
     "compared scattering": (
         "Scattering: {value}; pixels that the fit leaves out differ by {error:.1%} of the smoke's contrast, with "
         "{other} by {other_error:.1%}."
-    ),
-    "scattering in light from everywhere": (
-        "Scattering: {value}, in light from everywhere, because no light is given; pixels that the fit leaves out "
-        "differ by {error:.1%} of the smoke's contrast, with {other} by {other_error:.1%}."
     ),
     "gain of a view": (
         "It shows the smoke {value} times (red, green, blue) as bright as the input. This is evened out: the pictures "

@@ -7,7 +7,6 @@ import numpy as np
 from smokelift.checks import Doubt, Remark
 from smokelift.footage.backdrop import Backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plates
 from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, unknown_part
 
 BLACK = 0.001
@@ -30,9 +29,6 @@ COARSE_QUANTISER = 42.0
 """Quantiser from which on faint smoke is taken for background, in front of one of more than one colour. Before a brick
 wall crf 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50
 (docs/experiments/disturbed-clips.md)."""
-
-LARGE_NOISE = 6 / 255
-"""Noise in sRGB values from which on the background may be what moves (docs/experiments/background.md)."""
 
 
 def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
@@ -86,7 +82,7 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
         (before, after), last = found.cut, clip.first + len(clip) - 1
         said.append(Doubt("cut", {"before": before, "after": after, "first": clip.first, "last": last}))
     elif not samples.smoky:
-        said.append(what_helps(clip, found.plates, given))
+        said.append(what_helps(clip, given))
     if found.source == "colour around one frame":
         said.append(Doubt("background of one frame"))
     if found.source == "black for want of a picture":
@@ -103,15 +99,12 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
     return tuple(said)
 
 
-def what_helps(clip: Clip, plates: Plates, given: bool) -> Doubt:
+def what_helps(clip: Clip, given: bool) -> Doubt:
     """Return what may show the smoke of a clip in which none is found, see `doubts`."""
     if given:
         return Doubt("no smoke before the given background")
     if len(clip) == 1 and clip.backdrop is None:
         return Doubt("no smoke in one frame")
-    change = float(plates.noise.total.max())
-    if change > LARGE_NOISE:
-        return Doubt("no smoke before a changing background", {"codes": 255 * change})
     return Doubt("no smoke before an estimated background")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from smokelift.checks import Figures, Remark
+from smokelift.checks import Remark
 
 UNDETERMINED = "undetermined"
 """Value of an estimate that nothing in the clip or the scene decides."""
@@ -15,7 +15,7 @@ Value = TypeVar("Value", str, int, tuple[int, int, int], covariant=True)
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate(Remark, Generic[Value]):
-    """One decision; its kind says what decided it, its figures are what was measured for it. See the functions below.
+    """One decision; its kind says what decided it, its figures are what was measured for it.
 
     Attributes
     ----------
@@ -38,38 +38,6 @@ class Estimate(Remark, Generic[Value]):
     source: Literal["given", "measured", "assumed"]
     spread: float | None = None
     tolerance: float | None = None
-
-
-def given(what: str, value: Value) -> Estimate[Value]:
-    """Return what the user decides."""
-    return Estimate("given", what=what, value=value, source="given")
-
-
-def measured(
-    kind: str,
-    value: Value,
-    figures: Figures,
-    *,
-    what: str = "",
-    spread: float | None = None,
-    tolerance: float | None = None,
-) -> Estimate[Value]:
-    """Return what the clip shows; without more ado its kind is what it is about."""
-    about = what or kind
-    return Estimate(kind, figures, what=about, value=value, source="measured", spread=spread, tolerance=tolerance)
-
-
-def undetermined(
-    kind: str,
-    what: str,
-    figures: Figures | None = None,
-    *,
-    spread: float | None = None,
-    tolerance: float | None = None,
-) -> Estimate[str]:
-    """Return what neither the user decides nor the clip shows well enough."""
-    unknown, known = UNDETERMINED, figures or {}
-    return Estimate(kind, known, what=what, value=unknown, source="assumed", spread=spread, tolerance=tolerance)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_remarks import backdrop_remarks
 from smokelift.setup.coarse import HeldOut, coarse_frames, held_out
-from smokelift.setup.estimate import Estimate, measured
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -42,9 +42,6 @@ SAME_RATE = 0.01
 ROUNDS = 3
 """Fits from which a gain is found, each with the one before evened out: a fourth changes it by .3 % at most
 (docs/experiments/view-gain.md)."""
-
-MAX_GAIN = 8.0
-"""Largest gain, and the inverse of the smallest: three stops."""
 
 RATIO, RATIO_UNLIT = 1.2, 1.35
 """Ratio of brightness from which on it is the cameras', where light is known and where it is taken to come from
@@ -158,7 +155,7 @@ def _evened(
     for _ in range(ROUNDS):
         found = tried(ratio.astype(np.float32))
         own, other = np.maximum(found.colours, 1e-6)
-        errors, ratio = [*errors, found.error], np.clip(ratio * other / own, 1 / MAX_GAIN, MAX_GAIN)
+        errors, ratio = [*errors, found.error], ratio * other / own
     as_it_is, tolerance = errors[0], settings.selection.scattering_error
     scalar = float(np.exp(np.mean(np.log(ratio))))
     colour = ratio / scalar
@@ -171,7 +168,8 @@ def _evened(
     if error >= as_it_is - tolerance:
         return view, ()
     named = ", ".join(f"{value:.2f}" for value in gain)
-    figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
+    figures: Figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
     clip = view.clip.changed(lambda _, picture: picture / gain)
     view = replace(view, clip=clip, plates=view.plates.through(lambda part: part / gain if part.ndim == 3 else part))
-    return view, (measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance),)
+    what = f"gain of view {number}"
+    return view, (Estimate("gain of a view", figures, what=what, value=named, source="measured", tolerance=tolerance),)

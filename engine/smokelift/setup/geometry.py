@@ -16,7 +16,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.estimate import Estimate, Grid, given
+from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.resolution import DetailSpectrum, Shape, choose_grid, smoke_detail
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
@@ -25,13 +25,11 @@ PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
 a person."""
 
-FILM_WIDTH = 36.0
-FILM_DIAGONAL = math.hypot(FILM_WIDTH, 24)
-"""Millimetres of 35 mm film."""
+FILM = 36.0, 24.0
+"""Width and height (mm) of 35 mm film."""
 
-LENS = 50 / FILM_WIDTH
-"""Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
-lens."""
+LENS = 50.0
+"""Focal length (mm) of an uncalibrated camera whose file says none: Blender's default lens."""
 
 BOX_MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side."""
@@ -104,13 +102,14 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     if isinstance(asked, tuple):
         voxel = float((size / asked).max())
         domain = replace(box, resolution=asked) if isinstance(box, Domain) else _standing_on(floor, voxel, asked)
-        resolution, qualities = given("resolution", asked), dict.fromkeys(QUALITIES, Grid(asked, None))
+        resolution = Estimate("given", what="resolution", value=asked, source="given")
+        qualities = dict.fromkeys(QUALITIES, Grid(asked, None))
     else:
         domain, resolution, qualities = choose_grid(grids, lambda whole: _detail(estimate, camera, whole), settings)
     if box is None:
         around = "box around the smoke" if samples.smoky else "box over the picture"
         remarks = (
-            _assumed(known, clip.lens, focal / max(clip.size), metres * camera.size[1]),
+            _assumed(known, clip.lens, metres * camera.size[1]),
             Remark(around, {"size": domain.size, "resolution": domain.resolution}),
         )
     else:
@@ -133,7 +132,7 @@ def _require_place(scene: Scene, known: Camera | None) -> None:
 
 def _focal(size: tuple[int, int], lens: float | None) -> float:
     """Focal length in pixels where no camera is given: that of the file's lens (mm), or of the usual one."""
-    return LENS * max(size) if lens is None else lens / FILM_DIAGONAL * math.hypot(*size)
+    return LENS / FILM[0] * max(size) if lens is None else lens / math.hypot(*FILM) * math.hypot(*size)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -152,17 +151,16 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _assumed(given: Camera | None, lens: float | None, focal: float, height: float) -> Remark:
+def _assumed(given: Camera | None, lens: float | None, height: float) -> Remark:
     """What is assumed of a camera, or of the scale where that alone is unknown.
 
-    The file says its lens (mm), or its focal length is so many times the longer side of the picture, which is so many
-    metres high where the smoke is.
+    The file may say its lens (mm); the picture is so many metres high where the smoke is.
     """
     if given is not None:
         return Remark("assumed scale", {"height": height})
     if lens is not None:
         return Remark("assumed camera with the file's lens", {"height": height, "lens": lens})
-    return Remark("assumed camera", {"height": height, "lens": FILM_WIDTH * focal, "film": FILM_WIDTH})
+    return Remark("assumed camera", {"height": height, "lens": LENS, "film": FILM[0]})
 
 
 def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:

@@ -21,7 +21,7 @@ from smokelift.footage.images import brightest_channel
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
 from smokelift.scene.checks import Vector
-from smokelift.setup.estimate import Estimate, measured, undetermined
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 
 OPTICAL_DEPTH_AT_ONE = 5.0
@@ -70,7 +70,7 @@ def find_medium(
     if fire is not None:
         red, green, blue = color = medium.flame_color or fire.color
         figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
-        estimates.append(measured("fire", f"{fire.share:.3f}", figures))
+        estimates.append(Estimate("fire", figures, what="fire", value=f"{fire.share:.3f}", source="measured"))
         medium = replace(medium, flame_color=color)
     return medium, tuple(estimates), tuple(remarks)
 
@@ -111,22 +111,29 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
 
     The largest of red, green and blue is 1; the colour is white where nothing says that the smoke is not grey.
     """
+    undetermined = Estimate(
+        "smoke colour near the light's",
+        what="smoke colour",
+        value=UNDETERMINED,
+        source="assumed",
+        tolerance=COLOURED,
+    )
     line = _thickest(samples)
     if line is None:
-        return WHITE, undetermined("smoke colour unseen", "smoke colour", tolerance=COLOURED)
+        return WHITE, replace(undetermined, kind="smoke colour unseen")
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
     least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_SOURCE_VALUE else white
     if least.min() < COLOURED:
-        figures = {"degrees": float(least.min())}
-        return WHITE, undetermined("smoke colour near the light's", "smoke colour", figures, tolerance=COLOURED)
+        return WHITE, replace(undetermined, figures={"degrees": float(least.min())})
     # the palest that explains the clip
     own = sources[white.argmin()] / np.maximum(light, 1e-6)
     red, green, blue = (float(round(v, 3)) for v in own / own.max())
     named = f"{red:.2f}, {green:.2f}, {blue:.2f}"
     figures = {"degrees": float(white.min())}
-    return (red, green, blue), measured("smoke colour", named, figures, tolerance=COLOURED)
+    found = replace(undetermined, kind="smoke colour", figures=figures, value=named, source="measured")
+    return (red, green, blue), found
 
 
 def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:

@@ -15,11 +15,11 @@ from smokelift.render import scene_optics
 from smokelift.scene import Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_remarks import first_remarks
 from smokelift.setup.coarse import coarse_frame, coarse_frames
-from smokelift.setup.estimate import Estimate, given, measured, undetermined
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
-from smokelift.setup.illumination import first_light, light_remarks, measured_light
+from smokelift.setup.illumination import find_scattering, first_light, light_doubts
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -53,14 +53,14 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium, medium_remarks = find_medium(scene, estimate, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    light = first_light(scene.lights, asked, geometry, medium, samples)
+    lights, richest, thickness, light_remarks = first_light(scene.lights, asked, geometry, medium, samples)
     complete = CompleteScene(
         camera=camera,
         domain=domain,
         medium=medium,
-        lights=light.lights,
+        lights=lights,
         background=estimate.found.background or Background(),
-        scattering=light.scattering,
+        scattering=richest,
         clip=None if scene.clip is None else replace(scene.clip, fps=clip.fps),
         views=scene.views,
         closed=scene.closed,
@@ -68,10 +68,17 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     )
     first = ShotView.before(domain, estimate.clip, camera, plates)
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
-    if coarse:
+    of_scattering: tuple[Estimate[str], ...] = ()
+    if coarse and asked is not None:
+        of_scattering = (Estimate("given", what="scattering", value=asked, source="given"),)
+    elif coarse:
         finer = partial(coarse_frame, (first,), coarse[0].number, complete, times=2)
-        light = measured_light(light, coarse, finer, settings)
-        complete = replace(complete, lights=light.lights, scattering=light.scattering)
+        scattering, chosen = find_scattering(coarse, finer, settings)
+        complete, of_scattering = replace(complete, scattering=scattering), (chosen,)
+        if thickness:
+            light_remarks += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
+    if complete.scattering == "absorption":
+        thickness = ()
     others, gains, view_remarks = open_views(first, complete, samples.typical, bool(scene.lights), settings)
     coarsening: tuple[Estimate[int], ...] = ()
     if settings.selection.measure:
@@ -87,10 +94,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
             *first_remarks(estimate, scene.background is not None),
             *geometry.remarks,
             *medium_remarks,
-            *light_remarks(light, samples, plates.noise, burns=estimate.fire is not None),
+            *light_remarks,
             *view_remarks,
         ),
-        estimates=(geometry.resolution, *of_medium, *light.estimates, *coarsening, *gains),
+        estimates=(geometry.resolution, *of_medium, *of_scattering, *thickness, *coarsening, *gains),
         qualities=geometry.qualities,
         smoky=samples.smoky,
         place=None,
@@ -107,22 +114,30 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
 
 def place_estimate(place: AxisEstimate) -> Estimate[str]:
     """Return where in depth the smoke stands as an estimate by one of the cues."""
-    kind, figures, spread = f"axis depth by {place.cue}", {"depth": place.depth}, place.deviation
+    undetermined = Estimate(
+        f"axis depth by {place.cue}",
+        {"depth": place.depth},
+        what="axis depth",
+        value=UNDETERMINED,
+        source="assumed",
+        spread=place.deviation,
+    )
     if place.cue == "box":
-        return undetermined(kind, "axis depth", figures, spread=spread)
-    found = measured(kind, place.cue, figures, what="axis depth", spread=spread)
-    return replace(found, source="given") if place.cue == "distance" else found
+        return undetermined
+    return replace(undetermined, value=place.cue, source="given" if place.cue == "distance" else "measured")
 
 
 def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
     """Return how much coarser than the densities the grid of the velocity is; a side keeps eight voxels at least."""
+    what = "velocity grid coarsening"
     if settings.velocity.coarsening is not None:
-        return given("velocity grid coarsening", settings.velocity.coarsening)
+        return Estimate("given", what=what, value=settings.velocity.coarsening, source="given")
     finest = settings.selection.velocity_side
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > finest and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    return measured("velocity grid coarsening", coarsening, {"voxels": float(longest)}, tolerance=finest)
+    figures = {"voxels": float(longest)}
+    return Estimate(what, figures, what=what, value=coarsening, source="measured", tolerance=finest)
 
 
 def _check(length: int, scene: Scene, settings: Settings) -> None:

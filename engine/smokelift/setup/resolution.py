@@ -15,11 +15,12 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from smokelift.checks import Figures
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 from smokelift.scene import Domain
-from smokelift.setup.estimate import Estimate, Grid, measured
+from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.settings import LOST_DETAIL, QUALITIES, Quality, Settings
 
 Shape = tuple[int, int, int]
@@ -92,7 +93,7 @@ def choose_grid(
     tolerance = settings.selection.lost_detail
     domain = coarsest(own, tolerance)
     longest = max(domain.resolution)
-    figures = {
+    figures: Figures = {
         "lost": spectrum.lost(longest),
         "lost_beside_finest": spectrum.lost(longest, max(own[-1].resolution)),
         "pixels": spectrum.pixels,
@@ -101,7 +102,10 @@ def choose_grid(
     taken = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
     taken[settings.quality] = domain
     qualities = {name: Grid(grid.resolution, spectrum.lost(max(grid.resolution))) for name, grid in taken.items()}
-    return domain, measured("resolution", domain.resolution, figures, tolerance=tolerance), qualities
+    why = Estimate(
+        "resolution", figures, what="resolution", value=domain.resolution, source="measured", tolerance=tolerance
+    )
+    return domain, why, qualities
 
 
 def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> DetailSpectrum:

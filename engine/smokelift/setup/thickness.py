@@ -13,13 +13,15 @@ background may be smoke, says how well that is known. Figures: docs/experiments/
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Figures
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.plate import Plate, noise_at
-from smokelift.setup.estimate import Estimate, measured, undetermined
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 
 BLOCK = 8
 """Pixels along a block, inside which smoke is taken to let the same share of all light through."""
@@ -71,10 +73,18 @@ def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate
 
     The deviation is estimated by leaving one frame out after the other (the jackknife).
     """
+    undetermined = Estimate(
+        "uncertain smoke thickness",
+        what="smoke thickness",
+        value=UNDETERMINED,
+        source="assumed",
+        spread=1.0,
+        tolerance=ERROR,
+    )
     seen = np.array([frame for frame in frames if frame[1] > 0]).reshape(-1, 8)
     hidden, smoke, unsure, clear, missing, *added = (float(total) for total in seen.sum(0))
     if len(seen) < FRAMES or not (hidden > 0 and clear > 0):
-        return None, undetermined("uncertain smoke thickness", "smoke thickness", spread=1.0, tolerance=ERROR)
+        return None, undetermined
     rest = seen.sum(0) - seen
     others = rest[:, 5:].sum(1) / np.maximum(rest[:, 0], 1e-12)
     spread = np.sqrt((len(seen) - 1) * np.var(others)) / max(sum(added) / hidden, 1e-12)
@@ -82,11 +92,11 @@ def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate
     error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
         # more than all of it says nothing more
-        kind, spread = "uncertain smoke thickness", min(error, 1.0)
-        return None, undetermined(kind, "smoke thickness", spread=spread, tolerance=ERROR)
-    share = hidden / smoke
-    thickness = measured("smoke thickness", f"{share:.3f}", {"hidden": share}, spread=error, tolerance=ERROR)
-    return np.maximum(np.array(added) / hidden, 0), thickness
+        return None, replace(undetermined, spread=min(error, 1.0))
+    known: Figures = {"hidden": hidden / smoke}
+    named = f"{hidden / smoke:.3f}"
+    found = replace(undetermined, kind="smoke thickness", figures=known, value=named, source="measured", spread=error)
+    return np.maximum(np.array(added) / hidden, 0), found
 
 
 def _texture(one: Doubles, other: Doubles) -> Doubles:

@@ -11,7 +11,7 @@ import smokelift
 from smokelift.checks import Doubt, Remark
 from smokelift.report import sentences
 from smokelift.report.sentences import SENTENCES, sentence
-from smokelift.setup.estimate import Estimate, given
+from smokelift.setup.estimate import Estimate
 
 ENGINE = Path(smokelift.__file__).parent
 SOURCES = [path for path in ENGINE.rglob("*.py") if path != Path(sentences.__file__)]
@@ -64,7 +64,7 @@ def estimate(kind: str, value: str | int | tuple[int, int, int], **figures: floa
         (Doubt("no smoke examined", {"frames": 1}), "No smoke found in 1 examined frame, so nothing"),
         (Doubt("no smoke examined", {"frames": 4}), "No smoke found in 4 examined frames, so nothing"),
         (Remark("background of one colour", {"color": (0.1, 0.25, 1.0)}), "it is of one color, 0.1, 0.25, 1 (linear)."),
-        (given("resolution", (60, 60, 90)), "Resolution by hand: 60 x 60 x 90."),
+        (Estimate("given", what="resolution", value=(60, 60, 90), source="given"), "Resolution by hand: 60 x 60 x 90."),
         (
             estimate("compared scattering", "absorption", error=0.02, other="single", other_error=0.0149),
             "Scattering: absorption only; pixels that the fit leaves out differ by 2.0% of the smoke's contrast, with "

@@ -14,7 +14,7 @@ from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
-from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, what_helps
+from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts
 from smokelift.setup.first_estimate import SmokeSamples, sample_smoke
 from tests.engine.footage.films import coded, puff, wall
 
@@ -168,10 +168,3 @@ def test_how_many_frames_were_examined_is_said(grey) -> None:
         Doubt("no smoke examined", {"frames": 4}),
         Doubt("no smoke before an estimated background"),
     )
-
-
-@pytest.mark.parametrize(("codes", "moves"), [(5, False), (20, True)])
-def test_a_background_that_changes_may_be_that_of_a_camera_that_moves(grey, codes, moves) -> None:
-    doubt = what_helps(grey.clip, replace(grey.plates, noise=lasting_noise(codes / 255)), given=False)
-    assert (doubt.kind == "no smoke before a changing background") is moves
-    assert not moves or doubt.figures["codes"] == pytest.approx(codes, rel=1e-3)

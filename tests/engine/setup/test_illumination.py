@@ -15,7 +15,7 @@ from smokelift.scene import Background, DirectionalLight, EnvironmentLight, Medi
 from smokelift.setup import illumination
 from smokelift.setup.coarse import HeldOut
 from smokelift.setup.estimate import Estimate
-from smokelift.setup.illumination import Illumination, light_around, light_remarks
+from smokelift.setup.illumination import light_doubts
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
@@ -48,87 +48,7 @@ def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
     assert source.max() < 0.4
 
 
-# light from everywhere with shadows
-
-BEHIND = 0.4
-
-
-@pytest.fixture(scope="module")
-def lit(plume, tmp_path_factory) -> Scene:
-    """The blob, thick, in a sun from the side, before something that is brighter than most of it."""
-    sun = DirectionalLight((-0.7, 0.6, -0.5), (6.0, 5.5, 5.0))
-    scene = replace(plume.scene, medium=Medium(20.0, 0.9), lights=(sun,), background=Background(color=(BEHIND,) * 3))
-    return plume.write(tmp_path_factory.mktemp("lit"), plume.densities, scene)
-
-
-def unlit(scene: Scene) -> Scene:
-    """The same clip, of which neither light nor medium is known."""
-    return replace(scene, lights=(), medium=None)
-
-
-def scattering_of(shot: Shot) -> Estimate[str]:
-    (choice,) = (choice for choice in shot.estimates if choice.what == "scattering")
-    return choice
-
-
-@pytest.fixture
-def leaves(monkeypatch):
-    """Makes light from everywhere leave a given error; returns its strengths over that of what is behind the smoke."""
-
-    held_out = illumination.held_out
-
-    def of(error: float) -> list[float]:
-        tried = []
-
-        def known(frames, model, judge, settings) -> HeldOut:
-            if judge == "unshadowed":  # of the light that is assumed
-                return held_out(frames, model, judge, settings)
-            lights = frames[0].scene.lights
-            radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
-            tried.append(round(float(radiance.mean()) / BEHIND, 2))
-            coloured = radiance[0] > 1.1 * radiance[2]
-            return HeldOut(error if coloured else 1.0, np.array([[1.2, 1.0, 0.8]]))
-
-        monkeypatch.setattr(illumination, "held_out", known)
-        return tried
-
-    return of
-
-
-def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(lit, draft, leaves) -> None:
-    tried = leaves(0.02)
-    shot = shot_of(unlit(lit), draft)
-    choice, lights = scattering_of(shot), shot.scene.lights
-    assert tried == [1.0, 1.0]
-    assert shot.scene.scattering == choice.value == "single"
-    assert choice.figures["error_single"] == 0.02
-    assert choice.kind == "scattering in light from everywhere"
-    radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
-    assert radiance == pytest.approx(BEHIND * np.array([1.2, 1.0, 0.8]), rel=0.01)
-    assert "assumed light" in [remark.kind for remark in shot.remarks]
-
-
-def test_light_around_has_its_radiance_and_no_direction() -> None:
-    lights = light_around(np.array([0.2, 0.3, 0.4]))
-    assert np.allclose(np.sum([light.irradiance for light in lights], 0) / (4 * np.pi), (0.2, 0.3, 0.4))
-    assert np.allclose(np.sum([light.direction for light in lights], 0), 0)
-
-
-def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
-    """It is no special case of smoke without shadows: it has to be nearer by a quarter, and by the tolerance."""
-    leaves(1.0)
-    choice = scattering_of(shot_of(unlit(lit), draft))
-    error = choice.figures[f"error_{choice.value}"]
-    limit = min(0.75 * error, error - draft.selection.scattering_error)
-    leaves(limit + 0.001)
-    assert scattering_of(shot_of(unlit(lit), draft)) == choice
-    leaves(limit - 0.001)
-    assert scattering_of(shot_of(unlit(lit), draft)).value == "single"
-
-
-def test_a_light_that_is_given_stays(lit, draft, leaves) -> None:
-    leaves(1.0)
-    assert shot_of(lit, draft).scene.lights == lit.lights
+# what light is doubted
 
 
 @pytest.mark.parametrize(
@@ -148,11 +68,9 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
     choice = Estimate(
         "scattering", {"error_absorption": error}, what="scattering", value="absorption", source="measured"
     )
-    unknown = Estimate("unknown", what="smoke thickness", value="undetermined", source="assumed")
-    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, unknown, choice)
     for burns, kind in ((False, "likely wrong light"), (True, "light of fire")):
-        _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255), burns=burns)
-        assert doubts == [Doubt(kind, {"error": error})] * said
+        doubts = light_doubts(choice, samples, lasting_noise(noise / 255), burns=burns)
+        assert doubts == (Doubt(kind, {"error": error}),) * said
 
 
 def chosen(shot: Shot, what: str) -> Estimate:

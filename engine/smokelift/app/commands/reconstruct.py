@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         raise ValueError(
             f"No smoke found: nothing differs from the background by more than the clip's noise does, so all frames "
             f"in {options.out} are empty. "
-            f"{sentence(what_helps(shot.clip, shot.views[0].plates, scene.background is not None))}"
+            f"{sentence(what_helps(shot.clip, scene.background is not None))}"
         )
     for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)
