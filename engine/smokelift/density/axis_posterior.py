@@ -43,12 +43,22 @@ BOX_DEVIATION = 0.165
 """Standard deviation, in reaches, of the smoke's depth about the middle of its box
 (docs/experiments/axis-uncertainty.md)."""
 
+BOX_COUNT = 2.0
+"""Number of boxes that `BOX_DEVIATION` counts as, beside the one at hand, which shows how far off its middle the smoke
+is across the picture (docs/experiments/axis-uncertainty.md)."""
+
 MAX_KNOWN_DEVIATION = 0.95
 """Largest standard deviation of a depth that counts as determined by a floor contact, over that of the depth by the box
 alone: a contact that leaves about as much spread as the box shows nothing."""
 
+FLOOR_PROBABILITY = 0.6
+"""Probability that smoke which seems to touch the floor does."""
+
 CONTACT_DEVIATION = 0.08
 """Standard deviation, in reaches, of the depth that a floor contact shows."""
+
+BASE_HEIGHT = 0.3
+"""Mean height above the floor, in reaches, of smoke that only seems to touch it (exponential)."""
 
 LEANING_PROBABILITY = 0.2
 """Probability that a column leans, before anything is seen of it."""
@@ -101,7 +111,7 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
         amounts = [
             seen_at(points, amount, each.camera).astype(np.float32) for amount, each in zip(amounts, seen, strict=True)
         ]
-    base = None if distance is None else depth_at(distance, camera, domain)
+    base = None if distance is None else depth_at(distance, camera, clip.optics.domain)
     return estimate_axis(amounts, camera, domain, clip.inlets, base)
 
 
@@ -128,13 +138,14 @@ def estimate_axis(
     screens = [screen for amount in amounts if (screen := upright_screen(amount, camera, domain)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
     cue: Cue = "box" if base is None else "distance"
-    deviation = BOX_DEVIATION * reach
     if not screens:
-        return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, deviation)
+        return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, BOX_DEVIATION * reach)
     mean = replace(screens[0], values=np.mean([screen.values for screen in screens], 0))
     total = mean.values.sum(1)
     smoky = total > 0.02 * total.max()
     middle = np.interp(mean.heights, mean.heights[smoky], mean.rows().mean[smoky])
+    aside = np.average(middle**2, weights=total)
+    deviation = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + aside) / (BOX_COUNT + 1))
     depths = np.linspace(-reach, reach, CANDIDATES)
     if base is not None:
         lowest, widths = int(np.argmax(smoky)), np.zeros_like(middle)
@@ -152,7 +163,7 @@ def estimate_axis(
     else:
         columns = _floor_column(screens, len(amounts), middle, depths, camera, domain)
     if not columns:
-        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, deviation)
+        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(deviation))
     # several columns lean towards one another
     leans = LEANING_PROBABILITY if len(columns) == 1 else 0.0
     known = [_posterior(column, depths, total, deviation, leans) for column in columns]
@@ -220,8 +231,7 @@ def _floor_column(
     """The column that stands on the floor; none where less than half of the frames show a contact.
 
     A disc of smoke on the floor begins in the picture where the ray through the floor meets it, within a few rows. What
-    begins nearer and above the floor shows the same, and is as likely: its height is exponential, as far from the floor
-    on the mean as smoke is from the middle of its box.
+    begins nearer and above the floor shows the same.
     """
     eye, (_, along, height) = np.array(camera.matrix, np.float64)[:3, 3], view_frame(camera)
     distance = float((np.array(domain.centre) - eye) @ along)
@@ -234,11 +244,11 @@ def _floor_column(
     contact, width, begins = np.median(found, 0)
     reach, heights = depths[-1], screens[0].heights
     # the line of sight rises towards the camera
-    nearer, rate = contact - depths, above / (distance + contact) / (BOX_DEVIATION * reach)
+    nearer, rate = contact - depths, above / (distance + contact) / (BASE_HEIGHT * reach)
     deviation = CONTACT_DEVIATION * reach
     on_floor = np.exp(_normal(nearer, deviation)) / np.sqrt(2 * np.pi)
     above_floor = np.where(nearer > 0, rate * np.exp(-rate * np.abs(nearer)), 0)
-    base = np.log(on_floor + above_floor + 1e-300)
+    base = np.log(FLOOR_PROBABILITY * on_floor + (1 - FLOOR_PROBABILITY) * above_floor + 1e-300)
     drifts = middle - np.interp(begins + width / 4, heights, middle)
     return [_Column(base, begins, middle, np.zeros_like(middle), drifts)]
 

@@ -33,7 +33,7 @@ COARSE_SIDE = 32
 (docs/experiments/scattering-selection.md)."""
 
 SHORTEST = 4
-"""Voxels along the shortest side at least."""
+"""Voxels along the shortest side at least, two of which are not at its ends."""
 
 PIXELS = 2.0
 """Pixels of the clip along a voxel at least, so that each half of them shows every voxel."""

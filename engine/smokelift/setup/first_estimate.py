@@ -21,10 +21,11 @@ from smokelift.scene.checks import Vector
 from smokelift.setup.thickness import seen_texture
 
 SAMPLE_FRAMES, SAMPLE_SIDE = 16, 320
-"""Frames that are examined, and pixels along their longer side."""
+"""Frames that are examined, so that smoke of a sixteenth of the clip is seen, and pixels along their longer side: five
+to a voxel of a draft."""
 
 UNKNOWN = 0.5
-"""Confidence of a plate below which what is behind the smoke is unknown there."""
+"""Confidence of a plate below which what is behind the smoke is unknown there: it is as likely smoke as not."""
 
 
 @dataclass(frozen=True, eq=False)

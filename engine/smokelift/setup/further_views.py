@@ -30,7 +30,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 
 AGREEMENT_SAMPLES = 4
-"""Frames in which the views are compared."""
+"""Frames in which the views are compared: one that is wrong does not decide their median."""
 
 MIN_AGREED_SHARE = 0.9
 """Share of the smoke's pixels that the views agree on below which something is wrong. True views agree on all of it,
@@ -43,14 +43,13 @@ ROUNDS = 3
 """Fits from which a gain is found, each with the one before evened out: a fourth changes it by .3 % at most
 (docs/experiments/view-gain.md)."""
 
-RATIO, RATIO_UNLIT = 1.2, 1.35
-"""Ratio of brightness from which on it is the cameras', where light is known and where it is taken to come from
-everywhere. Cameras that are exposed alike are found to differ by up to 1.15 and 1.30 (docs/experiments/view-gain.md):
-coarse voxels cast other shadows, and light from one side is brighter there."""
-
-COLOUR_RATIO = 1.05
-"""Ratio of two colours from which on it is the cameras'; light and shadow do not change it
+RATIO = 1.35
+"""Ratio of brightness from which on it is the cameras' where light is taken to come from everywhere: light from one
+side is brighter there, and cameras that are exposed alike are found to differ by up to 1.30
 (docs/experiments/view-gain.md)."""
+
+MAX_GAIN = 8.0
+"""Largest gain, and the inverse of the smallest: three stops. What asks for more is before another background."""
 
 Gain = NDArray[np.float32]
 
@@ -155,16 +154,13 @@ def _evened(
     for _ in range(ROUNDS):
         found = tried(ratio.astype(np.float32))
         own, other = np.maximum(found.colours, 1e-6)
-        errors, ratio = [*errors, found.error], ratio * other / own
+        errors, ratio = [*errors, found.error], np.clip(ratio * other / own, 1 / MAX_GAIN, MAX_GAIN)
     as_it_is, tolerance = errors[0], settings.selection.scattering_error
-    scalar = float(np.exp(np.mean(np.log(ratio))))
-    colour = ratio / scalar
-    if max(scalar, 1 / scalar) < (RATIO if lit else RATIO_UNLIT):
-        scalar = 1.0
-    if colour.max() / colour.min() < COLOUR_RATIO:
-        colour = np.ones(3)
-    gain = (scalar * colour).astype(np.float32)
-    error = as_it_is if (gain == 1).all() else tried(gain).error
+    brightness = float(np.exp(np.mean(np.log(ratio))))
+    if not lit and 1 / RATIO < brightness < RATIO:
+        ratio = ratio / brightness
+    gain = ratio.astype(np.float32)
+    error = tried(gain).error
     if error >= as_it_is - tolerance:
         return view, ()
     named = ", ".join(f"{value:.2f}" for value in gain)

@@ -32,14 +32,19 @@ LENS = 50.0
 """Focal length (mm) of an uncalibrated camera whose file says none: Blender's default lens."""
 
 BOX_MARGIN = 0.06
-"""Margin on each side of an estimated box, as a fraction of its longer side."""
+"""Margin on each side of an estimated box, as a fraction of its longer side: two voxels of the coarsest grid, in which
+smoke that is fainter than the mask shows has its place."""
 
 NARROWEST = 0.25
-"""Width over height of an estimated box at least, and the reverse."""
+"""Width over height of an estimated box at least, and the reverse: eight voxels of the coarsest grid, the fewest that a
+side has."""
 
 MIN_SIDE_VOXELS = 32
 """Voxels along the longest side at least: with fewer there is nothing more to save
 (docs/experiments/resolution-selection.md)."""
+
+DETAIL_FRAMES = 3
+"""Frames whose detail decides the resolution: those with the most smoke (docs/selection.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +280,7 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
 def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
     """The detail of the smoke in some frames, at the clip's own pixels; None without smoke."""
     smoky, frames = estimate.samples.smoky, []
-    for number in estimate.samples.typical:
+    for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
             frames.append((part(estimate.clip.frame(number)), estimate.found.plates.at(number).through(part)))

@@ -41,7 +41,7 @@ THICK_PERCENTILE = 90
 """Percentile of the change from which on smoke is measured: the thickest is nearest to the source."""
 
 PIXELS = 50
-"""Smallest number of smoke pixels that have a colour."""
+"""Smallest number of smoke pixels that have a colour: five of them are the thickest tenth."""
 
 MIN_SOURCE_VALUE = 0.01
 """Linear value of the brightest channel at least: a darker source has no colour that 8 bits show."""

@@ -1,7 +1,7 @@
 """How many voxels the smoke's detail in a clip asks for, in so far as that detail stands out from the noise.
 
 The spectrum of what the smoke changes in the picture (cosine transform, in sRGB values, where a clip's noise is even)
-is compared with that of the clip's noise. A grid shows what is coarser than two of
+is compared with that of the noise beside it. A grid shows what is coarser than two of
 its voxels; the share of the smoke's contrast that is finer is what it loses. Figures:
 docs/experiments/resolution-selection.md.
 """
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from smokelift.checks import Figures
 from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 from smokelift.scene import Domain
@@ -28,6 +29,9 @@ Shape = tuple[int, int, int]
 RINGS = 256
 """Rings of equal width into which spatial frequencies are sorted, up to that of single pixels: finer than the step from
 one grid to the next, of four voxels, in a picture of up to 1,024 pixels."""
+
+NORMAL_MEDIAN = 1.4826
+"""Standard deviation of normal noise over the median of its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +120,11 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail
     energy = np.zeros(RINGS)
     for picture, plate in frames:
         change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
-        energy += _beyond_noise(change, float(plate.noise.total.mean()))
+        noise, still = float(plate.noise.total.mean()), ~matte(picture, plate).mask
+        # the channels' mean has less of it; half of what is beside the smoke has none that is too thin to be found
+        if still.any():
+            noise = min(noise, NORMAL_MEDIAN * float(np.median(np.abs(change[still]))))
+        energy += _beyond_noise(change, noise)
     return DetailSpectrum(energy, pixels)
 
 

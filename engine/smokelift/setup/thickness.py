@@ -38,7 +38,7 @@ ERROR = 0.15
 which it has to be right."""
 
 FRAMES = 3
-"""Smallest number of frames that their deviation is estimated from."""
+"""Smallest number of frames that their deviation is estimated from: without one of them two are left."""
 
 
 def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Doubles:

@@ -155,9 +155,8 @@ def test_another_exposure_is_found_and_undone(filmed, draft, gain) -> None:
     np.testing.assert_allclose(brightest, untouched, rtol=0.1)
 
 
-@pytest.mark.parametrize("gain", [1.0, 0.92])
-def test_what_light_may_explain_is_left_alone(filmed, draft, gain) -> None:
-    assert gains(shot_of(filmed((gain,) * 3), draft)) == []
+def test_a_camera_that_is_exposed_alike_is_left_alone(filmed, draft) -> None:
+    assert gains(shot_of(filmed((1.0, 1.0, 1.0)), draft)) == []
 
 
 def test_unknown_light_explains_more(filmed, draft) -> None:
