@@ -99,7 +99,7 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
             return None
         first, domain = seen[0].camera, clip.optics.domain
         return estimate_axis([], first, domain, base=depth_at(distance, first, domain))
-    camera, domain = seen[len(seen) // 2].camera, clip.optics.domain.coarsened(MAX_VOXELS)
+    camera, domain = seen[len(seen) // 2].camera, clip.optics.domain.with_at_most(MAX_VOXELS)
     optics = replace(clip.optics, domain=domain)
     amounts = [
         apparent_optical_depth(each.image, each.plate, matte(each.image, each.plate).mask, optics) for each in seen

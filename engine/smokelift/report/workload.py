@@ -62,7 +62,7 @@ def _shares(shot: Shot, settings: Settings) -> list[float]:
     """Shares of the voxels that may hold smoke, in some of the frames that show smoke."""
     if settings.method == "paper":  # its densities are anywhere in the box
         return [1.0]
-    optics = replace(shot.optics, domain=shot.optics.domain.coarsened(MAX_SIDE_VOXELS))
+    optics = replace(shot.optics, domain=shot.optics.domain.with_at_most(MAX_SIDE_VOXELS))
     prior = RoundDepth().of_clip(shot)
     step = -(-len(shot.smoky) // LOOKED_AT) or 1
     moments = ((frame, shot.observe(frame)) for frame in shot.smoky[::step])

@@ -128,7 +128,7 @@ class Domain(Box):
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
-    def coarsened(self, longest: int) -> Domain:
+    def with_at_most(self, longest: int) -> Domain:
         """Return the box, or a little less of it, with larger voxels: so many along its longest side at most."""
         # nor so large that a side has less than one; never beyond the box, where a light may stand
         times = min(max(self.resolution) / longest, min(self.resolution))

@@ -127,7 +127,7 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
         x, y, z = (n // times for n in domain.resolution)
         if most / 2 <= max(x, y, z) <= most and min(x, y, z) >= SHORTEST:
             return replace(domain, resolution=(x, y, z))
-    return domain.coarsened(max(most, SHORTEST))
+    return domain.with_at_most(max(most, SHORTEST))
 
 
 def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
