@@ -51,6 +51,9 @@ MAX_KNOWN_DEVIATION = 0.95
 """Largest standard deviation of a depth that counts as determined by a floor contact, over that of the depth by the box
 alone: a contact that leaves about as much spread as the box shows nothing."""
 
+MIN_CONTACT_SHARE = 0.6
+"""Smallest share of the frames that show a floor contact where there is one."""
+
 FLOOR_PROBABILITY = 0.6
 """Probability that smoke which seems to touch the floor does."""
 
@@ -228,7 +231,7 @@ def _normal(value: Doubles | float, deviation: Doubles | float) -> Doubles:
 def _floor_column(
     screens: Sequence[Screen], frames: int, middle: Doubles, depths: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
-    """The column that stands on the floor; none where less than half of the frames show a contact.
+    """The column that stands on the floor; none where too few of the frames show a contact.
 
     A disc of smoke on the floor begins in the picture where the ray through the floor meets it, within a few rows. What
     begins nearer and above the floor shows the same.
@@ -239,7 +242,7 @@ def _floor_column(
     if camera.type != "perspective" or abs(height[2]) < 1 or distance <= 0 or above <= 0:
         return []
     found = [contact for screen in screens if (contact := _floor_contact(screen, distance, above, camera, domain))]
-    if 2 * len(found) < frames:
+    if len(found) < MIN_CONTACT_SHARE * frames:
         return []
     contact, width, begins = np.median(found, 0)
     reach, heights = depths[-1], screens[0].heights
