@@ -15,8 +15,8 @@ from scipy import ndimage
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
-from smokelift.footage.stored_picture import StoredPicture
 
 FPS = 24.0
 BRIGHT = 0.75

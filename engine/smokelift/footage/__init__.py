@@ -1,8 +1,7 @@
 """Footage: pictures in linear light, and the smoke in them apart from its background.
 
-``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``, opened in a ``container``),
-each a ``stored_picture``, less what a ``mask`` hides. ``images`` reads and resizes single pictures; ``colour`` knows
-how files encode light.
+``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``), less what a ``mask``
+hides. ``images`` reads and resizes single pictures; ``colour`` knows how files encode light.
 
 ``proxy`` is the file in small, up to the cuts. ``backdrop`` decides on it what stands behind the smoke: what
 ``given_background`` reads, or what ``background_kind`` ranks first, one colour or a picture. ``clear_picture`` finds

@@ -20,7 +20,6 @@ from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture
 from smokelift.footage.clip import Clip
-from smokelift.footage.container import median_quantiser
 from smokelift.footage.given_background import given_plates
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.noise import (
@@ -35,6 +34,7 @@ from smokelift.footage.noise import (
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.proxy import Proxy
 from smokelift.footage.steady import cleared, uncovered, without_noise_light
+from smokelift.footage.video import median_quantiser
 from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera
 

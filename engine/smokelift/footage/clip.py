@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from functools import cached_property, lru_cache
+from copy import copy
+from functools import lru_cache, partial
 from pathlib import Path
-from types import TracebackType
+from typing import Any
 
 import numpy as np
 
 from smokelift.checks import Remark
 from smokelift.footage.exposure import COMPARED_SIDE
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Wrapped
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.image_sequence import ImageSequence, is_video
 from smokelift.footage.images import Picture, Transfer, reduced_size
-from smokelift.footage.mask import Mask, Masked, Seen
-from smokelift.footage.stored_picture import StoredPicture
+from smokelift.footage.mask import Mask, Seen
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
@@ -28,11 +28,15 @@ STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
 """Memory for the frames of a file that are kept as they are stored, twenty of 1080p at 8 bits, for what reads the same
 ones spread over a clip; and for the linear frames of a clip that are kept: two of 1080p."""
 
+Read = Callable[[int], StoredPicture]
+Kept = OrderedDict[int, StoredPicture]
+
 
 class Clip:
     """A video or a picture sequence as linear frames.
 
-    Made by :meth:`open`; a context manager. Not for several threads at once.
+    Made by :meth:`open`; a context manager. Not for several threads at once. What a clip is made of from another
+    (`part`, `changed`, ...) shares the open file with it.
 
     Attributes
     ----------
@@ -50,31 +54,24 @@ class Clip:
         Focal length in millimetres on 35 mm film, if the file says it.
     backdrop
         Linear grey that is shown behind pictures with an alpha channel; None behind opaque ones.
+    mask
+        What hides a part of the frames, if anything does.
     """
 
     def __init__(
-        self,
-        path: Path,
-        source: FrameSource,
-        fps: float | None,
-        frames: tuple[int, int] | None,
-        size: tuple[int, int] | None = None,
-        masked: Masked | None = None,
+        self, path: Path, source: FrameSource, fps: float | None = None, frames: tuple[int, int] | None = None
     ) -> None:
         self.path = path
-        self._masked = masked
         self.fps = source.fps if fps is None else float(fps)
-        self.warning = source.warning
-        self.lens = source.lens
-        self.backdrop = source.backdrop
+        self.warning, self.lens, self.backdrop = source.warning, source.lens, source.backdrop
+        self.mask: Mask | None = None
         self._source = source
-        first, last = (0, source.count - 1) if frames is None else frames
-        if not 0 <= first <= last < source.count:
-            raise ClipError(f"{path}: there are no frames {first} to {last}; choose some of 0 to {source.count - 1}")
-        self.first = first
-        self._count = last - first + 1
-        self._cache: OrderedDict[int, StoredPicture] = OrderedDict()
-        self.size = self.stored(0).size if size is None else size
+        self._damaged = lru_cache(maxsize=None)(source.damaged)
+        self._count = source.count
+        self._filmed: Read = partial(_kept, Kept(), STORED_BYTES, source.read)
+        self._read = self._filmed
+        self._use(frames or (0, source.count - 1))
+        self.size = self.stored(0).size
 
     @classmethod
     def open(
@@ -113,25 +110,24 @@ class Clip:
             If the mask is a picture that cannot be read.
         """
         try:
-            said = path if isinstance(path, ClipSource) else ClipSource(file_path(path, "path"))
-            said = ClipSource(
-                said.path,
-                fps=said.fps if fps is None else fps,
-                frames=said.frames if frames is None else frames,
-                transfer=said.transfer if transfer is None else transfer,
-                mask=said.mask if mask is None else file_path(mask, "mask"),
+            given = path if isinstance(path, ClipSource) else ClipSource(file_path(path, "path"))
+            given = ClipSource(
+                given.path,
+                fps=given.fps if fps is None else fps,
+                frames=given.frames if frames is None else frames,
+                transfer=given.transfer if transfer is None else transfer,
+                mask=given.mask if mask is None else file_path(mask, "mask"),
             )
         except SceneError as error:
             raise ClipError(str(error) if error.key == "path" else f"{path}: {error}") from error
-        path, fps, frames, transfer = said.path, said.fps, said.frames, said.transfer
-        source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
+        source: FrameSource
+        if is_video(given.path):
+            source = Video(given.path, given.transfer)
+        else:
+            source = ImageSequence(given.path, given.transfer, given.fps)
         try:
-            clip = cls(path, _Kept(source), fps, frames)
-            if said.mask is None:
-                return clip
-            needed = range(clip.first, clip.first + len(clip))
-            masked = Masked(clip._source, Mask(said.mask, needed, clip.size))
-            return cls(path, _Kept(masked), fps, frames, clip.size, masked)
+            clip = cls(given.path, source, given.fps, given.frames)
+            return clip if given.mask is None else clip._behind(given.mask)
         except BaseException:
             source.close()
             raise
@@ -140,7 +136,7 @@ class Clip:
     def files(self) -> tuple[Path, ...]:
         """What the frames are read from: the video, or the pictures of the range that exist."""
         files = self._source.files
-        own = files if len(files) == 1 else files[self.first : self.first + self._count]
+        own = files if len(files) == 1 else files[self.first : self._last + 1]
         return tuple(file for file in own if file.exists())
 
     @property
@@ -156,7 +152,7 @@ class Clip:
             remarks.append(Remark("damaged frames", {"path": str(self.path), "frames": frames}))
         return (*remarks, *self.notes)
 
-    @cached_property
+    @property
     def damaged(self) -> tuple[int, ...]:
         """Frames that cannot be decoded; for each the last one before it that can be, or else the next, stands in.
 
@@ -165,10 +161,10 @@ class Clip:
         ClipError
             If there are more of them than of others.
         """
-        damaged = self._source.damaged(self.first, self.first + self._count - 1)
-        if 2 * len(damaged) > self._count > 1:
+        damaged = self._damaged(self.first, self._last)
+        if 2 * len(damaged) > len(self) > 1:
             raise ClipError(
-                f"{self.path}: {len(damaged)} of its {self._count} frames are missing or cannot be decoded; export "
+                f"{self.path}: {len(damaged)} of its {len(self)} frames are missing or cannot be decoded; export "
                 "the clip again, or choose other frames"
             )
         return tuple(n - self.first for n in damaged)
@@ -181,30 +177,15 @@ class Clip:
         ClipError
             If there is no such frame, or most frames of the clip are damaged.
         """
-        return _keep(self._cache, n, StoredPicture(self.stored(n).linear()), LINEAR_BYTES).values
+        return _kept(self._linear, LINEAR_BYTES, lambda n: StoredPicture(self.stored(n).linear()), n).values
 
     def stored(self, n: int) -> StoredPicture:
         """Return frame ``n`` as it is stored, of which a part or means cost less than the linear `frame`."""
-        if n in self._cache:
-            self._cache.move_to_end(n)
-            return self._cache[n]
-        image = self._read(n)
-        return _keep(self._cache, n, image, LINEAR_BYTES) if image.table is None else image
-
-    @property
-    def mask(self) -> Mask | None:
-        """What hides a part of the frames, if anything does."""
-        return None if self._masked is None else self._masked.mask
-
-    def as_filmed(self) -> Clip:
-        """Return the clip with what a mask hides. The two share the open file."""
-        if self._masked is None:
-            return self
-        return Clip(self.path, self._masked.source, self.fps, (self.first, self.first + len(self) - 1), self.size)
+        return _kept(self._stored, LINEAR_BYTES, self._sound, n)
 
     def seen(self, n: int, width: int, height: int) -> Seen | None:
         """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask."""
-        return None if self._masked is None else self._masked.mask.seen(self.first + n, width, height)
+        return None if self.mask is None else self.mask.seen(self.first + n, width, height)
 
     def as_seen(self, n: int, picture: Picture) -> Picture:
         """Return a picture (rows, columns, 3) of frame ``n`` in which what is hidden is not a number."""
@@ -212,25 +193,11 @@ class Clip:
         seen = self.seen(n, columns, rows)
         return picture if seen is None else np.where(seen[..., None], picture, np.float32(np.nan))
 
-    def _read(self, n: int) -> StoredPicture:
-        """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
-        if not isinstance(n, int | np.integer) or not 0 <= n < self._count:
-            raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {self._count - 1}")
-        try:
-            return self._source.read(self.first + n)
-        except DamagedFrameError as error:
-            damage = error
-        for other in (*reversed(range(n)), *range(n + 1, self._count)):
-            if other not in self.damaged:
-                with suppress(DamagedFrameError):
-                    return self._source.read(self.first + other)
-        raise damage
-
     def __len__(self) -> int:
-        return self._count
+        return self._last - self.first + 1
 
     def __iter__(self) -> Iterator[Picture]:
-        return (self.frame(n) for n in range(self._count))
+        return (self.frame(n) for n in range(len(self)))
 
     def spread(self, count: int) -> list[int]:
         """Return the numbers of ``count`` frames (of all, if there are fewer), spread evenly over the clip."""
@@ -238,86 +205,93 @@ class Clip:
         return [int(number) for number in numbers]
 
     def whole(self) -> Clip:
-        """Return all of the file, whatever part of it this clip is. The two share the open file."""
-        return Clip(self.path, self._source, self.fps, None, self.size, self._masked)
+        """Return all of the file, whatever part of it this clip is; of one with a mask a frame, what has one."""
+        return self._with((0, self._count - 1))
 
     def part(self, first: int, last: int) -> Clip:
-        """Return the frames of the file from one number to another, both included. The two share the open file."""
-        if (first, last) == (self.first, self.first + len(self) - 1):
-            return self
-        return Clip(self.path, self._source, self.fps, (first, last), self.size, self._masked)
+        """Return the frames of the file from one number to another, both included."""
+        return self if (first, last) == (self.first, self._last) else self._with((first, last))
+
+    def as_filmed(self) -> Clip:
+        """Return the clip with what a mask hides, as the file has it."""
+        return self if self.mask is None else self._with((self.first, self._last), _read=self._filmed, mask=None)
 
     def changed(
         self,
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
     ) -> Clip:
-        """Return the clip with each frame, by its number, replaced by another. The two share the open file.
+        """Return the clip with each frame, by its number, replaced by another.
 
         ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
-        last = self.first + len(self) - 1
-        source = _Changed(self, self._source, change, keeps)
-        return Clip(self.path, source, self.fps, (self.first, last), self.size, self._masked)
+        before, first = self._read, self.first
+
+        def read(number: int) -> StoredPicture:
+            image, n = before(number), number - first
+            if keeps is not None and keeps(n, lambda: image.averaged(*reduced_size(*image.size, COMPARED_SIDE))):
+                return image
+            return StoredPicture(change(n, image.linear()))
+
+        return self._with((self.first, self._last), _read=read)
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file, and that of a mask."""
         self._source.close()
+        if self.mask is not None:
+            self.mask.close()
 
     def __enter__(self) -> Clip:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _with(self, frames: tuple[int, int], **attributes: Any) -> Clip:
+        """The same open file with other frames, and other attributes."""
+        clip = copy(self)
+        vars(clip).update(attributes)
+        clip._use(frames)
+        return clip
 
-class _Kept(Wrapped):
-    """The frames of a source, of which the last ones read are kept for all clips that share it."""
+    def _use(self, frames: tuple[int, int]) -> None:
+        """Use the file's frames from one to another, as they are read."""
+        self.first, self._last = frames
+        if not 0 <= self.first <= self._last < self._count:
+            raise ClipError(
+                f"{self.path}: there are no frames {self.first} to {self._last}; choose some of 0 to {self._count - 1}"
+            )
+        self._stored, self._linear = Kept(), Kept()
 
-    def __init__(self, source: FrameSource) -> None:
-        super().__init__(source)
-        self._kept: OrderedDict[int, StoredPicture] = OrderedDict()
-        self._damaged = lru_cache(maxsize=None)(source.damaged)
+    def _behind(self, path: Path) -> Clip:
+        """The clip with what a mask hides continued from around it."""
+        mask, filmed = Mask(path, range(self.first, self._last + 1), self.size), self._filmed
+        read = partial(_kept, Kept(), STORED_BYTES, lambda number: mask.applied(number, filmed(number)))
+        count = min(self._count, mask.count or self._count)
+        return self._with((self.first, self._last), _read=read, mask=mask, _count=count)
 
-    def read(self, n: int) -> StoredPicture:
-        image = self._kept.pop(n) if n in self._kept else self.source.read(n)
-        return _keep(self._kept, n, image, STORED_BYTES)
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        return self._damaged(first, last)
-
-
-class _Changed(Wrapped):
-    """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
-
-    def __init__(
-        self,
-        clip: Clip,
-        source: FrameSource,
-        change: Callable[[int, Picture], Picture],
-        keeps: Callable[[int, Callable[[], Picture]], bool] | None,
-    ) -> None:
-        super().__init__(source)
-        self.lens = clip.lens
-        self._first, self._change, self._keeps = clip.first, change, keeps
-
-    def read(self, n: int) -> StoredPicture:
-        image, number = self.source.read(n), n - self._first
-        if self._keeps is not None and self._keeps(
-            number, lambda: image.averaged(*reduced_size(*image.size, COMPARED_SIDE))
-        ):
-            return image
-        return StoredPicture(self._change(number, image.linear()))
+    def _sound(self, n: int) -> StoredPicture:
+        """Frame ``n``, or what stands in for it: the last sound one lasts on, as when one drops."""
+        if not isinstance(n, int | np.integer) or not 0 <= n < len(self):
+            raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {len(self) - 1}")
+        try:
+            return self._read(self.first + n)
+        except DamagedFrameError as error:
+            damage = error
+        for other in (*reversed(range(n)), *range(n + 1, len(self))):
+            if other not in self.damaged:
+                with suppress(DamagedFrameError):
+                    return self._read(self.first + other)
+        raise damage
 
 
-def _keep(kept: OrderedDict[int, StoredPicture], n: int, image: StoredPicture, most: int) -> StoredPicture:
-    """A picture, read-only from now on, put beside the last ones in so many bytes."""
+def _kept(pictures: Kept, most: int, read: Read, n: int) -> StoredPicture:
+    """A picture, read-only from now on: one of the last ones in so many bytes, or read and put beside them."""
+    image = pictures.pop(n) if n in pictures else read(n)
     image.values.flags.writeable = False
-    kept[n] = image
-    while len(kept) > max(1, most // image.values.nbytes):
-        kept.popitem(last=False)
+    pictures[n] = image
+    while len(pictures) > max(1, most // image.values.nbytes):
+        pictures.popitem(last=False)
     return image
 
 

@@ -1,36 +1,40 @@
-"""What a clip format implements, and what formats share; `Clip` counts, caches and checks the frames of all of them.
-
-The alpha channel of pictures of smoke alone is the matte, whatever stands behind the smoke. They are shown before one
-colour that is known for certain: white behind dark smoke, black behind bright smoke. What is behind a pixel then is 1 -
-alpha of it.
-"""
+"""What a clip format implements, and the frames that it gives: as they are stored, and read in linear light."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
+import numpy.typing as npt
+import scipy.sparse
 
+import smokelift._core as _core
 from smokelift.checks import Remark
-from smokelift.footage.images import Picture, linear_to_srgb
-from smokelift.footage.stored_picture import StoredPicture
+from smokelift.footage.images import Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
 """Frames a second where neither the file nor the user gives any: the rate of film."""
 
-BELIEVED = (4.0, 2000.0)
-"""Focal lengths in millimetres on 35 mm film that are; others, 0 above all, say that it is unknown."""
+FOCAL_LENGTHS = (4.0, 2000.0)
+"""Focal lengths in millimetres on 35 mm film, from a fisheye's to a telescope's; others, 0 above all, say that it is
+unknown."""
 
 MIDDLE = 0.5
 """sRGB value of smoke that is as far from black as from white."""
 
 OPAQUE = 0.999
-"""Alpha from which on nothing is behind a pixel."""
+"""Alpha from which on nothing is behind a pixel: less than a step of 8 bits below 1."""
 
+Edges = npt.NDArray[np.int32]
 Layer = tuple[Picture, Picture | None]
 """A linear picture (rows, columns, 3) as it is before black, and its alpha (rows, columns), None of an opaque one."""
+
+Sample = TypeVar("Sample")
+Value = TypeVar("Value", np.float32, np.uint16)
 
 
 class ClipError(ValueError):
@@ -39,6 +43,84 @@ class ClipError(ValueError):
 
 class DamagedFrameError(ClipError):
     """A frame that is missing or cannot be decoded; those around it may be sound."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredPicture:
+    """A picture whose values stand for linear light: integers take a quarter of the memory, at 8 bits.
+
+    Attributes
+    ----------
+    values : (rows, columns, 3) float32, uint8 or uint16
+        Linear light, or codes; row 0 at the top.
+    table : (n,) float32, optional
+        Linear value of each code; None where the values are linear.
+    """
+
+    values: npt.NDArray[Any]
+    table: Picture | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.values.shape[1], self.values.shape[0]
+
+    def linear(self) -> Picture:
+        """Return the linear picture (rows, columns, 3), read-only if it is kept."""
+        return self.values if self.table is None else look_up(self.table, self.values)
+
+    def cut(self, part: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> StoredPicture:
+        """Return some of the pixels, which a function takes whatever their values are."""
+        return StoredPicture(part(self.values), self.table)
+
+    def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
+        """Return the picture with a function applied to every linear value by itself, to each code once."""
+        return change(self.values) if self.table is None else look_up(change(self.table), self.values)
+
+    def averaged(self, width: int, height: int) -> Picture:
+        """Return the `area_average` of the linear picture."""
+        rows = len(self.values)
+        lines = self.sum_lines(area_weights(rows, height)) if 1 <= height < rows else self.linear()
+        return area_average(lines, width, height)
+
+    def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
+        """Return sums (n, columns, 3) of the lines of the linear picture, each of weights (n, rows)."""
+        if self.table is None or self.values.dtype != np.uint8:
+            return sum_lines(self.linear(), weights)
+        return _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
+
+    def chequered(self, width: int, height: int, first: int) -> tuple[Picture, Picture]:
+        """Return two `averaged` pictures, each of the pixels of one colour of a chequerboard.
+
+        ``first`` is 0 if the pixel at the top left belongs to the first of the two, 1 if to the second.
+        """
+        columns, rows = self.size
+        sums = []
+        for odd in (0, 1):
+            weights = area_weights(rows, height).copy()
+            weights.data[weights.indices % 2 != odd] = 0
+            weights.eliminate_zeros()
+            sums.append(self.sum_lines(weights))
+
+        def average(colour: int) -> Picture:
+            light = sums[colour].copy()
+            light[:, 1::2] = sums[1 - colour][:, 1::2]
+            board = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == colour
+            share = np.maximum(area_average(board, width, height), np.float32(1e-6))
+            return np.asarray(area_average(light, width, height) / share[..., None])
+
+        return average(first), average(1 - first)
+
+    def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
+        """Add the linear picture, times weights (m, n, 3) of its parts, to sums (rows, columns, 3).
+
+        The edges (m + 1,) and (n + 1,) are the row, and the column, where each part begins, and where the last ends.
+        """
+        if self.table is None or self.values.dtype != np.uint8:
+            rows, columns = (np.diff(each) for each in edges)
+            sums += self.linear() * np.repeat(np.repeat(weights, rows, axis=0), columns, axis=1)
+        else:
+            _core.add_weighted(self.values, self.table, weights, *edges, sums)
 
 
 class FrameSource(Protocol):
@@ -85,35 +167,20 @@ class FrameSource(Protocol):
         ...
 
 
-class Wrapped:
-    """The frames of another source, of which a subclass changes some."""
-
-    def __init__(self, source: FrameSource) -> None:
-        self.source = source
-        self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
-
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        return self.source.notes
-
-    def read(self, n: int) -> StoredPicture:
-        return self.source.read(n)
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        return self.source.damaged(first, last)
-
-    def close(self) -> None:
-        self.source.close()
-
-
-def believed_focal_length(value: object) -> float | None:
+def focal_length(value: object) -> float | None:
     """Return a focal length in millimetres as a file says it; None where it says none."""
     try:
         focal = float(str(value))
     except ValueError:
         return None
-    return focal if BELIEVED[0] <= focal <= BELIEVED[1] else None
+    return focal if FOCAL_LENGTHS[0] <= focal <= FOCAL_LENGTHS[1] else None
+
+
+def sound_samples(count: int, read: Callable[[int], Sample]) -> Iterator[Sample]:
+    """Return what is read of some of so many frames, with smoke and without; damaged ones are left out."""
+    for n in sorted({0, count // 4, count // 2, count - 1}):
+        with suppress(DamagedFrameError):
+            yield read(n)
 
 
 def shown_before(layer: Layer, backdrop: float | None) -> Picture:
@@ -125,18 +192,18 @@ def shown_before(layer: Layer, backdrop: float | None) -> Picture:
 
 
 def backdrop_of(layers: Iterable[Layer]) -> float | None:
-    """Return the linear grey that pictures of a clip are shown before; None if they are opaque."""
+    """Return the linear grey that pictures of a clip are shown before; None if they are opaque.
+
+    The alpha channel of pictures of smoke alone is the matte, whatever stands behind the smoke. They are shown before
+    one colour that is known for certain: white behind dark smoke, black behind bright smoke.
+    """
     light, opacity, opaque = 0.0, 0.0, True
     for picture, alpha in layers:
-        if alpha is not None:
-            light += float(picture.mean(-1).sum(dtype=np.float64))
-            opacity += float(alpha.sum(dtype=np.float64))
-            opaque = opaque and bool((alpha >= OPAQUE).all())
+        if alpha is None:
+            break
+        light += float(picture.mean(-1).sum(dtype=np.float64))
+        opacity += float(alpha.sum(dtype=np.float64))
+        opaque = opaque and bool((alpha >= OPAQUE).all())
     if opaque:
         return None
     return 1.0 if opacity > 0 and linear_to_srgb(light / opacity) < MIDDLE else 0.0
-
-
-def sample_numbers(count: int) -> list[int]:
-    """Return the frames of so many that show whether a clip has a matte: with smoke, and without."""
-    return sorted({0, count // 4, count // 2, count - 1})

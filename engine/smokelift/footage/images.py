@@ -13,19 +13,21 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+import av
 import numpy as np
 import numpy.typing as npt
 import OpenEXR
 import scipy.sparse
+from av.container import InputContainer
 from PIL import Image, ImageOps
 
 import smokelift._core as _core
 from smokelift.footage.colour import Encoding, hlg_to_linear, pq_to_linear
-from smokelift.footage.container import open_container
 from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
@@ -39,6 +41,9 @@ MAX_PIXELS = 2**28
 MAX_PICTURE_SIDE = 4096
 """Pixels along the longer side of a clip's pictures; larger ones are reduced while they are read. The finest grid has
 144 voxels along a side, so smoke on a twentieth of the picture still has more pixels than voxels."""
+
+OPENING_BYTES = 2**25
+"""Bytes that FFmpeg opens a file with: the contexts of its decoders, and some frames to know them by."""
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
@@ -166,18 +171,53 @@ def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Pict
         raise ImageError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
 
 
-def reduction(width: int, height: int) -> int:
-    """Return by how much the sides of a picture are divided, so that none exceeds `MAX_PICTURE_SIDE`."""
-    return -(-max(width, height) // MAX_PICTURE_SIDE)
+def readable_size(width: int | Fraction, height: int) -> tuple[int, int]:
+    """Return width and height in which a clip's pictures are read: whole parts of theirs, up to `MAX_PICTURE_SIDE`."""
+    divisor = -(-max(round(width), height) // MAX_PICTURE_SIDE)
+    return max(1, round(width / divisor)), max(1, round(height / divisor))
+
+
+def size_refusal(width: int, height: int) -> str | None:
+    """Return why a picture of the size that its header says is refused, before memory is taken for it; else None."""
+    if 0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS:
+        return None
+    return (
+        f"cannot be read: its header says {width} x {height} pixels; a picture has 1 to {LARGEST_PICTURE} along a side "
+        f"and {MAX_PIXELS} in all at most"
+    )
 
 
 def _require_size(path: Path, width: int, height: int) -> None:
-    """Refuse what a header says before memory is taken for it."""
-    if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS):
-        raise ImageError(
-            f"{path}: cannot be read: its header says {width} x {height} pixels; a picture has "
-            f"{LARGEST_PICTURE} a side and {MAX_PIXELS} in all at most"
-        )
+    if refusal := size_refusal(width, height):
+        raise ImageError(f"{path}: {refusal}")
+
+
+def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
+    """Open a file with FFmpeg, and whatever it refers to on this machine, but nothing on another.
+
+    FFmpeg takes a path that looks like a URL for one, and fetches it.
+
+    Parameters
+    ----------
+    path
+        The file, whatever characters are in its name.
+    form
+        FFmpeg's name of the format; None takes what the content shows.
+    options
+        Of that format.
+
+    Raises
+    ------
+    av.FFmpegError, ValueError
+        If it is of no format that FFmpeg knows, or damaged.
+    MemoryError
+        If there is hardly any memory left, where PyAV would end the process.
+    """
+    bytes(OPENING_BYTES)  # given back at once, untouched: Python says that memory lacks, where PyAV would not
+    container: InputContainer = av.open(
+        f"file:{path.absolute()}", format=form, options={"protocol_whitelist": "file", **options}
+    )
+    return container
 
 
 def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:

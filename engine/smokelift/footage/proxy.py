@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.exposure import gain_of, sample_gains, small
+from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb, reduced_size
 from smokelift.footage.mask import Seen
 from smokelift.footage.noise import some_blocks
-from smokelift.footage.stored_picture import StoredPicture
 
 PROXY_SIDE = 480
 """Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred

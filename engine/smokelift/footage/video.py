@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Iterator
-from contextlib import suppress
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
@@ -28,55 +27,56 @@ from av.filter import Graph
 from av.sidedata.sidedata import Type as SideData
 from av.video.plane import VideoPlane
 from av.video.reformatter import ColorRange, Interpolation
+from av.video.stream import VideoStream
 
 import smokelift._core as _core
 from smokelift.checks import Remark
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
-from smokelift.footage.container import lacks_index, open_container
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
     DamagedFrameError,
     Layer,
+    StoredPicture,
     backdrop_of,
-    believed_focal_length,
-    sample_numbers,
+    focal_length,
     shown_before,
+    sound_samples,
 )
 from smokelift.footage.images import (
-    MAX_PIXELS,
     Transfer,
     code_values,
     decode_alpha,
     decode_integers,
-    reduction,
+    open_container,
+    readable_size,
+    size_refusal,
     srgb_to_linear,
 )
-from smokelift.footage.stored_picture import StoredPicture
-from smokelift.scene import LARGEST_PICTURE
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
+_GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AREA) | _EXACT
 _FOCAL_LENGTH = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 """FFmpeg's own decoders of these leave the alpha channel out."""
-
-_GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AREA) | _EXACT
 
 BEYOND_ALPHA = 0.02
 """Share of white by which colours may exceed alpha through rounding and compression."""
 
 SQUARE = 0.01
-"""Difference from 1 of the shape of pixels that is not worth another grid of pixels."""
+"""Difference from 1 of the shape of pixels that is not worth another grid of pixels: half a pixel in fifty."""
+
+QUANTISED_FRAMES = 21
+"""Frames at the start of a file whose quantisers are read: their median needs no more."""
 
 
 class Video:
-    """One video stream with an index of the times of its frames.
-
-    Its attributes are those of `FrameSource`.
+    """One video stream with an index of the times of its frames; a `FrameSource`.
 
     ``_times`` are the frames' presentation times in the stream's time base, in order; ``_keys`` those where
     decoding can start; ``_shown`` maps a frame of the clip to one of them. Containers without presentation
-    times (raw streams, some AVI) have no index: they are decoded once to count and then only forward.
+    times (raw streams, some AVI) have no keys: they are decoded once to count, which gives their times, and then only
+    forward.
     """
 
     def __init__(self, path: Path, transfer: Transfer | None) -> None:
@@ -92,44 +92,68 @@ class Video:
             raise ClipError(f"{path}: is a pipe or a device, which cannot be read twice; save it as a file")
         self._failed = False  # whether decoding has
         self._lost: set[int] = set()  # indices into _times of what is known to be damaged, lest it is tried again
+        self._keys: list[int] = []
         self._start()
-        self._times, self._keys, broken = self._index()
-        if not self._times:
-            self.close()
-            raise ClipError(f"{path}: holds no frame that can be decoded; export it again")
+        self._times, broken = self._index()
         if broken:
             self._drop_undecodable_end()
             self.warning = Remark("truncated clip", {"path": str(path), "frames": len(self._times)})
-        self._varies, self._interlaced = False, False
+        if not self._times:
+            self.close()
+            raise ClipError(f"{path}: holds no frame that can be decoded; export it again")
+        self._varies, self._interlaced, self._premultiplied = False, False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
-        self._premultiplied = False
         self.backdrop = self._matted()
         self._format = self._described()
-        self.lens = believed_focal_length({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
+        self.lens = focal_length({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
+
+    @property
+    def notes(self) -> tuple[Remark, ...]:
+        """How the pictures are read, as far as they have been."""
+        return (*self._format, Remark("interlaced clip")) if self._interlaced else self._format
+
+    def read(self, n: int) -> StoredPicture:
+        """Return a frame, or raise `DamagedFrameError`."""
+        frame = self._decode(self._shown[n])
+        if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
+            return StoredPicture(shown_before(self._layer(frame), self.backdrop))
+        codes = self._codes(frame)
+        upright = np.ascontiguousarray(_upright(codes, frame))
+        return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which frames from one to another cannot be decoded."""
+        if not self._keys:
+            return ()  # they were counted by decoding them
+        wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
+        from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
+        self._seek(wanted[0])
+        good = self._good_times(wanted[-1])
+        if not (from_start or good.issuperset(wanted)):  # as in `_found`
+            self._rewind()
+            good |= self._good_times(wanted[-1])
+        self._rewind()
+        damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
+        self._lost.update(self._shown[n] for n in damaged)
+        return damaged
+
+    def close(self) -> None:
+        """Close the file."""
+        self._container.close()
 
     def _start(self) -> None:
         """Open the file at its beginning."""
         try:
             self._container = open_container(self._path)
         except (av.FFmpegError, ValueError) as error:
-            raise _unreadable(self._path, error) from error
-        if not self._container.streams.video:
+            reason = getattr(error, "strerror", None) or error
+            raise _unreadable(self._path, f"is not a video, or is damaged: {reason}") from error
+        try:
+            self._stream = self._usable_stream()
+        except ClipError:
             self._container.close()
-            raise _unreadable(self._path, None)
-        self._stream = self._container.streams.video[0]
-        if self._stream.codec_context is None:
-            self._container.close()
-            raise ClipError(
-                f"{self._path}: holds video of a kind that cannot be decoded; convert it, for example to H.264"
-            )
-        width, height = self._stream.width, self._stream.height
-        if max(width, height) > LARGEST_PICTURE or not 0 < width * height <= MAX_PIXELS:
-            self._container.close()
-            raise ClipError(
-                f"{self._path}: has pictures of {width} x {height} pixels; those that are read have 1 to "
-                f"{LARGEST_PICTURE} along a side and at most {MAX_PIXELS} in all"
-            )
+            raise
         # A decoder of several frames at once takes sound ones along when one fails.
         self._stream.thread_type = "SLICE" if self._failed else "AUTO"
         decoder = _ALPHA_DECODERS.get(self._stream.codec_context.name)
@@ -139,9 +163,22 @@ class Video:
         self._decoded = self._frames()
         self._next = 0  # index into _times of the frame that decoding on will give
 
-    def _frames(self) -> Iterator[av.VideoFrame]:
-        """Decode on from where the container stands, without what cannot be decoded."""
+    def _usable_stream(self) -> VideoStream:
+        if not self._container.streams.video:
+            raise _unreadable(self._path, "holds no video stream; choose another file")
+        stream = self._container.streams.video[0]
+        if stream.codec_context is None:
+            raise ClipError(
+                f"{self._path}: holds video of a kind that cannot be decoded; convert it, for example to H.264"
+            )
+        if refusal := size_refusal(stream.width, stream.height):
+            raise ClipError(f"{self._path}: {refusal}")
+        return stream
+
+    def _frames(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
+        """Decode on from where the container stands: times and frames, without what cannot be decoded."""
         packets = self._container.demux(self._stream)
+        count = 0
         while True:
             try:
                 packet = next(packets)
@@ -152,11 +189,13 @@ class Video:
             except av.FFmpegError:
                 self._failed = True
                 continue
-            yield from frames
+            for frame in frames:
+                yield frame.pts if self._keys else count, frame
+                count += 1
 
-    def _index(self) -> tuple[list[int], list[int], bool]:
-        """Return the times of all frames and of the key frames, and whether the file broke off."""
-        times, keys, seen, broken = [], [], 0, False
+    def _index(self) -> tuple[list[int], bool]:
+        """Return the times of all frames, and whether the file broke off; keep those of the key frames."""
+        times, keys, seen, broken = set(), [], 0, False
         try:
             for packet in self._container.demux(self._stream):
                 if packet.is_corrupt:
@@ -166,15 +205,16 @@ class Video:
                 if packet.size == 0 or packet.is_discard:  # a dropped frame, or one that an edit cuts away
                     continue
                 if packet.pts is None:
-                    return self._count(), [], False
-                times.append(packet.pts)
+                    return self._counted(), False
+                times.add(packet.pts)
                 if packet.is_keyframe:
                     keys.append(packet.pts)
         except av.FFmpegError:
             broken = True
         broken = broken or seen < self._promised()
+        self._keys = sorted(keys)
         self._rewind()
-        return sorted(set(times)), sorted(keys), broken
+        return sorted(times) if keys else list(range(len(times))), broken
 
     def _promised(self) -> int:
         """Return how many frames the file says it holds; 0 if it does not say."""
@@ -185,7 +225,7 @@ class Video:
         alone = len(self._container.streams) == 1
         return int(length * stream.average_rate / av.time_base) - 1 if alone else 0
 
-    def _count(self) -> list[int]:
+    def _counted(self) -> list[int]:
         """Return made-up times, by decoding everything, for a container that has none."""
         self._rewind()
         count = sum(1 for _ in self._decoded)
@@ -204,7 +244,6 @@ class Video:
                 return
             except ClipError:
                 self._times.pop()
-        raise ClipError(f"{self._path}: holds no frame that can be decoded; export it again")
 
     def _steady(self) -> tuple[float, list[int]]:
         """Return the frame rate and, for each frame of the clip, the decoded frame that it shows."""
@@ -224,77 +263,22 @@ class Video:
         shown = [bisect.bisect_right(self._times, self._times[0] + mean * n + 0.5) - 1 for n in range(count)]
         return float(Fraction(1) / (Fraction(mean) * base)), shown
 
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        """How the pictures are read, as far as they have been."""
-        if not self._interlaced:
-            return self._format
-        return (*self._format, Remark("interlaced clip"))
-
     def _described(self) -> tuple[Remark, ...]:
         """How the file's format is read."""
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
-        width, height = self._size()
         notes = [Remark("varying frame rate", {"fps": self.fps})] * self._varies
         if encoding in ("hlg", "pq") and self._transfer is None:
             notes.append(Remark("high dynamic range", {"transfer": encoding.upper()}))
         if primaries is not None:
             notes.append(Remark("other primaries", {"primaries": primaries}))
-        if (width, height) != (stream.width, stream.height):
-            notes.append(Remark("scaled pictures", {"size": (stream.width, stream.height), "scaled": (width, height)}))
+        if self._size() != (stream.width, stream.height):
+            notes.append(Remark("scaled pictures", {"size": (stream.width, stream.height), "scaled": self._size()}))
         return tuple(notes)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._container.close()
-
-    def read(self, n: int) -> StoredPicture:
-        """Return a frame, or raise `DamagedFrameError`."""
-        frame = self._decode(self._shown[n])
-        if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
-            return StoredPicture(shown_before(self._layer(frame), self.backdrop))
-        codes = self._codes(frame)
-        upright = np.ascontiguousarray(_upright(codes, frame))
-        return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded."""
-        wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
-        if not self._keys:
-            return ()  # they were counted by decoding them
-        from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
-        self._container.seek(wanted[0], stream=self._stream)
-        self._decoded = self._frames()
-        good = self._good_times(wanted[-1])
-        if not (from_start or good.issuperset(wanted)):  # as in `_decode`
-            self._rewind()
-            good |= self._good_times(wanted[-1])
-        damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
-        if damaged or self._failed:
-            self._rewind()
-        else:  # what follows is decoded on from there
-            self._next = self._shown[last] + 1
-        self._lost.update(self._shown[n] for n in damaged)
-        return damaged
-
-    def _good_times(self, last: int) -> set[int]:
-        """Times of the frames that can be decoded from where the container stands, up to one."""
-        good = set()
-        for frame in self._decoded:
-            if frame.pts is not None and not frame.is_corrupt:
-                good.add(frame.pts)
-            if frame.pts is not None and frame.pts >= last:
-                break
-        return good
 
     def _decode(self, index: int) -> av.VideoFrame:
         """Return the decoded frame at an index into ``_times``."""
-        frame = None
-        if not self._keys:
-            frame = self._count_to(index)
-        elif index not in self._lost:
-            frame = self._seek(index)
+        frame = None if index in self._lost else self._found(index)
         if frame is None:
             self._rewind()
             self._lost.add(index)
@@ -304,13 +288,12 @@ class Video:
         self._next = index + 1
         return frame
 
-    def _seek(self, index: int) -> av.VideoFrame | None:
+    def _found(self, index: int) -> av.VideoFrame | None:
+        """The decoded frame, by the shortest way; None if it is damaged."""
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
-        key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
-        if reached is None or wanted < reached or key_between:
-            self._container.seek(wanted, stream=self._stream)
-            self._decoded = self._frames()
+        if reached is None or wanted < reached or any(reached < key <= wanted for key in self._keys):
+            self._seek(wanted)
         frame = self._forward_to(wanted)
         if frame is None:
             # A seek may land late (open groups of pictures); from the start nothing can be missed.
@@ -318,66 +301,69 @@ class Video:
             frame = self._forward_to(wanted)
         return frame
 
+    def _seek(self, wanted: int) -> None:
+        """Go to the last key frame at or before a time; to the start where there are none."""
+        if not self._keys:
+            self._rewind()
+            return
+        self._container.seek(wanted, stream=self._stream)
+        self._decoded = self._frames()
+
     def _forward_to(self, wanted: int) -> av.VideoFrame | None:
-        for frame in self._decoded:
-            if frame.pts is not None and frame.pts >= wanted:
-                return frame if frame.pts == wanted and not frame.is_corrupt else None
+        for time, frame in self._decoded:
+            if time is not None and time >= wanted:
+                return frame if time == wanted and not (frame.is_corrupt and self._keys) else None
         return None
 
-    def _count_to(self, index: int) -> av.VideoFrame | None:
-        if index < self._next:
-            self._rewind()
-        return next(islice(self._decoded, index - self._next, None), None)
-
-    def _pixel_shape(self) -> Fraction:
-        """Return how many times as wide as high a pixel is, as stored."""
-        shape = self._stream.sample_aspect_ratio
-        return Fraction(1) if not shape or abs(shape - 1) <= SQUARE else Fraction(shape)
-
-    def _size(self) -> tuple[int, int]:
-        """Return the width and the height of the pictures that are read, as stored: pixels are square."""
-        width, height = self._stream.width * self._pixel_shape(), self._stream.height
-        divisor = reduction(round(width), height)
-        return max(1, round(width / divisor)), max(1, round(height / divisor))
+    def _good_times(self, last: int) -> set[int]:
+        """Times of the frames that can be decoded from where the container stands, up to one."""
+        good = set()
+        for time, frame in self._decoded:
+            if time is not None and not frame.is_corrupt:
+                good.add(time)
+            if time is not None and time >= last:
+                break
+        return good
 
     def _matted(self) -> float | None:
-        """Find out how alpha is meant, if there is any: colours beyond it are not multiplied by it."""
-        layers = []
-        for n in sample_numbers(self.count):
-            with suppress(DamagedFrameError):
-                frame = self._decode(self._shown[n])
-                if not _has_alpha(frame):
-                    return None
-                codes: npt.NDArray[Any] = frame.reformat(format="rgba", threads=1).to_ndarray()
-                # white that is multiplied by alpha in linear light is the brightest that there may be
-                limit = codes[..., 3:] / np.float32(255) + np.float32(BEYOND_ALPHA)
-                layers.append((frame, bool((srgb_to_linear(codes[..., :3] / np.float32(255)) <= limit).all())))
-        self._premultiplied = bool(layers) and all(within for _, within in layers)
-        return backdrop_of(self._layer(frame) for frame, _ in layers)
+        """Find out how alpha is meant, and what is shown behind it; None if there is none."""
+        frames = []
+        for frame in sound_samples(self.count, lambda n: self._decode(self._shown[n])):
+            if not _has_alpha(frame):
+                return None
+            frames.append(frame)
+        self._premultiplied = bool(frames) and all(map(_is_premultiplied, frames))
+        return backdrop_of(map(self._layer, frames))
+
+    def _size(self) -> tuple[int, int]:
+        """Return width and height of the pictures that are read, as stored: pixels are square."""
+        shape = self._stream.sample_aspect_ratio or Fraction(1)
+        square = abs(shape - 1) <= SQUARE
+        return readable_size(self._stream.width * (1 if square else Fraction(shape)), self._stream.height)
 
     def _encoding(self) -> Encoding | None:
         """How the codes stand for light; None is sRGB."""
         return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
 
     def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
-        """RGB, and alpha if there is any, in codes."""
+        """RGB, and alpha if there is any, in codes, as stored."""
         wide = max(component.bits for component in frame.format.components) > 8
         alpha = _has_alpha(frame)
         # FFmpeg writes planes three times as fast as it writes pixels, of the same codes
         planes = not (wide or alpha or frame.format.is_rgb)
         layout = {False: ("rgb24", "rgba"), True: ("rgb48le", "rgba64le")}[wide][alpha]
-        size = (self._stream.width, self._stream.height)
-        if (frame.width, frame.height) != size:
+        width, height = self._stream.width, self._stream.height
+        if (frame.width, frame.height) != (width, height):
             raise ClipError(
-                f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}; "
+                f"{self._path}: changes its picture size from {width} x {height} to {frame.width} x {frame.height}; "
                 "export it in one size"
             )
-        width, height = self._size()
+        size, shown = self._size(), frame
         if frame.interlaced_frame:
-            self._interlaced, frame = True, self._of_one_moment(frame)
-        way = _SHRINKING if width < size[0] else _GROWING
+            self._interlaced, shown = True, self._of_one_moment(frame)
+        way = _SHRINKING if size[0] < width else _GROWING
         # in this thread: after a fork of a process that has read a video, the converter waits for its own for ever
-        converted = frame.reformat(width, height, "gbrp" if planes else layout, interpolation=way, threads=1)
+        converted = shown.reformat(*size, "gbrp" if planes else layout, interpolation=way, threads=1)
         if planes:
             green, blue, red = (_lines(plane) for plane in converted.planes)
             return _core.interleave((red, green, blue))
@@ -386,10 +372,10 @@ class Video:
 
     def _layer(self, frame: av.VideoFrame) -> Layer:
         codes, white = self._codes(frame), _white(frame)
-        linear = decode_integers(codes, self._encoding(), white, self._premultiplied)
-        opacity = decode_alpha(codes, white)
-        picture = to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
-        return picture, None if opacity is None else _upright(opacity, frame)
+        linear = _upright(decode_integers(codes, self._encoding(), white, self._premultiplied), frame)
+        alpha = decode_alpha(codes, white)
+        picture = to_bt709(linear, self._stream.codec_context.color_primaries)
+        return picture, None if alpha is None else _upright(alpha, frame)
 
     def _of_one_moment(self, frame: av.VideoFrame) -> av.VideoFrame:
         """The even lines of an interlaced frame, with others between them."""
@@ -405,6 +391,12 @@ class Video:
 
 def _has_alpha(frame: av.VideoFrame) -> bool:
     return any(component.is_alpha for component in frame.format.components)
+
+
+def _is_premultiplied(frame: av.VideoFrame) -> bool:
+    """Whether colours are multiplied by alpha: none is brighter than white multiplied by it in linear light."""
+    pixels = frame.reformat(format="rgba", threads=1).to_ndarray() / np.float32(255)
+    return bool((srgb_to_linear(pixels[..., :3]) <= pixels[..., 3:] + np.float32(BEYOND_ALPHA)).all())
 
 
 def _lines(plane: VideoPlane) -> npt.NDArray[np.uint8]:
@@ -423,13 +415,17 @@ def _white(frame: av.VideoFrame) -> float:
     return 255 / 256 if limited else (2**bits - 1) * 2 ** (16 - bits) / 65535
 
 
+def _side_data(frame: av.VideoFrame, kind: SideData) -> Any:
+    sides: Any = frame.side_data  # PyAV's stub of it knows motion vectors only
+    return sides.get(kind)
+
+
 def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]:
     """Turn and mirror a picture as its display matrix says; angles other than quarter turns are ignored.
 
     The matrix sends the stored column p and row q to the shown column a p + c q and row b p + d q.
     """
-    sides: Any = frame.side_data  # PyAV's stub of it knows motion vectors only
-    side = sides.get(SideData.DISPLAYMATRIX)
+    side = _side_data(frame, SideData.DISPLAYMATRIX)
     if side is None:
         return pixels
     a, b, _, c, d = (int(v) for v in np.frombuffer(bytes(side), np.int32)[:5])
@@ -438,19 +434,53 @@ def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]
     return pixels[:: -1 if d < 0 else 1, :: -1 if a < 0 else 1]
 
 
-def _unreadable(path: Path, error: Exception | None) -> ClipError:
-    """Why FFmpeg cannot open a file, or finds no video in it, and what to do where that is known."""
+def _unreadable(path: Path, reason: str) -> ClipError:
+    """The error of a file in which FFmpeg finds no video, with what to do where that is known."""
     if path.stat().st_size == 0:
-        return ClipError(f"{path}: is empty; copy or export it again")
-    if lacks_index(path):
-        return ClipError(
-            f"{path}: breaks off before its index is complete, without which no frame is found; copy it again, or "
-            "repair it"
-        )
-    if error is None:
-        return ClipError(f"{path}: holds no video stream; choose another file")
-    return ClipError(f"{path}: is not a video, or is damaged: {_reason(error)}")
+        reason = "is empty; copy or export it again"
+    elif lacks_index(path):
+        reason = "breaks off before its index is complete, without which no frame is found; copy it again, or repair it"
+    return ClipError(f"{path}: {reason}")
 
 
-def _reason(error: Exception) -> str:
-    return str(error.strerror) if isinstance(error, av.FFmpegError) else str(error)
+def lacks_index(path: Path) -> bool:
+    """Return whether a file is an MP4 or QuickTime one without its whole index, as a recording that was cut short is.
+
+    Such a file is a row of boxes: eight bytes with size and name, and what it holds (ISO/IEC 14496-12, 4.2).
+    """
+    with path.open("rb") as file:
+        if file.read(8)[4:] != b"ftyp":
+            return False
+        start, end = 0, path.stat().st_size
+        while start + 8 <= end:
+            file.seek(start)
+            head = file.read(16)
+            size = int.from_bytes(head[:4], "big")
+            if size == 1:  # the true size follows the name
+                size = int.from_bytes(head[8:], "big")
+            if head[4:8] == b"moov":
+                return start + size > end
+            if size < 8:  # 0: up to the end of the file
+                break
+            start += size
+    return True
+
+
+def median_quantiser(path: Path) -> float | None:
+    """Return the median of the mean quantisers of a video's first frames, 0 to 51; None where the file gives none.
+
+    They say how strongly a video is compressed: an encoder leaves a block as it was where it differs by less than the
+    quantiser's step, which doubles every six. Those of H.264 are read; other codecs have other scales.
+    """
+    try:
+        with open_container(path) as container:
+            stream = next(iter(container.streams.video), None)
+            if stream is None or stream.codec_context is None or stream.codec_context.name != "h264":
+                return None
+            stream.codec_context.options = {"export_side_data": "venc_params"}
+            frames = islice(container.decode(stream), QUANTISED_FRAMES)
+            sides = [_side_data(frame, SideData.VIDEO_ENC_PARAMS) for frame in frames]
+            means = [float(side.qp_map().mean()) for side in sides if side is not None]
+    except (av.FFmpegError, ValueError, RuntimeError):  # the last if the blocks do not cover the frame
+        return None
+    return float(np.median(means)) if means else None

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from smokelift.footage.behind_smoke import DETAIL_QUANTILE
 from smokelift.footage.clear_picture import ClearPicture
 from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import Edges
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.stored_picture import Edges
 
 STEP = 2
 """Every so manieth frame is read whole: half of those that are examined."""

@@ -21,7 +21,6 @@ from smokelift.density import DensitySettings, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
-from smokelift.footage.stored_picture import chequered_averages
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Light, Scattering
@@ -134,7 +133,7 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     """What one camera saw of a frame."""
     working = working_picture(view.camera.at(number), domain)
     first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
-    halves = chequered_averages(view.clip.stored(number).cut(working.part), *working.camera.size, first)
+    halves = view.clip.stored(number).cut(working.part).chequered(*working.camera.size, first)
     plate = view.plates.at(number).through(working.cut, working.pixels)
     return CoarseView(working.camera, plate, working.of(view.clip, number), *halves)
 

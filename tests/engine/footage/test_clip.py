@@ -11,8 +11,8 @@ from PIL import Image
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource

@@ -9,9 +9,9 @@ from films import codes_apart
 from smokelift.checks import Remark
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.plate import Plate
-from smokelift.footage.stored_picture import StoredPicture
 
 COUNT = 16
 SIZE = (80, 1280)
