@@ -20,9 +20,8 @@ is measured."""
 MIN_CONTRAST = 4 / 255
 """Contrast in sRGB values below which there is more noise or fog than texture (docs/experiments/turning-camera.md)."""
 
-CELLS, MIN_SIDE = 6, 24
-"""Cells along the picture's longer side, which others between them overlap by half, and pixels along a cell that tells
-anything: four times `CONTRAST_SIGMA`."""
+CELLS = 6
+"""Cells along the picture's longer side, which others between them overlap by half."""
 
 HALF = 0.5
 """Share of a cell's variance that is texture, and that is the same in another picture in which it is found again; share
@@ -45,7 +44,7 @@ def moves(pictures: Picture) -> bool:
     """
     shape, middle = pictures.shape[1:3], len(pictures) // 2
     side = min(round(max(shape) / CELLS), *shape)
-    if side < MIN_SIDE:
+    if side < 4 * CONTRAST_SIGMA:  # it has to hold all over which contrast is measured
         return False
     window = np.outer(*[np.hanning(side + 2)[1:-1].astype(np.float32)] * 2)
     places = np.ix_(*(np.arange(0, n - side + 1, side // 2) for n in shape))

@@ -248,7 +248,7 @@ class Clip:
         self.close()
 
     def _with(self, frames: tuple[int, int], **attributes: Any) -> Clip:
-        """The same open file with other frames, and other attributes."""
+        """A clip of the same open file with other frames, and other attributes."""
         clip = copy(self)
         vars(clip).update(attributes)
         clip._use(frames)

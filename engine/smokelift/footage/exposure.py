@@ -7,8 +7,6 @@ estimates of location", 1972).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import numpy.typing as npt
 
@@ -42,9 +40,8 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
 
     Both are linear (rows, columns, 3), `small` enough that their noise does not count.
     """
-    low, high = USABLE
     gains = np.ones(3, np.float32)
-    usable = _all_three((background > low) & (background < high) & (picture > low) & (picture < high))
+    usable = _usable(background) & _usable(picture)
     if usable.mean() < MIN_USABLE_SHARE:
         return gains
     ratios = np.log(picture[usable] / background[usable])
@@ -58,13 +55,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
 
 def shows_exposure(background: Picture) -> bool:
     """Return whether a linear background (rows, columns, 3) is bright enough somewhere, and not too bright, to tell."""
-    low, high = USABLE
-    return bool(((background > low) & (background < high)).all(-1).mean() >= MIN_USABLE_SHARE)
-
-
-def largest_change(gains: Sequence[Picture]) -> float:
-    """Return the share by which gains of a clip's frames differ from 1 at most."""
-    return float(np.expm1(np.abs(np.log(gains)).max()))
+    return bool(_usable(background).mean() >= MIN_USABLE_SHARE)
 
 
 def small(picture: Picture) -> Picture:
@@ -85,6 +76,10 @@ def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:
         if (gains == before).all():  # as they would stay
             break
     return gains
+
+
+def _usable(picture: Picture) -> npt.NDArray[np.bool_]:
+    return _all_three((picture > USABLE[0]) & (picture < USABLE[1]))
 
 
 def _all_three(holds: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

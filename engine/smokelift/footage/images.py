@@ -187,11 +187,6 @@ def size_refusal(width: int, height: int) -> str | None:
     )
 
 
-def _require_size(path: Path, width: int, height: int) -> None:
-    if refusal := size_refusal(width, height):
-        raise ImageError(f"{path}: {refusal}")
-
-
 def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
     """Open a file with FFmpeg, and whatever it refers to on this machine, but nothing on another.
 
@@ -224,8 +219,13 @@ def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
     # with a pattern, "frame_%d.png" would mean other files
     with open_container(path, "image2", pattern_type="none") as container:
         stream = container.streams.video[0]
-        _require_size(path, stream.width, stream.height)
+        _require_size(path, (stream.width, stream.height))
         return next(container.decode(stream)).to_ndarray(format=pixels)
+
+
+def _require_size(path: Path, size: tuple[int, int]) -> None:
+    if refusal := size_refusal(*size):
+        raise ImageError(f"{path}: {refusal}")
 
 
 def _read_radiance(path: Path) -> npt.NDArray[Any]:
@@ -243,7 +243,7 @@ def _read_integers(path: Path) -> npt.NDArray[Any]:
     if head.startswith(b"\x89PNG") and head[24:] == b"\x10":
         return _read_with_ffmpeg(path, "rgba64le")  # Pillow would cut 16 bit colour to 8
     with Image.open(path) as picture:
-        _require_size(path, *picture.size)
+        _require_size(path, picture.size)
         upright = ImageOps.exif_transpose(picture)
         return np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
 
@@ -267,28 +267,30 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
     with _silent():
         headers = OpenEXR.File(str(path), header_only=True).parts
     for part in headers:
-        for window in ("displayWindow", "dataWindow"):
-            low, high = part.header[window]
-            _require_size(path, int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1)
+        for name in ("displayWindow", "dataWindow"):
+            _require_size(path, _window(part, name)[1])
     with _silent():
         parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # the library's way to say that it found damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
     part = parts[0]
-    left, top = (int(v) for v in part.header["displayWindow"][0])
-    right, bottom = (int(v) for v in part.header["displayWindow"][1])
-    x0, y0 = (int(v) for v in part.header["dataWindow"][0])
-    image = np.zeros((bottom - top + 1, right - left + 1, 4), np.float32)
-    rows, columns = slice(max(0, y0 - top), None), slice(max(0, x0 - left), None)
+    ((left, top), (width, height)), ((x0, y0), _) = (_window(part, name) for name in ("displayWindow", "dataWindow"))
+    image = np.zeros((height, width, 4), np.float32)
     colours = _exr_channels(path, tuple(part.channels))
     opacity = [f"{colours[0][:-1]}A"] if f"{colours[0][:-1]}A" in part.channels else []
     for channel, name in enumerate((*colours, *opacity)):
         pixels = part.channels[name].pixels[max(0, top - y0) :, max(0, left - x0) :]
-        target = image[rows, columns, channel]
-        height, width = min(target.shape[0], pixels.shape[0]), min(target.shape[1], pixels.shape[1])
-        target[:height, :width] = pixels[:height, :width]
+        target = image[max(0, y0 - top) :, max(0, x0 - left) :, channel]
+        rows, columns = np.minimum(target.shape, pixels.shape)
+        target[:rows, :columns] = pixels[:rows, :columns]
     alpha = np.clip(image[..., 3], 0.0, 1.0) if opacity else None
     return np.ascontiguousarray(image[..., :3]), alpha
+
+
+def _window(part: Any, name: str) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The left and top of a window of an EXR, and its width and height."""
+    (left, top), (right, bottom) = (map(int, corner) for corner in part.header[name])
+    return (left, top), (right - left + 1, bottom - top + 1)
 
 
 def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:

@@ -26,9 +26,9 @@ PROXY_SIDE = 480
 """Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred
 (docs/experiments/background.md)."""
 
-OF_FILE, OF_CLIP = 32, 32
-"""Frames of the file and of the clip, at most: a half of them is enough for a median, a third for a false-alarm rate of
-1e-3 where every second pair of smoke's samples is alike."""
+FRAMES = 32
+"""Frames of the file, and of the clip, at most: a half of them is enough for a median, a third for a false-alarm rate
+of 1e-3 where every second pair of smoke's samples is alike."""
 
 MAX_STILL_CHANGE = np.float32(4 / 255)
 """Change of a pixel, in sRGB values, up to which it has not changed."""
@@ -71,8 +71,8 @@ class Proxy:
         first, last = clip.first, clip.first + len(clip) - 1
         (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
         pictures, seen, blocks = {}, [], {}
-        own = {first + number for number in clip.spread(OF_CLIP)}
-        for number in sorted(own | set(whole.spread(OF_FILE))):
+        own = {first + number for number in clip.spread(FRAMES)}
+        for number in sorted(own | set(whole.spread(FRAMES))):
             inside = first <= number <= last
             of, n = (clip, number - first) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
@@ -93,10 +93,10 @@ class Proxy:
         return linear_to_srgb(self.pictures)
 
     def between(self, first: int, last: int) -> Proxy:
-        """Return the frames from one number of the file to another, both included, as even as `OF_FILE` of them are."""
+        """Return the frames from one number of the file to another, both included, as even as `FRAMES` of them are."""
         inside = np.array([n for n, number in enumerate(self.numbers) if first <= number <= last])
         numbers = np.array(self.numbers)[inside]
-        wanted = np.linspace(numbers[0], numbers[-1], min(OF_FILE, len(numbers)))
+        wanted = np.linspace(numbers[0], numbers[-1], min(FRAMES, len(numbers)))
         chosen = np.unique(np.abs(numbers - wanted[:, None]).argmin(1))
         return self.only(inside[chosen])
 

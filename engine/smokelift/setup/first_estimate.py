@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.exposure import largest_change, small
+from smokelift.footage.exposure import small
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
@@ -72,7 +72,7 @@ class SmokeSamples:
     @property
     def exposure(self) -> float:
         """Share by which the exposure of a sample differs from its background's at most."""
-        return largest_change(list(self.gains.values()))
+        return float(np.expm1(np.abs(np.log(list(self.gains.values()))).max()))
 
     @property
     def brightens(self) -> bool:

@@ -1,4 +1,4 @@
-"""What formats of clips share: an alpha channel says what is behind the smoke, a file its focal length; stored frames."""
+"""What formats of clips share: what alpha says is behind the smoke, the focal length, frames as they are stored."""
 
 from pathlib import Path
 
