@@ -6,7 +6,8 @@ import pytest
 
 from benchmarks.file_kinds.judge import misread
 from benchmarks.file_kinds.kinds import kinds
-from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
 
 KINDS = {f"{group}: {name}": make for group, files in kinds(1).items() for name, make in files.items()}
 

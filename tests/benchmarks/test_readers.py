@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
 from benchmarks.stability.readers import READERS, Reader
-from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
 from smokelift.output.checksum import checksum
 
 TRIES = settings(

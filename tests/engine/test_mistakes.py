@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import smokelift
-from smokelift.footage.clip import ClipError
+from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
 from smokelift.output.index import SequenceError
 from smokelift.scene import SceneError

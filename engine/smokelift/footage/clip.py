@@ -22,8 +22,6 @@ from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
 
-__all__ = ["Clip", "ClipError", "is_video"]
-
 STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
 """Memory for the frames of a file that are kept as they are stored, twenty of 1080p at 8 bits, for what reads the same
 ones spread over a clip; and for the linear frames of a clip that are kept: two of 1080p."""
@@ -206,15 +204,15 @@ class Clip:
 
     def whole(self) -> Clip:
         """Return all of the file, whatever part of it this clip is; of one with a mask a frame, what has one."""
-        return self._with((0, self._count - 1))
+        return self._with(frames=(0, self._count - 1))
 
     def part(self, first: int, last: int) -> Clip:
         """Return the frames of the file from one number to another, both included."""
-        return self if (first, last) == (self.first, self._last) else self._with((first, last))
+        return self if (first, last) == (self.first, self._last) else self._with(frames=(first, last))
 
     def as_filmed(self) -> Clip:
         """Return the clip with what a mask hides, as the file has it."""
-        return self if self.mask is None else self._with((self.first, self._last), _read=self._filmed, mask=None)
+        return self if self.mask is None else self._with(_read=self._filmed, mask=None)
 
     def changed(
         self,
@@ -233,7 +231,7 @@ class Clip:
                 return image
             return StoredPicture(change(n, image.linear()))
 
-        return self._with((self.first, self._last), _read=read)
+        return self._with(_read=read)
 
     def close(self) -> None:
         """Close the file, and that of a mask."""
@@ -247,11 +245,11 @@ class Clip:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _with(self, frames: tuple[int, int], **attributes: Any) -> Clip:
-        """A clip of the same open file with other frames, and other attributes."""
+    def _with(self, frames: tuple[int, int] | None = None, **attributes: Any) -> Clip:
+        """A clip of the same open file with other frames, or other attributes."""
         clip = copy(self)
         vars(clip).update(attributes)
-        clip._use(frames)
+        clip._use(frames or (self.first, self._last))
         return clip
 
     def _use(self, frames: tuple[int, int]) -> None:
@@ -268,7 +266,7 @@ class Clip:
         mask, filmed = Mask(path, range(self.first, self._last + 1), self.size), self._filmed
         read = partial(_kept, Kept(), STORED_BYTES, lambda number: mask.applied(number, filmed(number)))
         count = min(self._count, mask.count or self._count)
-        return self._with((self.first, self._last), _read=read, mask=mask, _count=count)
+        return self._with(_read=read, mask=mask, _count=count)
 
     def _sound(self, n: int) -> StoredPicture:
         """Frame ``n``, or what stands in for it: the last sound one lasts on, as when one drops."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from smokelift.footage.clip import Clip, is_video
-from smokelift.footage.image_sequence import is_pattern
+from smokelift.footage.clip import Clip
+from smokelift.footage.image_sequence import is_pattern, is_video
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part

@@ -15,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, sample_gains, small
-from smokelift.footage.frame_source import StoredPicture
+from smokelift.footage.frame_source import ClipError, StoredPicture
 from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb, reduced_size
 from smokelift.footage.mask import Seen
 from smokelift.footage.noise import some_blocks

@@ -249,16 +249,15 @@ class Video:
         """Return the frame rate and, for each frame of the clip, the decoded frame that it shows."""
         count = len(self._times)
         base = self._stream.time_base
-        rate = self._stream.average_rate or self._stream.guessed_rate
+        rate = float(self._stream.average_rate or self._stream.guessed_rate or 0)
         if not self._keys or count < 3 or base is None:
-            return float(rate or DEFAULT_FPS), list(range(count))
+            return rate or DEFAULT_FPS, list(range(count))
         gaps = np.diff(np.array(self._times, np.float64))
         mean = (self._times[-1] - self._times[0]) / (count - 1)
         # Times are whole ticks: a gap may be off by one without the rate being another (Matroska: 1 ms).
         if np.abs(gaps - mean).max() <= max(0.01 * mean, 1.0):
             steady = 1.0 / (mean * float(base))
-            near = rate is not None and abs(float(rate) - steady) < 0.01 * steady
-            return float(rate if near and rate is not None else steady), list(range(count))
+            return rate if abs(rate - steady) < 0.01 * steady else steady, list(range(count))
         self._varies = True
         shown = [bisect.bisect_right(self._times, self._times[0] + mean * n + 0.5) - 1 for n in range(count)]
         return float(Fraction(1) / (Fraction(mean) * base)), shown

@@ -18,7 +18,8 @@ from smokelift.checks import Doubt, Figures, Remark
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
-from smokelift.footage.clip import Clip, is_video
+from smokelift.footage.clip import Clip
+from smokelift.footage.image_sequence import is_video
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from smokelift.checks import Remark
-from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.frame_source import StoredPicture
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError, StoredPicture
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image

@@ -7,7 +7,8 @@ import pytest
 from films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 from PIL import Image
 
-from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
 from smokelift.footage.mask import Mask
 from smokelift.footage.plate import Plate, known_plate

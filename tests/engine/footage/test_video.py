@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from films import coded, film, puff, wall
 
-from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.footage.video import lacks_index, median_quantiser
 from smokelift.output.video_file import write_video
