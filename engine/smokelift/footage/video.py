@@ -147,8 +147,7 @@ class Video:
         try:
             self._container = open_container(self._path)
         except (av.FFmpegError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise _unreadable(self._path, f"is not a video, or is damaged: {reason}") from error
+            raise _unreadable(self._path, error) from error
         try:
             self._stream = self._usable_stream()
         except ClipError:
@@ -165,7 +164,7 @@ class Video:
 
     def _usable_stream(self) -> VideoStream:
         if not self._container.streams.video:
-            raise _unreadable(self._path, "holds no video stream; choose another file")
+            raise _unreadable(self._path, None)
         stream = self._container.streams.video[0]
         if stream.codec_context is None:
             raise ClipError(
@@ -433,13 +432,18 @@ def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]
     return pixels[:: -1 if d < 0 else 1, :: -1 if a < 0 else 1]
 
 
-def _unreadable(path: Path, reason: str) -> ClipError:
-    """The error of a file in which FFmpeg finds no video, with what to do where that is known."""
+def _unreadable(path: Path, error: Exception | None) -> ClipError:
+    """Why FFmpeg cannot open a file, or finds no video in it, and what to do where that is known."""
     if path.stat().st_size == 0:
-        reason = "is empty; copy or export it again"
-    elif lacks_index(path):
-        reason = "breaks off before its index is complete, without which no frame is found; copy it again, or repair it"
-    return ClipError(f"{path}: {reason}")
+        return ClipError(f"{path}: is empty; copy or export it again")
+    if lacks_index(path):
+        return ClipError(
+            f"{path}: breaks off before its index is complete, without which no frame is found; copy it again, or "
+            "repair it"
+        )
+    if error is None:
+        return ClipError(f"{path}: holds no video stream; choose another file")
+    return ClipError(f"{path}: is not a video, or is damaged: {getattr(error, 'strerror', None) or error}")
 
 
 def lacks_index(path: Path) -> bool:
