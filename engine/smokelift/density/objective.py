@@ -59,7 +59,7 @@ class Term:
 
     def noise_floor(self) -> float:
         """What the picture's noise leaves of the objective at the true density."""
-        power = np.square(self.view.noise, dtype=np.float64)
+        power = np.square(self.view.noise_left, dtype=np.float64)
         if self.view.colours is not None:
             power *= self.view.colours.of_channels()
         return float(np.sum(self.weight[..., None] * power))

@@ -127,8 +127,10 @@ class ObservedView:
     image : (rows, columns, 3)
         The observation's, faded to the plate as far as it is uncertain that a pixel shows smoke: so a faint rim ends
         where its light does, not at the mask.
+    share : (rows, columns)
+        How certain a pixel shows smoke, from 0 to 1: the share of the observation, and of its noise, that is left.
     mask : (rows, columns) bool
-        Pixels that may show smoke.
+        Pixels that may show smoke: where that share is not 0.
     optical_depth : (rows, columns)
         Of smoke without shadows that explains the picture, or as much as shows where only smoke in its own shadow
         does; 0 outside the mask.
@@ -143,6 +145,7 @@ class ObservedView:
     camera: Camera
     image: Image
     plate: Plate
+    share: NDArray[np.float32]
     mask: NDArray[np.bool_]
     optical_depth: NDArray[np.float32]
     projection: Projection
@@ -165,7 +168,7 @@ class ObservedView:
             for _ in range(ROUNDS):
                 depth = apparent_optical_depth(image, plate, mask, optics, colours)
                 colours = ColourWeight.of(image, plate, depth)
-        return ObservedView(camera, image, plate, mask, depth, projection, reached(mask, projection), colours)
+        return ObservedView(camera, image, plate, share, mask, depth, projection, reached(mask, projection), colours)
 
     def weighted(self, colours: Image) -> Image:
         """Colours (rows, columns, 3) as much as they count."""
@@ -177,8 +180,13 @@ class ObservedView:
 
     @cached_property
     def noise(self) -> Image:
-        """Standard deviation (rows, columns, 3) of the picture's noise, linear radiance."""
+        """Standard deviation (rows, columns, 3) of the observation's noise, linear radiance."""
         return noise_at(self.image, self.plate)
+
+    @cached_property
+    def noise_left(self) -> Image:
+        """Standard deviation (rows, columns, 3) of the noise of `image`, which fades with it."""
+        return self.share[..., None] * self.noise
 
 
 @dataclass(frozen=True, eq=False)

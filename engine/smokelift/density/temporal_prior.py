@@ -135,7 +135,7 @@ class BlendCarried:
 
         (loss_prior, optical_depth), (loss_carried, carried_optical_depth) = judged(prior), judged(moved)
         loss_before, _ = judged(before.density)
-        noise = float(np.sum(np.square(view.noise, dtype=np.float64)))
+        noise = float(np.sum(np.square(view.noise_left, dtype=np.float64)))
         amounts = self.largest * _skill(loss_carried, loss_prior + noise)
         share = self.largest * _skill(loss_carried, loss_before + noise)
         corrected = _with_optical_depth(prior, view, optical_depth, carried_optical_depth, amounts)
