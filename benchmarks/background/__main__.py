@@ -15,8 +15,7 @@ import numpy as np
 from benchmarks.background.clips import Smoke, cases
 from benchmarks.background.score import score
 from smokelift.footage.backdrop import find_backdrop
-from smokelift.footage.plate import Plates, known_plate
-from smokelift.footage.steady import without_noise_light
+from smokelift.footage.plate import Plates, known_plate, without_noise_light
 
 FIGURES = ("plate", "lost", "missed", "false", "unknown")
 

@@ -5,8 +5,7 @@ import numpy as np
 from benchmarks.background.clips import Case
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plates
-from smokelift.footage.steady import steady
+from smokelift.footage.plate import Plates, evened
 
 VISIBLE, CLEAR = 6.0, 0.5
 """8 bit codes of contrast from which smoke should be found, and up to which a pixel is clear."""
@@ -24,7 +23,7 @@ def score(case: Case, plates: Plates) -> dict[str, float]:
     the plate holds; ``missed``: visible smoke outside the matte; ``false``: clear pixels inside it; ``unknown``: share
     of the picture.
     """
-    clip = steady(case.clip, plates)
+    clip = evened(case.clip, plates)
     missed, false, errors, lost, smoke = [], [], [], 0.0, 0.0
     touched = np.zeros(case.clean.shape[1:3], np.bool_)
     unknown = 0.0

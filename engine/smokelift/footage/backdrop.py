@@ -31,9 +31,8 @@ from smokelift.footage.noise import (
     spread_about,
     white_noise,
 )
-from smokelift.footage.plate import Plate, Plates, known_plate
+from smokelift.footage.plate import Plate, Plates, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.steady import cleared, uncovered, without_noise_light
 from smokelift.footage.video import median_quantiser
 from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera

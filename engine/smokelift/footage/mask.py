@@ -2,7 +2,7 @@
 
 What a mask hides is neither smoke nor anything to learn from: a head, a dog, leaves, a label. There every frame is
 continued from around it, so that what looks at whole pictures meets nothing that moves, and no edge that stays. What
-counts pixels leaves these out (`Clip.seen`). Once the background is known, it takes their place (`steady.cleared`).
+counts pixels leaves these out (`Clip.seen`). Once the background is known, it takes their place (`plate.cleared`).
 
 A pixel is hidden or it is not: the mask's value, as it is stored, counts as the nearer of black and white. A frame that
 shows a part of its smoke only would be taken for one of thinner smoke, so that soft edges have no meaning here.

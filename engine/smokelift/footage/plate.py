@@ -1,11 +1,15 @@
-"""What a camera sees without smoke: one picture for the whole clip, or one for each frame."""
+"""What a camera sees without smoke: one picture for the whole clip, or one for each frame.
+
+Clips are brought to it here: to its exposure, and to the brightness of light without noise.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -15,10 +19,12 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
+    EIGHT_BIT_STEP,
     Noise,
     block_means,
     clipped_black,
     lasting_noise,
+    linear_excess,
     linear_per_srgb,
     noise_about,
     some_blocks,
@@ -28,9 +34,14 @@ CLIPPED_LEVEL = np.float32(0.1)
 """Lasting part of white noise that is clipped at black: so little is known of the mean that is left, since
 it depends on how the file rounds."""
 
-
 NOISE_FRAMES = 32
 """Frames on which the noise before a known background is measured: a median needs no more."""
+
+MIDDLE = np.full(3, 0.5, np.float32)
+"""sRGB values at which it is judged whether noise brightens a clip."""
+
+UNCOVERED = 5
+"""Frames whose median is shown where a mask hides all of them."""
 
 NO_NOISE = lasting_noise(0.0)
 """Noise of a plate before it is measured."""
@@ -204,3 +215,77 @@ def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
     The noise of the plate is even in sRGB values, so that it grows with brightness.
     """
     return plate.noise.total * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))
+
+
+def evened(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
+    """Return a clip whose frames are all exposed as their backgrounds are; ``known`` are gains (3,) by frame."""
+    gains_of = exposures(plates)
+
+    def gains(number: int, shown: Callable[[], Picture]) -> Picture:
+        return known[number] if number in known else gains_of(number, shown())
+
+    def balanced(number: int, picture: Picture) -> Picture:
+        return picture / gains(number, lambda: small(picture))
+
+    return clip.changed(balanced, lambda number, tiny: bool((gains(number, tiny) == 1).all()))
+
+
+def without_noise_light(clip: Clip, noise: Noise) -> Clip:
+    """Return a clip without the light that its noise adds to means (`linear_excess`).
+
+    A clip that is brightened by less than rounding to 8 bits may do is returned as it is. Before black too little is
+    taken off: the noise is measured where there is no smoke, and there it is clipped.
+    """
+    if (linear_excess(MIDDLE, noise.total) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
+        return clip
+
+    def lessened(_: int, picture: Picture) -> Picture:
+        return np.maximum(picture - linear_excess(linear_to_srgb(picture), noise.total), 0)
+
+    return clip.changed(lessened)
+
+
+def cleared(clip: Clip, plates: Plates) -> Clip:
+    """Return a clip that shows its background, as it is exposed, wherever a mask hides a frame."""
+    if clip.mask is None:
+        return clip
+    gains_of = exposures(plates)
+
+    def change(number: int, picture: Picture) -> Picture:
+        visible = clip.as_seen(number, picture)
+        hidden = np.isnan(visible)
+        return np.where(hidden, plates.at(number).image * gains_of(number, small(visible)), picture)
+
+    return clip.changed(change)
+
+
+def uncovered(plates: Plates, clip: Clip) -> Plates:
+    """Return backgrounds that show what a clip shows where a mask hides all of it, if nothing else tells what is there.
+
+    It is no smoke, so it may stand behind the result.
+    """
+    if clip.mask is None or not isinstance(plates, Plate):
+        return plates
+    numbers = clip.spread(UNCOVERED)
+    hidden = plates.confidence == 0
+    for number in numbers:
+        seen = clip.seen(number, *clip.size)
+        hidden = hidden if seen is None else hidden & ~seen
+    filmed, gains_of = clip.as_filmed(), exposures(plates)
+    shown = []
+    for number in numbers:
+        gains = gains_of(number, small(clip.as_seen(number, clip.frame(number))))
+        shown.append(filmed.frame(number)[hidden] / gains)
+    image = plates.image.copy()
+    image[hidden] = np.median(shown, axis=0)
+    return replace(plates, image=image)
+
+
+def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:
+    """Return what tells by how much a frame, by number and `small` picture, is brighter than its background, (3,)."""
+
+    @lru_cache(maxsize=1)
+    def still(plate: Plate) -> Picture:
+        return small(plate.image)
+
+    return lambda number, picture: gain_of(picture, still(plates.at(number)))

@@ -14,8 +14,7 @@ from smokelift.footage.exposure import small
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plates
-from smokelift.footage.steady import exposures, steady
+from smokelift.footage.plate import Plates, evened, exposures
 from smokelift.scene import Background, Camera
 from smokelift.scene.checks import Vector
 from smokelift.setup.thickness import seen_texture
@@ -126,7 +125,7 @@ def first_estimate(clip: Clip, camera: Camera | None, background: Background | N
     """Estimate what a clip shows; the parameters and errors are those of `find_backdrop`."""
     found = find_backdrop(clip, camera, background)
     samples = sample_smoke(found.clip, found.plates)
-    exposed = steady(found.clip, found.plates, samples.gains)
+    exposed = evened(found.clip, found.plates, samples.gains)
     fire, share = None, fire_share(samples.colours, samples.behind)
     if share:
         doused = without_fire(exposed, found.plates)

@@ -20,7 +20,7 @@ from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_video
-from smokelift.footage.steady import steady
+from smokelift.footage.plate import evened
 from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_remarks import backdrop_remarks
@@ -103,7 +103,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         background = scene.background
     found = find_backdrop(opened, camera, background)
     try:
-        shown = ShotView.before(scene.domain, steady(found.clip, found.plates), camera, found.plates)
+        shown = ShotView.before(scene.domain, evened(found.clip, found.plates), camera, found.plates)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]

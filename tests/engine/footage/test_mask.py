@@ -11,8 +11,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
 from smokelift.footage.mask import Mask
-from smokelift.footage.plate import Plate, known_plate
-from smokelift.footage.steady import cleared, uncovered
+from smokelift.footage.plate import Plate, cleared, known_plate, uncovered
 from smokelift.output.images import write_image
 from smokelift.output.video_file import write_video
 

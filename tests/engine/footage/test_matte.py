@@ -10,8 +10,7 @@ from scipy import ndimage
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
-from smokelift.footage.plate import Plate, known_plate
-from smokelift.footage.steady import without_noise_light
+from smokelift.footage.plate import Plate, known_plate, without_noise_light
 
 
 def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
