@@ -17,9 +17,9 @@ import numpy as np
 from smokelift.checks.array_types import Mask
 from smokelift.footage import camera_motion
 from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
-from smokelift.footage.behind_smoke import DETAIL
-from smokelift.footage.clear_picture import ClearPicture, clear_picture
+from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
+from smokelift.footage.continuation import DETAIL
 from smokelift.footage.given_background import given_plates
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.noise import (
@@ -34,7 +34,6 @@ from smokelift.footage.noise import (
 from smokelift.footage.plate import Plate, Plates, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import Proxy
 from smokelift.footage.video import median_quantiser
-from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera
 
 NOISE_FRAMES = 16

@@ -10,28 +10,26 @@ tell them apart:
   farthest from the smoke's.
 
 A pixel that only drifts is clear as well if it looks like its surroundings, or so unlike them that smoke would change
-more. What is left is continued by `behind_smoke`.
+more. What else no frame shows clear is continued smoothly from around it. Its detail is that of the frames' mean, with
+the contrast that the smoke takes from it given back. How wrong that is, is measured where the background is known.
+
+Which pixels are clear, and when, is as smooth in the picture as smoke is, so that a proxy tells it. `whole_plate` takes
+the background's detail from whole frames.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.behind_smoke import (
-    DRIFT,
-    ISLAND,
-    completed,
-    continuation_errors,
-    in_one_piece,
-    mostly_beside,
-    push_pull,
-    thin_rim,
-    unlike,
-)
-from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb, srgb_to_linear
+from smokelift.footage.clip import Clip
+from smokelift.footage.continuation import ISLAND, continuation_errors, in_one_piece, mostly_beside, push_pull
+from smokelift.footage.frame_source import Edges
+from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 from smokelift.footage.proxy import Proxy
@@ -64,12 +62,31 @@ FALSE_ALARM = 1e-3
 PRIOR_PAIRS = 4.0
 """Pairs of frames that the clip's share of like pairs counts for beside a pixel's own."""
 
+DRIFT = 8 / 255
+"""Change in sRGB values by a codec or by the light, at most."""
+
 LIKE_SURROUNDINGS = 3 * DRIFT
-"""Difference in sRGB values from what the surroundings let expect, of a background."""
+"""Difference in sRGB values from what the surroundings let expect, of a background (docs/experiments/background.md)."""
 
 MIN_CHANGE_SHARE = 1 / 4
-"""Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
-"""
+"""Range of smoke over time, as a share of its difference from the background, at least: what is steadier is a chair or
+a jacket."""
+
+DETAIL_QUANTILE = 0.95
+"""Quantile of the known background's detail that bounds that of the unknown; what is beyond it is smoke's."""
+
+MIN_TRANSMITTANCE = 0.2
+"""Light let through by the smoke from which the detail behind it can be distinguished from noise."""
+
+MIN_CONTRAST = 0.02
+"""Difference of the background from the smoke's brightness, in sRGB values, from which the mean tells how much of it
+the smoke lets through: noise and codecs change a mean by a code or two."""
+
+STEP = 2
+"""Every so manieth frame is read whole: half of those that are examined."""
+
+DETAIL_MARGIN = 16
+"""Pixels of the proxy around what is unknown whose detail bounds that of the unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +133,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     noise
         Of them.
     detail
-        Standard deviation of the Gaussian as of `behind_smoke.DETAIL`, in pixels.
+        Standard deviation of the Gaussian as of `DETAIL`, in pixels.
     """
     width = smoothing(noise)
     pictures, seen = proxy.pictures, proxy.seen
@@ -137,34 +154,27 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         image[band], known[band], calm[band], clear[:, band] = _clear_values(
             pictures[:, band], grey[:, band], window, smoke.similarity
         )
-    sure, known = _known(image, known, calm, clear | ~seen, brightens, window)
+    known = in_one_piece(known)
+    if not known.all():
+        # what only drifts is the background if it is so unlike its surroundings that smoke would change more
+        known = in_one_piece(known | (calm & (MIN_CHANGE_SHARE * _unlike(image, known) >= window + DRIFT)))
+        # or if it is like them: smoke hardly changes what has its colour
+        known = mostly_beside(in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
     never = ~seen.any(0)
     if never.any():
-        sure, known = sure & ~never, known & ~never
-        mean[never] = push_pull(linear_to_srgb(image), sure.astype(np.float32))[never]
+        known &= ~never
+        mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
-    whole, contrast = completed(image, known, sure, mean, smoke.brightness, brightens, detail)
-    return ClearPicture(whole, known, clear, contrast, continuation_errors(whole, sure))
+    whole, contrast = _completed(image, known, mean, smoke.brightness, brightens, detail)
+    return ClearPicture(whole, known, clear, contrast, continuation_errors(whole, known))
 
 
-def _known(image: Picture, known: Mask, calm: Mask, clear: Mask, brightens: Mask, window: float) -> tuple[Mask, Mask]:
-    """The pixels whose background is sure, and those where it is known, from those with a certain value."""
-    known = in_one_piece(known)
-    if known.all():
-        return known, known
-    # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
-    known = in_one_piece(known | (calm & (MIN_CHANGE_SHARE * unlike(image, known) >= window + DRIFT)))
-    if known.all():
-        return known, known
-    # or if it looks like them, too; that its difference is drift, and not faint smoke, is sure of a small one only
-    apart = unlike(image, known)
-    alike = (in_one_piece(known | (calm & (apart <= most))) for most in (DRIFT, LIKE_SURROUNDINGS))
-    # surroundings that are unknown themselves speak for nothing
-    sure, known = (mostly_beside(each, known) for each in alike)
-    thin = thin_rim(image, known, brightens, clear)
-    return sure & ~thin, known & ~thin
+def _unlike(image: Picture, known: Mask) -> Picture:
+    """By how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
+    encoded = linear_to_srgb(image)
+    return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
 
 def _smoke_of(grey: Picture, window: float) -> _Smoke:
@@ -254,3 +264,91 @@ def _clear_values(
         centre = np.where(inside, away, 0).sum(axis=0) / within
     value = np.einsum("tyxc,tyx->yxc", pictures, inside.astype(np.float32)) / within[..., None]
     return value.astype(np.float32), known, calm, inside
+
+
+def _completed(
+    image: Picture,
+    known: Mask,
+    mean: Picture,
+    brightness: float,
+    brightens: Mask,
+    finer_than: float,
+) -> tuple[Picture, Picture]:
+    """Return a linear plate with what is unknown filled in, and the ``contrast`` of `ClearPicture`.
+
+    ``mean`` is that of the samples in sRGB values. Smoke of transmittance T and brightness J shows J + T (B - J) of a
+    background B. The mean over time has T from its coarse part and that of the surroundings, and so what of its detail
+    is the background's.
+    """
+    if known.all():
+        return image, np.ones(known.shape, np.float32)
+    smooth = push_pull(linear_to_srgb(image), known.astype(np.float32))
+    coarse = blurred(mean, finer_than)
+    contrast = smooth.mean(-1) - brightness
+    seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > MIN_CONTRAST, contrast, np.inf)
+    detail = mean - coarse
+    most = np.quantile(np.abs(detail[known]), DETAIL_QUANTILE, axis=0) if known.any() else np.zeros(3, np.float32)
+    passed = np.clip(seen, MIN_TRANSMITTANCE, 1)
+    detail = np.clip(detail / passed[..., None], -most, most)
+    filled = smooth + np.where(seen > MIN_TRANSMITTANCE, 1, 0)[..., None] * detail
+    # smoke has drawn the pixel towards its own brightness, never away from it
+    beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
+    beyond -= np.clip(beyond, -DRIFT, DRIFT)
+    filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
+    filled = srgb_to_linear(np.maximum(filled, 0))
+    contrast = np.where(known, 1, np.where(seen > MIN_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
+    return np.where(known[..., None], image, filled), contrast
+
+
+def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -> Picture:
+    """Return a linear background (rows, columns, 3) of full size.
+
+    It is made of the frames of the clip's proxy, as they are exposed; each is brighter by its gain (3,) than the
+    background that was found of the proxy.
+    """
+    if found.image.shape[1::-1] == clip.size:
+        return found.image
+    shown = (found.clear & found.known)[::STEP]
+    known = shown.any(0)
+    whole = _mean(clip, proxy.numbers[::STEP], gains[::STEP], np.where(known, shown, True))
+    if known.all():
+        return whole
+    rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))
+    (top, down), (left, right) = (
+        (max(0, int(lines[0]) - DETAIL_MARGIN), min(n, int(lines[-1]) + 1 + DETAIL_MARGIN))
+        for lines, n in ((rows, known.shape[0]), (columns, known.shape[1]))
+    )
+    small = np.s_[top:down, left:right]
+    y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
+    part = np.s_[y[top] : y[down], x[left] : x[right]]
+    size = x[right] - x[left], y[down] - y[top]
+    mean = linear_to_srgb(whole[part])
+    detail = mean - area_average(area_average(mean, right - left, down - top), *size)
+    clearly = spread_out(known, clip.size)[part]
+    most = np.quantile(np.abs(detail[clearly]), DETAIL_QUANTILE, axis=0) if clearly.any() else np.zeros(3, np.float32)
+    detail = np.clip(detail * spread_out(found.contrast, clip.size)[part][..., None], -most, most)
+    filled = srgb_to_linear(np.maximum(area_average(linear_to_srgb(found.image[small]), *size) + detail, 0))
+    whole[part] = np.where(clearly[..., None], whole[part], filled)
+    return whole
+
+
+def spread_out(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return values (rows, columns) of small pixels at those of a picture of a width and a height."""
+    rows, columns = (np.diff(_edges(*sizes)) for sizes in zip(values.shape, size[::-1], strict=True))
+    return np.repeat(np.repeat(values, rows, axis=0), columns, axis=1)
+
+
+def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[np.bool_]) -> Picture:
+    """The linear mean of whole frames of a file over the times at which they are ``shown``, of pixels of the proxy."""
+    file, width, height = clip.whole(), *clip.size
+    down, across = (_edges(*each) for each in zip(shown.shape[1:], (height, width), strict=True))
+    total = np.zeros((height, width, 3), np.float32)
+    times = shown.sum(0, dtype=np.float32)[..., None]
+    for number, gain, clear in zip(numbers, gains, shown, strict=True):
+        file.stored(number).add_weighted(clear[..., None] / (gain * times), (down, across), total)
+    return total
+
+
+def _edges(count: int, pixels: int) -> Edges:
+    """Where each of so many parts of a line of pixels begins, and the end of the last."""
+    return np.asarray(-(-np.arange(count + 1) * pixels // count), np.int32)

@@ -36,7 +36,7 @@ MEDIAN_OF_BLOCK = 0.955
 freedom as 14.5 that are independent, k, and the median of chi-squared is 1 - 2 / (9 k) of its mean, cubed."""
 
 LARGEST_LASTING = np.float32(4 / 255)
-"""Lasting noise at most, in sRGB values: a codec's changes are up to twice as large (`behind_smoke.DRIFT`)."""
+"""Lasting noise at most, in sRGB values: a codec's changes are up to twice as large (`clear_picture.DRIFT`)."""
 
 SPREAD_SAMPLES, SPREAD_ROUNDS = 50_000, 25
 """Deviations that tell a spread, at most, and rounds in which it settles to a hundredth."""

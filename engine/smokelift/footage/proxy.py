@@ -23,7 +23,7 @@ from smokelift.footage.mask import Seen
 from smokelift.footage.noise import some_blocks
 
 PROXY_SIDE = 480
-"""Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred
+"""Pixels along the longer side: the lengths in pixels of `clear_picture` hold at some hundred
 (docs/experiments/background.md)."""
 
 FRAMES = 32

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.footage.behind_smoke import continuation_errors, in_one_piece, mostly_beside, push_pull, thin_rim, unlike
+from smokelift.footage.continuation import continuation_errors, in_one_piece, mostly_beside, push_pull
 
 HEIGHT, WIDTH = 40, 60
 COLOUR = np.array([0.3, 0.2, 0.1], np.float32)
@@ -35,31 +35,12 @@ def test_a_slope_goes_on_behind_what_is_unknown() -> None:
     assert (np.diff(continued[20, 20:40, 0]) > -0.02).all()
 
 
-def test_what_differs_from_its_surroundings_is_told() -> None:
-    image = np.full((HEIGHT, WIDTH, 3), 0.3, np.float32)
-    image[16:24, 26:34] = 0.6
-    apart = unlike(image, hole())
-    assert apart[16:24, 26:34].min() > 0.2
-    assert apart[12:15, 20:25].max() < 1e-3
-
-
 def test_what_most_of_a_square_shows_is_its_median() -> None:
     known = ndimage.gaussian_filter(np.random.default_rng(0).random((40, 60)), 2) > 0.5
     smooth = ndimage.median_filter(known.astype(np.uint8), 7) > 0
     islands, count = ndimage.label(smooth)
     large = [n for n in range(1, count + 1) if (islands == n).mean() > 0.01]
     assert np.array_equal(in_one_piece(known), np.isin(islands, large))
-
-
-def test_a_patch_counts_if_it_borders_on_more_that_is_known() -> None:
-    known = hole()
-    grown = known.copy()
-    grown[12:15, 20:40] = True  # along the upper rim
-    grown[20:23, 28:31] = True  # amid the unknown
-    kept = mostly_beside(grown, known)
-    assert kept[12:15, 20:40].all()
-    assert not kept[20:23, 28:31].any()
-    assert kept[known].all()
 
 
 def bricks(deviation: float) -> np.ndarray:
@@ -87,20 +68,12 @@ def test_errors_are_along_the_walls_colour_and_as_large_as_behind_the_smoke() ->
     np.testing.assert_array_equal(continuation_errors(wall, known), continuation_errors(wall * known[..., None], known))
 
 
-def test_thin_smoke_at_the_rim_is_told_from_a_bright_wall() -> None:
-    """Smoke that never leaves has bright rims: the one where it never leaves the neighbourhood either is smoke."""
-    rows, columns = np.mgrid[:120, :90]
-    smoke = columns < 20
-    bright = (columns >= 20) & (columns < 32) & (rows % 40 < 24)
-    image = np.where(bright[..., None], 0.3, 0.2).astype(np.float32).repeat(3, -1)
-    image[80:] = np.where(bright[80:, :, None], 0.1, 0.2)
-    clear = np.repeat(~smoke[None], 4, axis=0)
-    clear[2, 36:76] = True
-    thin = thin_rim(image, ~smoke, np.ones_like(smoke), clear)
-    near = np.s_[20:26]
-    assert thin[4:20, near].all()
-    assert not thin[44:60, near].any()
-    assert not thin[84:100, near].any()
-    assert not thin[:, 32:].any()
-    darkens = np.zeros_like(smoke)
-    assert thin_rim(image, ~smoke, darkens, clear)[84:100, near].all()
+def test_a_patch_counts_if_it_borders_on_more_that_is_known() -> None:
+    known = hole()
+    grown = known.copy()
+    grown[12:15, 20:40] = True  # along the upper rim
+    grown[20:23, 28:31] = True  # amid the unknown
+    kept = mostly_beside(grown, known)
+    assert kept[12:15, 20:40].all()
+    assert not kept[20:23, 28:31].any()
+    assert kept[known].all()

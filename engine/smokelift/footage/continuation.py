@@ -1,0 +1,97 @@
+"""Pictures of which a part is unknown: continued from what is known around it, and how wrong that is."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from smokelift.checks.array_types import Mask
+from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
+
+DETAIL = 4.0
+"""Standard deviation in pixels of the Gaussian above which a background's detail is finer than that of smoke."""
+
+ISLAND = 0.01
+"""Share of the picture up to which what seems clear is taken for an accident."""
+
+SPECK = 7
+"""Pixels along the square whose median a pixel is taken to be."""
+
+SHIFTS = (-1 / 2, -1 / 3, -1 / 6, 1 / 6, 1 / 3, 1 / 2)
+"""Where the outline of the unknown is laid on what is known, to the right, in widths of the picture."""
+
+
+def push_pull(image: Picture, confidence: Picture) -> Picture:
+    """Blend pixels of low confidence with the smooth continuation of their surroundings.
+
+    The push-pull algorithm (Gortler et al., "The lumigraph", 1996): averages weighted by confidence over ever larger
+    blocks; each level keeps what it knows and takes the rest from the next coarser one.
+    """
+    height, width = confidence.shape
+    weight: Picture = confidence[..., None]
+    if max(height, width) == 1 or float(confidence.min()) >= 1.0:
+        return image
+    small_size = ((width + 1) // 2, (height + 1) // 2)
+    total = area_average(weight, *small_size)
+    mean = area_average(image * weight, *small_size) / np.maximum(total, 1e-6)
+    # A block of which a quarter is known is known: its mean is as good as any.
+    coarse = push_pull(mean, np.minimum(4.0 * total[..., 0], 1.0))
+    blend: Picture = image * weight + area_average(coarse, width, height) * (np.float32(1.0) - weight)
+    return blend
+
+
+def continuation_errors(image: Picture, known: Mask) -> Picture:
+    """Return the covariance (3, 3) of the colours' errors where a linear picture is continued from what is known.
+
+    The outline of the unknown is laid on what is known, which is continued there as if it were unknown. The mean error
+    is not taken off: it says nothing of that behind the smoke (docs/experiments/disturbed-clips.md). 0 where nothing is
+    unknown, or so much that nothing can be left out.
+    """
+    if known.all():
+        return np.zeros((3, 3), np.float32)
+    encoded = linear_to_srgb(image)
+    total, count = np.zeros((3, 3)), 0
+    for shift in SHIFTS:
+        left_out = known & _moved(~known, round(shift * known.shape[1]))
+        if left_out.mean() < ISLAND:
+            continue
+        continued = srgb_to_linear(push_pull(encoded, (known & ~left_out).astype(np.float32)))
+        error = np.where(left_out[..., None], continued - image, 0)
+        share = blurred(left_out.astype(np.float32), DETAIL)[left_out]
+        coarse = blurred(error, DETAIL)[left_out] / share[:, None]
+        total += coarse.T.astype(np.float64) @ coarse
+        count += len(coarse)
+    return (total / max(count, 1)).astype(np.float32)
+
+
+def in_one_piece(known: Mask) -> Mask:
+    """Without specks: a clear island amid smoke, or an unknown one amid the clear, is an accident of the samples."""
+    # the median of a square: what most of its pixels are
+    down = ndimage.correlate1d(known.astype(np.uint8), np.ones(SPECK), 0)
+    smooth = ndimage.correlate1d(down, np.ones(SPECK), 1) > SPECK**2 // 2
+    islands, count = ndimage.label(smooth)
+    large = np.bincount(islands.ravel(), minlength=count + 1) > ISLAND * known.size
+    large[0] = False
+    return np.asarray(large[islands])
+
+
+def mostly_beside(grown: Mask, known: Mask) -> Mask:
+    """Without patches that were added to what is known but border on less of it than of what stays unknown."""
+    patches, count = ndimage.label(grown & ~known, structure=np.ones((3, 3)))
+    beside = np.zeros(count + 1)
+    for along, across in ((patches, grown), (patches.T, grown.T)):
+        for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[1:], np.s_[:-1])):
+            border = (along[one] > 0) & (along[other] == 0)
+            sides = np.where(across[other][border], 1, -1)
+            beside += np.bincount(along[one][border], sides, count + 1)
+    return np.asarray(grown & (beside >= 0)[patches])
+
+
+def _moved(mask: Mask, right: int) -> Mask:
+    """A mask (rows, columns) moved to the right, with nothing where it comes from."""
+    moved = np.zeros_like(mask)
+    if right >= 0:
+        moved[:, right:] = mask[:, : mask.shape[1] - right]
+    else:
+        moved[:, :right] = mask[:, -right:]
+    return moved
