@@ -152,7 +152,7 @@ def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
     plate = Plate(area_average(linear, width, height), np.ones((height, width), np.float32), NO_NOISE)
-    deviations, blocks = _deviations(plate, clip)
+    deviations, blocks = _noise_samples(plate, clip)
     given = linear_to_srgb(plate.image)
     raised = np.maximum(given, clipped_black(deviations, blocks)) - given
     if not raised.any():
@@ -191,10 +191,10 @@ def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
         return Plate(area_average(plates.frame(clip.first + frame), width, height), known, NO_NOISE)
 
     silent = ChangingPlate(of, NO_NOISE, plates.files)
-    return replace(silent, noise=noise_about(*_deviations(silent, clip)))
+    return replace(silent, noise=noise_about(*_noise_samples(silent, clip)))
 
 
-def _deviations(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
+def _noise_samples(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
     """How a clip differs from backgrounds that are known, as `noise_about` takes it; NaN where a mask hides it."""
     single, blocks = [], []
     encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # of a camera that stands still, once
