@@ -172,7 +172,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:
-    """By how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
+    """Difference (rows, columns) of a linear picture from what is known around, in grey sRGB values."""
     encoded = linear_to_srgb(image)
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
