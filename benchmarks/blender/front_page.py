@@ -1,7 +1,7 @@
 """Make the picture of the front page, docs/blender_render.png: ``python -m benchmarks.blender.front_page SEQUENCE``.
 
 It takes a Python with bpy, and a sequence of the example:
-``smokelift reconstruct examples/plume/scene.toml --quality fine --frames 25:36 --out SEQUENCE``.
+``smokelift reconstruct examples/plume/scene.toml --quality final --frames 25:36 --out SEQUENCE``.
 """
 
 from __future__ import annotations
