@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
+from smokelift.density.coarser_grid import (
+    MIN_COARSENED_VOXELS,
+    any_of_two,
+    every_second,
+    spread_to_two,
+    with_neighbours,
+)
 from smokelift.density.hull import Places, centres_of, project_voxels
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth

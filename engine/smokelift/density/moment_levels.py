@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two
+from smokelift.density.coarser_grid import MIN_COARSENED_VOXELS, any_of_two
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import Observation, ObservedView, ViewSet
 from smokelift.density.temporal_prior import TINY

@@ -19,7 +19,7 @@ import numpy as np
 import psutil
 import scipy.fft
 
-from smokelift.density.halves import MIN_COARSENED_VOXELS
+from smokelift.density.coarser_grid import MIN_COARSENED_VOXELS
 from smokelift.report.workload import Workload
 
 Resolution = tuple[int, int, int]

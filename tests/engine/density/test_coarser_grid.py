@@ -4,7 +4,7 @@ import numpy as np
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.density.halves import any_of_two, every_second, spread_to_two, with_neighbours
+from smokelift.density.coarser_grid import any_of_two, every_second, spread_to_two, with_neighbours
 
 ODD = (5, 4, 7)
 
