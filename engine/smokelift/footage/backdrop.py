@@ -17,9 +17,9 @@ import numpy as np
 from smokelift.checks.array_types import Mask
 from smokelift.footage import camera_motion
 from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
+from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
-from smokelift.footage.continuation import DETAIL
 from smokelift.footage.given_background import given_plates
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.noise import (

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.continuation import DETAIL
+from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.images import (
     Picture,
     area_average,
