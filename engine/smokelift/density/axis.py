@@ -29,8 +29,6 @@ class SmokeAxis:
         Standard deviation (m) of the depth over several columns that are known to stand behind one another.
     widths : (n, m)
         Lateral standard deviation (m) of the column that shows there, of several; zero of a single one.
-    enclosed
-        Whether all smoke that is seen is known to be inside the domain, as one that is given says.
     """
 
     heights: Doubles
@@ -38,7 +36,6 @@ class SmokeAxis:
     depths: Doubles
     spreads: Doubles
     widths: Doubles
-    enclosed: bool = False
 
     @staticmethod
     def by_height(heights: Doubles, depths: Doubles) -> SmokeAxis:

@@ -106,10 +106,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     if scene.views:
         return replace(shot, remarks=(*shot.remarks, *disagreement(shot)))
     place = clip_axis(shot, settings.distance) if settings.method == "default" else None
-    if place is None:
-        return shot
-    place = replace(place, axis=replace(place.axis, enclosed=scene.domain is not None))
-    return replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
+    return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
 
 
 def place_estimate(place: AxisEstimate) -> Estimate[str]:

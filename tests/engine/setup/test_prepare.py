@@ -258,7 +258,6 @@ def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
     assert known.place is not None and known.place.cue == "distance"
     assert known.place.depth == pytest.approx(0.1, abs=0.05)
     assert known.estimates[-1].source == "given"
-    assert all(shot.place is not None and shot.place.axis.enclosed for shot in (found, marked, known))
     blank = shot_of(blind, Settings.preset(draft.quality, method="paper"))
     assert blank.place is None
     assert "axis depth" not in [choice.what for choice in blank.estimates]
@@ -277,7 +276,6 @@ def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings)
             ahead = (np.array(shot.scene.domain.centre) - shot.scene.camera.position) @ view_frame(shot.scene.camera)[1]
             assert ahead == pytest.approx(distance, rel=1e-3)
             assert shot.place is not None and shot.place.depth == pytest.approx(0, abs=0.02 * distance)
-            assert not shot.place.axis.enclosed
         sizes = [np.subtract(shot.scene.domain.max, shot.scene.domain.min) for shot in (near, far)]
         np.testing.assert_allclose(sizes[1], 2 * sizes[0], rtol=0.05)
 
