@@ -15,20 +15,20 @@ from smokelift.scene import Camera, Domain
 
 @dataclass(frozen=True, eq=False)
 class SmokeAxis:
-    """How far behind the domain's centre the middle of the smoke is, at the places of the upright screen through it.
+    """How far behind the domain's centre the middle of the smoke is, on the upright screen through the centre.
 
     Attributes
     ----------
     heights : (n,)
-        In metres above the domain's centre, ascending, along `view_frame`'s height.
+        Metres above the centre, ascending, along `view_frame`'s height.
     laterals : (m,)
-        In metres from the domain's centre, ascending, along its lateral direction; one where there is one column.
+        Metres from the centre, ascending, along its lateral direction; one where there is one column.
     depths : (n, m)
-        In metres along its depth, away from the camera.
+        Metres away from the camera, along its depth direction.
     spreads : (n, m)
-        Standard deviation (m) of the depth over several columns that are known to stand behind one another.
+        Standard deviation (m) of the depth over the columns that stand behind one another.
     widths : (n, m)
-        Lateral standard deviation (m) of the column that shows there, of several; zero of a single one.
+        Lateral standard deviation (m) of the column that shows there, if there are several; else zero.
     """
 
     heights: Doubles
@@ -67,12 +67,9 @@ class SmokeAxis:
 
 
 def depth_at(distance: float, camera: Camera, domain: Domain) -> float:
-    """How far behind the domain's centre (m) is what stands at a level distance (m) ahead of a camera.
+    """Depth (m behind the domain's centre) of what stands at a level distance (m) ahead of a camera.
 
-    Raises
-    ------
-    ValueError
-        If it is outside the domain.
+    It raises ValueError outside the domain.
     """
     along = view_frame(camera)[1]
     middle = float((np.array(domain.centre) - np.array(camera.position)) @ along)
@@ -91,18 +88,10 @@ Cue = Literal["box", "floor contact", "inlets", "distance"]
 
 @dataclass(frozen=True, eq=False)
 class AxisEstimate:
-    """An axis, and how well it is known.
+    """An axis, the cue that shows it, and how well it is known.
 
-    Attributes
-    ----------
-    axis
-        Its posterior mean.
-    cue
-        What shows it.
-    depth
-        Mean depth (m behind the domain's centre) of smoke that stands on it.
-    deviation
-        Standard deviation (m) of the mean depth's error.
+    `axis` is the posterior mean, `depth` the mean depth (m behind the domain's centre) of smoke that stands on it, and
+    `deviation` the standard deviation (m) of that depth's error.
     """
 
     axis: SmokeAxis

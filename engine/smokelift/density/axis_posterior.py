@@ -1,15 +1,14 @@
 """Where in depth the smoke stands: a posterior over the depth of its base, to which each cue adds a log-likelihood.
 
-One picture of smoke looks the same whether the smoke is near and small or far and large. Its place comes from
+One picture of smoke looks the same whether the smoke is near and small or far and large. Three cues show its place:
 
 - the box, which is put around its smoke: the mean depth is normal about its middle;
-- the base, where a column begins: its distance or a marked inlet gives its depth, else its contact with the floor
-  shows it;
-- the way up: a column is upright or leans, and one that comes back to the middle across the picture does so in depth.
-  What drifts across the picture drifts as far in depth, nobody knows where to: there the box alone speaks.
+- the base, where a column begins: a given distance or a marked inlet says its depth, else its contact with the floor;
+- the way up: a column is upright or leans. One that comes back to the middle across the picture does so in depth. One
+  that drifts across the picture drifts as far in depth, but nobody knows where to: there the box alone speaks.
 
-Several cameras need none of it: `depth_prior` reads the axis from what they have in common.
-docs/experiments/density-axis.md has what the cues are worth; it chose the constants of this page that cite no other.
+Several cameras need none of them: `depth_prior` reads the axis from what they have in common.
+docs/experiments/density-axis.md has the worth of each cue. It chose the constants of this page that cite no other.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ MAX_VOXELS = 512
 (docs/experiments/axis-uncertainty.md)."""
 
 CANDIDATES = 121
-"""Number of depths that are compared, from the front of the box to its back: 60 to a reach (half the box's depth), so
+"""Number of depths that are compared, from the front of the box to its back: 60 to a reach (half the box's depth). So
 `UPRIGHT_DEVIATION`, the narrowest of all, is three steps."""
 
 BOX_DEVIATION = 0.165
@@ -44,12 +43,12 @@ BOX_DEVIATION = 0.165
 (docs/experiments/axis-uncertainty.md)."""
 
 BOX_COUNT = 2.0
-"""Number of boxes that `BOX_DEVIATION` counts as, beside the one at hand, which shows how far off its middle the smoke
-is across the picture (docs/experiments/axis-uncertainty.md)."""
+"""Number of boxes that `BOX_DEVIATION` counts as. The box at hand counts as one more, by how far off its middle the
+smoke is across the picture (docs/experiments/axis-uncertainty.md)."""
 
 MAX_KNOWN_DEVIATION = 0.95
-"""Largest standard deviation of a depth that counts as determined by a floor contact, over that of the depth by the box
-alone: a contact that leaves about as much spread as the box shows nothing."""
+"""Largest standard deviation of a depth that a floor contact determines, over that by the box alone. A contact that
+leaves about as much spread as the box shows nothing."""
 
 MIN_CONTACT_SHARE = 0.6
 """Smallest share of the frames that show a floor contact where there is one."""
@@ -73,24 +72,19 @@ LEANING_DEVIATION = 0.5
 """Standard deviation, in reaches, of that distance for a column that leans, across the picture and in depth."""
 
 WIDENING = 0.15
-"""Growth of a column's radius per metre on its way up, by the air that it takes in
-(docs/experiments/density-columns.md)."""
+"""Growth of a column's radius per metre of height: it takes in air (docs/experiments/density-columns.md)."""
 
 INERTIA = 0.5
-"""Weight of a column's place in the row below, in shares of its smoke: other smoke there may not be its own
+"""Weight of a column's place in the row below, in shares of its smoke: other smoke in a row may not be its own
 (docs/experiments/density-columns.md)."""
 
 
 def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate | None:
-    """The axis of a clip's smoke; None where there is none, where a camera travels, or where there are several.
+    """The axis of a clip's smoke; None where there is no smoke, or a camera that travels, or more than one.
 
-    What a camera that turns in its place sees is put into its middle picture. For one that travels the axis is known
-    only where the ``distance`` (m) is given at which the smoke stands ahead of it: that of its first picture.
-
-    Raises
-    ------
-    ValueError
-        If what stands at the distance is outside the box.
+    The pictures of a camera that turns in its place are put into its middle picture. For one that travels the axis is
+    known only by ``distance``: how far (m) ahead of the camera of its first picture the smoke stands. It raises
+    ValueError if what stands there is outside the box.
     """
     moments = [observations for frame in clip.spread(FRAMES) if (observations := clip.observe(frame))]
     if not moments or len(moments[0]) > 1:
@@ -127,16 +121,9 @@ def estimate_axis(
 ) -> AxisEstimate:
     """The axis of the smoke in some frames; the middle of the box where nothing else is known.
 
-    Parameters
-    ----------
-    amounts : sequence of (rows, columns)
-        Optical depths that a camera which stands still sees, 0 where there is no smoke.
-    camera, domain
-        The camera and the box.
-    inlets
-        Where smoke is known to enter; else a floor contact is searched for.
-    base
-        Depth (m) at which the one column is known to stand; then neither counts.
+    ``amounts`` are the optical depths (rows, columns) that a camera at rest sees, 0 where there is no smoke. Smoke
+    enters at the inlets; without any a floor contact is searched for. ``base`` is the depth (m) at which the one column
+    is known to stand; neither counts then.
     """
     screens = [screen for amount in amounts if (screen := upright_screen(amount, camera, domain)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
@@ -185,11 +172,11 @@ class _Column:
     Attributes
     ----------
     base : (k,)
-        Log-likelihood of the depths of its base.
+        Log-likelihood of each depth of its base.
     begins
-        Height (m above the domain's centre) of the base.
+        Height (m above the domain's centre) of its base.
     middles, widths, drifts : (n,)
-        By height, lateral place (m) of its axis, lateral standard deviation, and distance of its axis from its base.
+        By height: lateral place (m) of its axis, its lateral standard deviation, distance of its axis from its base.
     """
 
     base: Doubles
@@ -233,7 +220,7 @@ def _floor_column(
 ) -> list[_Column]:
     """The column that stands on the floor; none where too few of the frames show a contact.
 
-    A disc of smoke on the floor begins in the picture where the ray through the floor meets it, within a few rows. What
+    A disc of smoke on the floor begins in the picture within a few rows, where the ray through the floor meets it. What
     begins nearer and above the floor shows the same.
     """
     eye, (_, along, height) = np.array(camera.matrix, np.float64)[:3, 3], view_frame(camera)
@@ -261,7 +248,7 @@ def _floor_contact(
 ) -> tuple[float, float, float] | None:
     """Depth and lateral width (m) of the floor contact in one frame, and the height (m) of its lower end; if any.
 
-    The camera is a distance (m) before the middle of the box and so far above its floor.
+    ``distance`` is how far the camera is before the middle of the box, ``above`` how far above its floor (m).
     """
     reach = reach_along(domain, view_frame(camera)[1])
     # depth of the floor that one row of the picture shows
@@ -288,8 +275,8 @@ def _inlet_columns(
 ) -> list[_Column]:
     """The columns above inlets, followed upwards in the mean picture where there are several.
 
-    In every row the smoke is shared out among the columns that have begun (a mixture of Gaussians, by expectation
-    maximisation), each expected where it was in the row below and as wide as a rising column becomes; were the widths
+    The smoke of each row is shared out among the columns that have begun: a mixture of Gaussians, by expectation
+    maximisation. Each is expected where it was in the row below, as wide as a rising column becomes. Were the widths
     free, one column would swallow the others.
     """
     lateral, along, up = view_frame(camera)
@@ -312,12 +299,12 @@ def _inlet_columns(
 
 
 def _likelihood(places: Doubles, middles: Doubles, widths: Doubles) -> Doubles:
-    """Likelihood of columns where there is smoke at some lateral places; never quite zero."""
+    """Likelihood of columns at some lateral places with smoke; never quite zero."""
     return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
 
 
 def _axis(columns: Sequence[_Column], known: Sequence[Doubles], mean: Screen) -> SmokeAxis:
-    """The axis of columns by their depths (n,); where several may hold the smoke at a place, their mean."""
+    """The axis of columns whose depths (n,) are known; their mean where several may hold the smoke."""
     if len(columns) == 1:
         return SmokeAxis.by_height(mean.heights, known[0])
     # below all columns there is the lowest one

@@ -1,4 +1,4 @@
-"""What a clip shows of its smoke's texture: along which axis it travels, and how its patches are distributed."""
+"""The texture of a clip's smoke: along which axis it travels, and how its patches are distributed."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ from smokelift.density.turntable import Turntable
 from smokelift.scene import Camera, Domain
 
 FRAMES = 12
-"""Frames at most, spread over the clip, whose patches are taken: a thousand each are enough of a scale."""
+"""Frames at most, spread over the clip, whose patches are taken: a thousand of each are enough for a scale."""
 
 SMOOTHING = 1.5
-"""Standard deviation (voxels) of the blur before the drift is measured, which a difference quotient asks for."""
+"""Standard deviation (voxels) of the blur before the drift is measured: a difference quotient needs it."""
 
 ACROSS = 6.0
-"""Width of a row's smoke in its standard deviations: three to either side of its middle hold all but 0.3 % of a
-Gaussian profile."""
+"""Width of a row's smoke in its standard deviations: three to either side hold all but 0.3 % of a Gaussian profile."""
 
 VOXEL = 12**-0.5
-"""Standard deviation (voxels) of smoke that fills one voxel: none is narrower, a thread of single pixels either."""
+"""Standard deviation (voxels) of smoke that fills one voxel: the smallest, even for a thread of single pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +36,15 @@ class ClipTexture:
     Attributes
     ----------
     turntable
-        Before the input's camera; it turns about the smoke's own axis: what is seen on the way about it looks alike.
+        Before the input's camera. It turns about the smoke's own axis: what is seen on the way about it looks alike.
     exemplars
-        Of the scales, the coarsest first. Its patches are as wide as the smoke.
+        One a scale, the coarsest first; the coarsest's patches are as wide as the smoke.
     width
         Standard deviation of the smoke across the axis, in voxels.
     drift
         Mean motion of the pictures along the axis, in voxels a frame.
     roughness
-        Of the octaves of `StretchedNoise`.
+        Strength of each octave of `StretchedNoise`.
     """
 
     turntable: Turntable
@@ -56,7 +55,7 @@ class ClipTexture:
 
     @staticmethod
     def of(clip: ObservedClip) -> ClipTexture | None:
-        """Measure the texture of frames of a clip; None if none shows smoke."""
+        """Measure the texture of some frames of a clip; None if none shows smoke."""
         frames, domain = clip.spread(FRAMES), clip.optics.domain
         # each frame is read once, the ones that follow for the motion alone
         needed = sorted({number + ahead for number in frames for ahead in (0, 1) if number + ahead < clip.length})
@@ -95,7 +94,7 @@ class _Shown(NamedTuple):
 
 
 def _seen(clip: ObservedClip, number: int) -> list[tuple[Camera, NDArray[np.float32]]]:
-    """Cameras and the optical depths (rows, columns) that they saw in a frame, the input's first."""
+    """Cameras of a frame, the input's first, and the optical depths (rows, columns) that they saw."""
     views = [ObservedView.of(observation, clip.optics) for observation in clip.observe(number)]
     return [(view.camera, view.optical_depth) for view in views]
 
@@ -103,7 +102,7 @@ def _seen(clip: ObservedClip, number: int) -> list[tuple[Camera, NDArray[np.floa
 def _on_screens(
     seen: Sequence[tuple[Camera, NDArray[np.float32]]], domain: Domain, axis: int | None = None
 ) -> list[_Shown]:
-    """What cameras saw, on screens of an axis of the grid or of their own height; only pictures that show smoke."""
+    """Pictures that show smoke, on screens of an axis of the grid or of their own height."""
     found = []
     for camera, optical_depth in seen:
         if optical_depth.any():
@@ -117,8 +116,8 @@ def _on_screens(
 def _motion(pairs: Sequence[tuple[Sequence[_Shown], Sequence[_Shown]]]) -> NDArray[np.float64]:
     """Mean motion across and along the axis, in voxels a frame, that explains most of the change between frames.
 
-    It is the least squares solution of p' - p + u . grad p = 0 over pairs of frames that follow each other, of the
-    input's pictures, compressed and smoothed.
+    It is the least squares solution of p' - p + u . grad p = 0 over pairs of successive pictures of the input,
+    compressed and smoothed.
     """
     normal, change = np.zeros((2, 2)), np.zeros(2)
     for pair in pairs:
@@ -131,7 +130,7 @@ def _motion(pairs: Sequence[tuple[Sequence[_Shown], Sequence[_Shown]]]) -> NDArr
 
 
 def _width(picture: Picture) -> float:
-    """Standard deviation (columns) of a picture's smoke in its rows, which count by their smoke."""
+    """Standard deviation (columns) of a picture's smoke about the middle of its row."""
     columns, amounts = np.arange(len(picture)), np.maximum(picture.sum(0), 1e-30)
     middles = columns @ picture / amounts
     return float(np.sqrt(np.sum(picture * (columns[:, None] - middles) ** 2) / picture.sum()))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MIN_COARSENED_VOXELS = 1_000_000
-"""Voxels that may hold smoke, above which a grid has a coarser one (docs/experiments/clip-pixels.md)."""
+"""Voxels that may hold smoke above which a grid has a coarser one (docs/experiments/clip-pixels.md)."""
 
 
 def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -20,20 +20,20 @@ def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def spread_to_two(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Mark all voxels of a grid (shape) that those of one half as fine are made of."""
+    """Mark the voxels of a grid (shape) that the marked ones of a grid half as fine are made of."""
     x, y, z = (slice(0, count) for count in shape)
     return voxels.repeat(2, 0).repeat(2, 1).repeat(2, 2)[x, y, z]
 
 
 def every_second(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Mark the first voxel of a grid (shape) of each that one half as fine marks."""
+    """Mark the first voxel of a grid (shape) in each that is marked on a grid half as fine."""
     result = np.zeros(shape, np.bool_)
     result[::2, ::2, ::2] = voxels
     return result
 
 
 def with_neighbours(voxels: NDArray[np.bool_], *, corners: bool = False) -> NDArray[np.bool_]:
-    """Mark the six voxels beside each marked one as well, with corners all 26: a fast `ndimage.binary_dilation`."""
+    """Mark the six voxels beside each marked one too, with corners all 26: a fast `ndimage.binary_dilation`."""
     result = voxels.copy()
     for axis in range(3):
         lead = (slice(None),) * axis

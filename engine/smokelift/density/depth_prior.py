@@ -1,11 +1,11 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
 `RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `DetailedDepth`, gives it
-detail (`detailed_depth`). It spreads the smoke of one picture about an axis that comes from the whole clip, first as
+detail (`detailed_depth`). It spreads the smoke of one picture about an axis that comes from the whole clip: first as
 much as explains the picture without shadows, then as much as explains it in the shadows that this casts. With several
-pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical
-depth of the view that shows most there. It need not look like any picture: the multiplicative fit scales ray by ray,
-and keeps of it only how the smoke of one ray relates to that of another.
+pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical depth of the
+view that shows most there. This density need not look like any picture: the multiplicative fit scales it ray by ray and
+keeps only how the smoke of one ray relates to that of another.
 """
 
 from __future__ import annotations
@@ -36,40 +36,27 @@ from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
 
 MIN_SHAPE = 0.05
-"""Smallest share of its peak that a profile has inside the hull of several views: another one may see smoke there
+"""Smallest share of its peak that a profile has inside the hull of several views, as another view may see smoke there
 (docs/experiments/density-profile.md)."""
 
 
 class Detail(Protocol):
-    """What makes up detail that no camera shows.
+    """Detail that no camera shows, made up.
 
-    Attributes
-    ----------
-    smooth : (nx, ny, nz) float32
-        A density that shows about what the pictures do, without it.
+    `smooth` (nx, ny, nz) is the density without it, which shows about what the pictures do.
     """
 
     @property
     def smooth(self) -> Volume: ...
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
-        """Return a density (nx, ny, nz) with detail, as far as the cameras' pictures allow.
+        """Add detail to a density (nx, ny, nz), zero outside the hull, as far as the cameras' pictures allow.
 
-        Parameters
-        ----------
-        density : (nx, ny, nz)
-            Zero outside the hull.
-        cameras
-            Terms of the cameras' pictures.
-        fresh
-            Whether nothing of it is carried on from the frame before.
+        ``fresh`` says that nothing of the density is carried on from the frame before.
         """
 
     def amounts(self, density: Volume) -> NDArray[np.float32]:
-        """Return what the smooth answer decides of a density, (n,) at the voxels that may hold smoke.
-
-        The density (nx, ny, nz) is blurred over lobes, which are detail.
-        """
+        """What the smooth answer decides of a density: its blur over lobes, (n,) at the voxels that may hold smoke."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +68,11 @@ class DepthEstimate:
     density : (nx, ny, nz) float32
         A plausible density that shows about what the pictures do; where a fit starts.
     inside : tuple of (rows, columns)
-        Of each view, the share of every ray's smoke that lies inside the domain.
+        For each view, the share of every ray's smoke that lies inside the domain.
     views
-        The pictures to fit, against the voxels where it expects smoke.
+        The pictures to fit, against the voxels where the prior expects smoke.
     detail
-        What makes up detail, and the density without it; None if the prior makes nothing up.
+        None if the prior makes nothing up.
     """
 
     density: Volume
@@ -111,9 +98,9 @@ class RoundDepth:
     Attributes
     ----------
     axis
-        Where the smoke of one view stands in depth; None takes that of a clip, or the middle of the domain.
+        Where the smoke of one view stands in depth. None takes the clip's axis, else the middle of the domain.
     wander
-        How it wanders about that; None does not. Several views show where it stands.
+        How one view's smoke wanders about the axis; None lets it stand there. Several views show where it stands.
     """
 
     axis: SmokeAxis | None = None
@@ -124,7 +111,7 @@ class RoundDepth:
         return self if self.axis is not None or clip.place is None else replace(self, axis=clip.place.axis)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
-        """Spread the pictures' smoke by the profiles; of one picture before darkness as its shadows ask for."""
+        """Spread the pictures' smoke by the profiles; one picture before darkness is explained in its own shadows."""
         scatter = None
         if len(views.views) == 1:
             (view,) = views.views
@@ -138,7 +125,7 @@ class RoundDepth:
         return DepthEstimate(_density(expected, profiles), tuple(p.share_inside() for p in profiles), expected)
 
     def _in_its_shadows(self, view: ObservedView, views: ViewSet, scatter: Scatter | None) -> ObservedView:
-        """The only view, with the optical depth that explains it in the shadows of the smoke that it shows itself."""
+        """The only view, with the optical depth that explains it in the shadows of the smoke that it shows."""
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))  # shadows need no single voxels
         coarse = replace(view, projection=project_voxels(view.camera, optics.domain))
         seen = ViewSet((coarse,), any_of_two(views.hull), optics, views.frame)
@@ -160,7 +147,7 @@ class RoundDepth:
 def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
     """Voxels (nx, ny, nz) of the hull where any profile expects smoke, and their neighbours.
 
-    A profile says along each ray by itself where its smoke may be, so that a thin veil beside thick smoke stays.
+    A profile decides along each ray by itself, so that a thin veil beside thick smoke stays.
     """
     hull = views.hull
     box = box_around(hull, 1)
@@ -176,7 +163,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
 
 
 def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
-    """Mark those of some voxels (nx, ny, nz) where any profile expects smoke."""
+    """Mark the given voxels (nx, ny, nz) where any profile expects smoke."""
     found = np.zeros(np.count_nonzero(voxels), np.bool_)
     for view, profile in zip(views.views, profiles, strict=True):
         places = view.projection.places(voxels)

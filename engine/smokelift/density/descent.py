@@ -1,12 +1,11 @@
 """Projected descent on the exact gradient, preconditioned per voxel, with a step that needs no tuning.
 
-Every voxel is measured in units of its own scale, start + floor: in these units the steepest descent changes a ray's
-smoke in proportion to what is there, so what the start assumes about depth survives where the pictures say nothing.
-The direction is that of the limited-memory BFGS method (Nocedal 1980), among the voxels that no bound holds (two-metric
+Every voxel is measured in units of its own scale, start + floor. In these units the steepest descent changes a ray's
+smoke in proportion to what is there, so what the start assumes of depth survives where the pictures say nothing. The
+direction is that of the limited-memory BFGS method (Nocedal 1980), among the voxels that no bound holds (two-metric
 projection: Bertsekas 1982). What neighbours share counts more in it than what each wants for itself: thick smoke that
 is too dark is so over a whole lobe, and voxels that mend it one by one become spikes. No voxel changes by more than a
-share of itself, and the step is shortened until the objective falls sufficiently (Armijo), so the objective never
-rises.
+share of itself. The step is shortened until the objective falls sufficiently (Armijo), so the objective never rises.
 """
 
 from __future__ import annotations
@@ -25,34 +24,34 @@ from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 
 MEMORY = 3
-"""Steps that the direction remembers: as good as six, for half the memory (docs/experiments/density-descent.md)."""
+"""Steps that the direction remembers: as good as six, in half the memory (docs/experiments/density-descent.md)."""
 
 BLOCK = 4
 """Voxels along the cubes whose voxels share a step: small lobes (docs/experiments/density-descent.md)."""
 
 SHARED = 3.0
-"""How many times as much a gradient's mean over such a cube counts as the gradient itself
+"""Weight of a gradient's mean over such a cube, over that of the gradient itself
 (docs/experiments/density-descent.md)."""
 
 FLOOR = 0.1
-"""Scale of an empty voxel of the hull, in mean densities of the start, or as much as the prior expects there if that is
-less: it may fill, but more slowly than others (docs/experiments/density-descent.md)."""
+"""Scale of an empty voxel of the hull, in mean densities of the start, or what the prior expects there if that is less.
+The voxel may fill, but more slowly than others (docs/experiments/density-descent.md)."""
 
 SUFFICIENT = 1e-4
-"""Armijo's constant: share of the linear prediction that a step has to gain."""
+"""Share of the linear prediction that a step has to gain (Armijo's constant)."""
 
 MAX_CHANGE = np.float32(0.25)
 """Largest change of a voxel in one step, as a share of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
 MAX_FIRST_STEP = 1e30
-"""First step, at most: a start of next to nothing asks for more than 32 bits hold."""
+"""Largest first step: a start of next to nothing asks for more than 32 bits hold."""
 
 SHORTEN = 0.3
 """Factor of a step that gains too little."""
 
 SHORTENINGS = 40
-"""Times that a step is shortened at most: 0.3^40 is below float32's resolution."""
+"""Largest number of times that a step is shortened: 0.3^40 is below float32's resolution."""
 
 
 def descend(
@@ -67,28 +66,13 @@ def descend(
     recorded: tuple[Image, ...] = (),
     expected: Volume | None = None,
 ) -> Fit:
-    """Minimise the objective from a start.
+    """Minimise the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
 
-    Parameters
-    ----------
-    terms
-        Their renderers made with the hull as support.
-    density : (nx, ny, nz)
-        Start.
-    hull : (nx, ny, nz) bool
-        Voxels that may hold smoke.
-    iterations
-        At most so many steps.
-    tolerance
-        Share of the objective that a step has to gain.
-    patience
-        Stop after so many steps in a row that do not: one may gain little and the next much.
-    bound
-        What no voxel may exceed; where the start does it is cut.
-    recorded
-        Of each term what is left of the start's picture, L - I, if the renderers hold the records of these pictures.
-    expected : (nx, ny, nz), optional
-        What bounds the scale of an empty voxel, so that smoke fades where a prior expects none.
+    It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
+    share of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to it.
+    ``recorded`` is what is left of each term's picture at the start, L - I, if the renderers hold the records of these
+    pictures. ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects
+    none.
     """
     where = np.flatnonzero(hull)
     if expected is not None:
@@ -139,16 +123,14 @@ class _Problem:
 
     Attributes
     ----------
-    terms
-        Its parts.
     where : (n,)
-        The hull's voxels in the volume.
+        The hull's voxels in the flat volume.
     volume : (nx, ny, nz)
         The last density that was shown.
     slopes : (nx, ny, nz)
         Room for a gradient.
     scale : (n,)
-        Units that the voxels are measured in.
+        Unit of each voxel.
     """
 
     terms: Sequence[Term]
@@ -158,16 +140,16 @@ class _Problem:
     scale: Array
 
     def show(self, density: Array) -> None:
-        """Write a density of the hull's voxels into the volume."""
+        """Write a density of the hull's voxels (n,) into the volume."""
         self.volume.ravel()[self.where] = density
 
     def residuals(self, density: Array) -> tuple[Image, ...]:
-        """What the pictures of a density differ by from those that are to be fitted."""
+        """What is left of the pictures, L - I, for a density of the hull's voxels."""
         self.show(density)
         return tuple(term.renderer.image(self.volume, keep_record=True) - term.view.image for term in self.terms)
 
     def gradient(self, residuals: tuple[Image, ...]) -> Array:
-        """Derivative of the objective in units of the scale, for the density whose residuals are the last."""
+        """Derivative of the objective (n,) in units of the scale, at the density that was rendered last."""
         parts = (
             term.renderer.gradient(term.image_gradient(residual), out=self.slopes).ravel().take(self.where)
             for term, residual in zip(self.terms, residuals, strict=True)
@@ -179,7 +161,7 @@ class _Problem:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """Where a step arrives: its density, how far it moved in units of the scale, and what is left there."""
+    """Where a step arrives: the density, the way there in units of the scale, the residuals, and the objective."""
 
     density: Array
     moved: Array
@@ -215,12 +197,11 @@ def _step(
 
 
 class _Curvature:
-    """The objective's second derivatives, as far as its last steps show them (Nocedal, "Updating quasi-Newton matrices
-    with limited storage", 1980).
+    """The objective's second derivatives, as far as its last steps show them.
 
     Of each of the last `MEMORY` steps it keeps s, the step itself, y, the change of the gradient along it, and their
-    product ys = 1 / rho. Where nothing is known, the inverse of the second derivatives is a multiple of what
-    `neighbours` does.
+    product ys = 1 / rho (Nocedal, "Updating quasi-Newton matrices with limited storage", 1980). Where nothing is known,
+    the inverse of the second derivatives is a multiple of what `neighbours` does.
     """
 
     def __init__(self, neighbours: _Neighbours) -> None:
@@ -233,7 +214,7 @@ class _Curvature:
         return bool(self._steps)
 
     def learn(self, s: Array, y: Array) -> None:
-        """Remember a step and what it changed in the gradient, unless the objective is not convex along it."""
+        """Remember a step s and the gradient's change y, unless the objective is not convex along the step."""
         ys = _dot(s, y)
         if ys > 0:
             self._steps.append((s, y, ys))
@@ -255,12 +236,9 @@ class _Curvature:
 
 
 class _Neighbours:
-    """The cubes of voxels that share a step. There are two lattices of them, half a cube apart, so that no cube shows.
+    """Cubes of voxels that share a step, in two lattices half a cube apart, so that no cube shows.
 
-    Parameters
-    ----------
-    where : (n,)
-        The voxels in a volume of that shape.
+    ``where`` (n,) are the voxels in a flat volume of the shape.
     """
 
     def __init__(self, where: NDArray[np.intp], shape: tuple[int, ...]) -> None:

@@ -1,12 +1,11 @@
 """Detail in depth: smoke that looks like the clip from every side.
 
-The smooth answer of `RoundDepth` is the mean of all smokes that show one picture. From the side it is a spindle without
+The smooth answer of `RoundDepth` is the mean of all smokes that show one picture: from the side, a spindle without
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
 distribution of their patches (`exemplar`). Noise breaks the spindle's symmetry (`stretched_noise`). Then, from coarse
 to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
-their rays to follow. The rows of every picture keep the amounts of the smooth answer, and after each round the cameras'
-pictures have their turn. What is carried on from the frame before has the clip's statistics already and needs one
-round.
+their rays to follow. The rows of every picture keep the amounts of the smooth answer. After each round the cameras'
+pictures have their turn. Smoke carried on from the frame before has the clip's statistics already: one round is enough.
 """
 
 from __future__ import annotations
@@ -37,37 +36,37 @@ from smokelift.scene import Camera
 from smokelift.scene.domain import box_around
 
 SMOOTH_ITERATIONS = 4
-"""Multiplicative iterations for the smooth answer; the sides' rows keep its amounts."""
+"""Multiplicative iterations for the smooth answer, whose amounts the sides' rows keep."""
 
 SMOOTH_TOLERANCE = 0.02
-"""Share of the objective that one of them has to gain for another to follow, as in the fit."""
+"""Share of the objective that each has to gain for another to follow, as in the fit."""
 
 AMOUNTS = 0.5
-"""Standard deviation of a blur, in standard deviations of the smoke's width: blurred by it, the density is the same
-with noise as without. Noise makes lobes, and leaves the smoke of each where it is (docs/experiments/every-view.md)."""
+"""Standard deviation, in those of the smoke's width, of a blur by which the density is the same with noise as without.
+Noise makes lobes, and leaves the smoke of each where it is (docs/experiments/every-view.md)."""
 
 GUIDED_AMOUNTS = 0.75
-"""Standard deviation, in the same unit, of the blur over which carried smoke gets the smooth answer's amounts: what is
+"""Standard deviation, in the same unit, of the blur over which carried smoke gets the smooth answer's amounts. What is
 finer is the simulation's, on any grid (docs/experiments/guided-simulation.md)."""
 
 LARGEST_GAIN = 5.0
-"""Bound of the factor that brings those amounts back."""
+"""Bound of the factor that gives noisy smoke these amounts."""
 
 FRESH_ROUNDS = 4
-"""Rounds on each scale for smoke that nothing is carried for."""
+"""Rounds on each scale for smoke that carries nothing on."""
 
 AZIMUTHS = 5
 """Azimuths in a round (docs/experiments/every-view.md)."""
 
 OWN_PICTURE_DEGREES = 10.0
-"""Degrees from a camera within which its own picture says what is seen."""
+"""Degrees from a camera within which its own picture decides."""
 
 GOLDEN = (np.sqrt(5) - 1) / 2
-"""Multiples of it, less their whole parts, are spread evenly however many there are."""
+"""Its multiples, less their whole parts, are spread evenly however many there are."""
 
 FRESH_STEP, CARRIED_STEP = 0.6, 0.5
-"""Shares of a step towards a picture that are made, for smoke that nothing is carried for and for what is carried: more
-of the second flickers (docs/experiments/uneven-steps.md)."""
+"""Shares of a step towards a picture that are made, for fresh smoke and for carried smoke: more of the second flickers
+(docs/experiments/uneven-steps.md)."""
 
 STEP_RANGE = (0.3, 3.0)
 """Largest change of a ray's smoke in one step."""
@@ -76,8 +75,8 @@ ROW_RANGE = (0.5, 2.0)
 """Largest factor that gives a row of a picture the smooth answer's amount."""
 
 OUTLINE = 0.02
-"""Share of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades: it does not
-leave the outline that the smooth answer has from there."""
+"""Share of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades. So it stays
+within the outline that the smooth answer has from there."""
 
 OUTLINE_BLUR = 3.0
 """Standard deviation (voxels) of that blur."""
@@ -90,16 +89,8 @@ ENDS = 3.0
 class DetailedDepth:
     """Round smoke with detail; see the module.
 
-    Attributes
-    ----------
-    smooth
-        The prior of the smooth answer.
-    detail
-        Strength, from 0 (the smooth answer) to 1.
-    seed
-        Of another plausible smoke of the same clip.
-    texture
-        Of the clip; None makes no detail.
+    `smooth` is the prior of the smooth answer, `detail` the strength from 0 (the smooth answer) to 1. Another `seed`
+    makes another plausible smoke of the same clip. Without a `texture` there is no detail.
     """
 
     smooth: RoundDepth
@@ -118,7 +109,7 @@ class DetailedDepth:
         return replace(self, smooth=smooth, texture=texture)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
-        """The smooth answer, the same with noise, and what gives it the clip's texture."""
+        """The smooth answer with noise, and the detail that gives it the clip's texture."""
         estimate = self.smooth.estimate(views)
         level = MomentLevel(estimate.views, estimate.inside)
         if self.texture is None or not level.views.hull.any():
@@ -133,7 +124,7 @@ class DetailedDepth:
         )
 
     def _noisy(self, smooth: Volume, level: MomentLevel, texture: ClipTexture) -> Volume:
-        """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
+        """The smooth answer with noise that travels with the smoke; its coarse amounts stay."""
         moved = texture.turntable.height * texture.drift * level.views.frame
         strengths = tuple(self.detail * each for each in texture.roughness)
         noise = StretchedNoise(moved, texture.width, strengths, self.seed)
@@ -146,7 +137,7 @@ class DetailedDepth:
 
 
 def _smooth_answer(level: MomentLevel, density: Volume) -> Volume:
-    """A density in the amounts that the cameras' pictures show; those of a large grid are found on the coarsest."""
+    """A density in the amounts that the cameras' pictures show, found on the coarsest grid."""
     coarser = level.coarser
     if coarser is None:
         fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, within=level.views)
@@ -167,18 +158,9 @@ class _Upright(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EveryView:
-    """Makes smoke look like the clip from every side.
+    """Makes the smoke of a moment look like the clip from every side, from a smooth answer (nx, ny, nz).
 
-    Attributes
-    ----------
-    texture
-        Of the clip.
-    level
-        The moment.
-    smooth : (nx, ny, nz)
-        The smooth answer.
-    strength
-        From 0 to 1.
+    `strength` is from 0 to 1.
     """
 
     texture: ClipTexture
@@ -188,7 +170,7 @@ class EveryView:
 
     @cached_property
     def coarser(self) -> EveryView | None:
-        """Return the detail on a grid half as fine, of the scales that it holds; None where smoke has few voxels."""
+        """The detail on a grid half as fine, with the scales that it holds; None where smoke has few voxels."""
         coarser, texture = self.level.coarser, self.texture
         if coarser is None or len(texture.exemplars) == 1:
             return None
@@ -200,7 +182,7 @@ class EveryView:
         return self._rounds(density, cameras, self.texture.exemplars, self.azimuths(), fresh)
 
     def amounts(self, density: Volume) -> NDArray[np.float32]:
-        """A density (n,) over the lobes of smoke; see `Detail`."""
+        """The density (n,) blurred over lobes of smoke; see `Detail`."""
         return self.level.blurred(density, GUIDED_AMOUNTS * self.texture.width)
 
     def _rounds(
@@ -286,16 +268,16 @@ class EveryView:
 
 
 def unseen_sides(turntable: Turntable, cameras: Sequence[Camera]) -> bool:
-    """Whether there are sides that no camera is near to, over a degree at least: fewer are hardly ever come by."""
+    """Whether no camera is near to some sides, over a degree at least: azimuths hardly ever fall into less."""
     seen_from = [turntable.degrees(camera) for camera in cameras]
     return any(_unseen(degrees, seen_from, OWN_PICTURE_DEGREES + 0.5) for degrees in range(180))
 
 
 def _unseen(degrees: float, cameras: Sequence[float], near: float = OWN_PICTURE_DEGREES) -> bool:
-    """Whether no camera, in degrees, is near to an azimuth."""
+    """Whether no camera (degrees) is near to an azimuth."""
     return all(_apart(degrees, camera) >= near for camera in cameras)
 
 
 def _apart(a: float, b: float) -> float:
-    """Degrees between two directions; what is seen from the back is what is seen from the front."""
+    """Degrees between two directions; the back shows what the front shows."""
     return abs((a - b + 90) % 180 - 90)

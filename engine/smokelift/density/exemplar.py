@@ -1,14 +1,14 @@
-"""What smoke looks like near by: the distribution of the patches of a clip, and pictures that are moved towards it.
+"""The distribution of the patches of a clip, and pictures that are moved towards it.
 
 A picture of turbulent smoke is a sample of a texture whose statistics do not depend on the azimuth. So every side of
 the smoke should have the distribution of square patches that the clip's own pictures have. Two distributions agree if
-all their one-dimensional projections do. Along random directions the patches of a picture are therefore sorted and
-moved to the quantiles of the clip's: one-dimensional optimal transport (sliced Wasserstein distance: Pitie, Kokaram and
-Dahyot 2005; for patches Elnekave and Weiss, "Generating natural images with direct patch distributions matching", 2022;
-for solids Kopf et al., "Solid texture synthesis from 2D exemplars", 2007).
+all their one-dimensional projections do. So the patches of a picture are sorted along random directions and moved to
+the quantiles of the clip's: one-dimensional optimal transport (sliced Wasserstein distance: Pitie, Kokaram and Dahyot
+2005; for patches Elnekave and Weiss, "Generating natural images with direct patch distributions matching", 2022; for
+solids Kopf et al., "Solid texture synthesis from 2D exemplars", 2007).
 
 Patches hold v = log(1 + tau / tau0) of the optical depth tau, so that outlines and thin parts count as well as the
-core. The height of a patch within the smoke is one more coordinate, for the cap of a column differs from its stem.
+core. The height of a patch within the smoke is one more coordinate, as the cap of a column differs from its stem.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ UNIT = 0.05
 """tau0, in shares of the clip's 95th percentile of optical depth."""
 
 BASES = 8
-"""Orthonormal bases of directions that take turns: more than the rounds of a frame on one scale."""
+"""Orthonormal bases of directions that take turns: more than a frame has rounds on one scale."""
 
 KNOTS = 512
 """Quantiles that stand for a distribution."""
 
 MAX_PATCHES = 8192
-"""Patches at most that the quantiles of a scale are taken from: the rank of each is then known to 0.6 % at most, the
-standard error of a share of one half."""
+"""Largest number of patches for the quantiles of a scale: the rank of each is then known to 0.6 % at most, the standard
+error of a share of one half."""
 
 PASSES = 2
-"""Times that a picture's patches are moved, each along another basis."""
+"""Times that a picture's patches are moved, each time along another basis."""
 
 MIN_DEPTH_SHARE = 0.01
 """Share of a picture's largest optical depth below which a patch, or a row, shows no smoke."""
@@ -51,7 +51,7 @@ DENSE = 0.05
 """Share of a picture's largest optical depth from which the spread of v is measured."""
 
 MAX_LOG_DEPTH = 12.0
-"""Bound of v: far beyond what any picture shows, within what an exponential holds."""
+"""Bound of v: far beyond any picture, within what an exponential holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +61,13 @@ class Exemplar:
     Attributes
     ----------
     scale
-        Pixels of the pictures that one pixel of a patch is the mean of.
+        Pixels of the pictures along one pixel of a patch, which is their mean.
     unit
         tau0.
     height
         What the whole height of the smoke counts as, in units of v.
     directions : (bases, n, n)
-        Orthonormal; n is the number of a patch's pixels and one for its height.
+        Orthonormal; n is the number of a patch's pixels, and one for its height.
     quantiles : (bases, n, knots)
         Of the patches along each direction, ascending.
     """
@@ -105,9 +105,9 @@ class Exemplar:
         return Exemplar(scale, unit, height, directions, np.ascontiguousarray(quantiles, np.float32))
 
     def towards(self, picture: Picture, turn: int) -> Picture:
-        """Return a picture at this scale, its patches moved to the exemplar's quantiles.
+        """A picture at this scale, its patches moved to the exemplar's quantiles; where they overlap their mean counts.
 
-        Where they overlap their mean counts. ``turn`` chooses the directions.
+        ``turn`` chooses the directions.
         """
         v = np.log1p(picture / np.float32(self.unit))
         reach = SIZE // 2
@@ -135,7 +135,7 @@ def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np
 
 
 def reduced(picture: Picture, scale: int) -> Picture:
-    """Means of blocks of a picture, which goes on as zero beyond its ends."""
+    """Means of square blocks of a picture, which is zero beyond its ends."""
     if scale == 1:
         return np.ascontiguousarray(picture)
     padded = np.pad(picture, [(0, -count % scale) for count in picture.shape])

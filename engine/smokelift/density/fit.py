@@ -35,10 +35,10 @@ LARGEST_START = 1e12
 
 MIN_DENSITY = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
-range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
+range to 0 for a whole process; a resumed run would then differ in its last bits."""
 
 SINGLE_VOXELS = 1.0
-"""Standard deviation (voxels) of the Gaussian that leaves of a change what lobes share
+"""Standard deviation (voxels) of the Gaussian that keeps of a change what lobes share
 (docs/experiments/density-descent.md)."""
 
 FAINT_SHARE = 1e-3
@@ -122,13 +122,7 @@ class DensityFit(Protocol):
 
 @dataclass(frozen=True)
 class GradientFit:
-    """Multiplicative iterations, then descent on the exact gradient.
-
-    Attributes
-    ----------
-    settings
-        How long.
-    """
+    """Multiplicative iterations, then descent on the exact gradient."""
 
     settings: DensitySettings = DensitySettings()
 
@@ -238,7 +232,7 @@ def reconstruct_density(
 
 
 def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
-    """The observation before the scene's background, if it says nothing else; a picture's mean for other cameras."""
+    """The observation, before the scene's background unless it has a plate; a picture's mean for other cameras."""
     if observation.plate is not BLACK:
         return observation
     camera = observation.camera
@@ -252,7 +246,7 @@ def empty_density(views: ViewSet) -> FittedDensity:
 
 
 def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
-    """The density at some voxels (n,) of the flat array, without what no picture can show; see `MIN_DENSITY`."""
+    """The density at some voxels (n,) of the flat array, without values below `MIN_DENSITY`."""
     values = density.ravel()[within]
     shown = values >= MIN_DENSITY
     result = np.zeros(density.shape, np.float32)
@@ -261,7 +255,7 @@ def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
 
 
 def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_]) -> Volume:
-    """The density before a descent, with what it changes up to the one after, but for the changes of single voxels."""
+    """The density before a descent with the descent's changes, but for those of single voxels."""
     box = box_around(hull, 1)
     blurred_before, blurred_after = (ndimage.gaussian_filter(each[box], SINGLE_VOXELS) for each in (before, after))
     faint = FAINT_SHARE * float(blurred_before.max())
@@ -271,7 +265,7 @@ def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
-    """Figures of a fit that leaves residuals (rows, columns, 3), one a view at least; see `FittedDensity`."""
+    """Figures of a fit (see `FittedDensity`) from its residuals (rows, columns, 3), of the first views at least."""
     losses, decibels = [], {}
     for number, (view, residual) in enumerate(zip(views.views, residuals, strict=False)):
         left = residual[view.counted]

@@ -1,10 +1,10 @@
 """Flame from one picture: where in the smoke its light comes from.
 
-The picture shows the integral of the emission along each ray, less what the smoke before it takes away. As with smoke
-it says nothing of the depth, so that the same is assumed: a flame is as deep as it is wide
-(`smokelift.density.profile`), about the middle of the smoke at its height. From there maximum likelihood expectation
-maximisation (Shepp and Vardi 1982) scales the emission until it shows the picture: what is not negative stays so, and
-the distribution along a ray stays about what it was. Figures: docs/experiments/fire.md.
+The picture shows the integral of the emission along each ray, less what the smoke before it takes away. It says nothing
+of the depth. As for smoke, a flame is assumed to be as deep as it is wide (`smokelift.density.profile`), about the
+middle of the smoke at its height. From there maximum likelihood expectation maximisation (Shepp and Vardi 1982) scales
+the emission until it shows the picture. The emission stays not negative, and its distribution along a ray stays about
+what it was. Figures: docs/experiments/fire.md.
 """
 
 from __future__ import annotations
@@ -31,27 +31,14 @@ MIN_PROFILE_SHARE = 1e-3
 """Share of a profile's peak below which nothing burns."""
 
 SMOOTHING = 2.0
-"""Standard deviation, in voxels, over which the middle of the smoke is averaged along its height."""
+"""Standard deviation (voxels) of the average of the smoke's middle along its height."""
 
 
 def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, optics: Optics) -> Volume:
-    """Reconstruct the emission of a flame.
+    """Reconstruct the emission (nx, ny, nz) of a flame, radiance per metre.
 
-    Parameters
-    ----------
-    light : (rows, columns)
-        Radiance that it adds to the picture of the smoke, not negative.
-    camera
-        Of the picture; it stands still.
-    density : (nx, ny, nz)
-        Of the smoke, which takes light away.
-    optics
-        The grid's domain, and the smoke's extinction.
-
-    Returns
-    -------
-    (nx, ny, nz) float32
-        Emission, radiance per metre.
+    ``light`` (rows, columns) is the radiance that the flame adds to the picture of the smoke, not negative. The camera
+    stands still. The density (nx, ny, nz) of the smoke takes light away.
     """
     flame = np.zeros(optics.domain.resolution, np.float32)
     projection = project_voxels(camera, optics.domain)
@@ -71,7 +58,7 @@ def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, 
 
 
 def _scaled(emission: NDArray[np.float64], light: NDArray[np.float64], matrix: sparse.csr_array) -> NDArray[np.float64]:
-    """Emission (voxels,) that shows the light (pixels,) by the matrix (pixels, voxels)."""
+    """The emission (voxels,) that shows the light (pixels,) through the matrix (pixels, voxels)."""
     seen = matrix.sum(0)
     emission = np.where(seen > 0, emission, 0)
     for _ in range(ITERATIONS):

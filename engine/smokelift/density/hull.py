@@ -1,4 +1,4 @@
-"""Which voxels can hold smoke: those whose every calibrated picture shows smoke where they lie."""
+"""Which voxels can hold smoke: those where every calibrated picture shows smoke."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Places:
     Attributes
     ----------
     rows, columns : (n,) float32
-        Picture coordinates of their centres, pixel centres at integers.
+        Picture coordinates of their centres; pixel centres are integers.
     visible : (n,) bool
         Whether they are before the camera and their centre falls into the picture.
     """
@@ -39,12 +39,9 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Where the voxels of a grid lie in a picture. It is computed for the voxels that are asked for.
+    """Where the voxels of a grid lie in a picture, computed for the voxels that are asked for.
 
-    Attributes
-    ----------
-    footprint : float
-        Largest width of a voxel in the picture, in pixels.
+    `footprint` is the largest width of a voxel in the picture, in pixels.
     """
 
     footprint: float
@@ -65,7 +62,7 @@ class Projection:
         return self._map.shown(marked)
 
     def read(self, picture: NDArray[np.floating[Any]], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """The picture (rows, columns) read bilinearly at the marked voxels (n,); see `Places.read`."""
+        """The picture (rows, columns) read at the marked voxels (n,); see `Places.read`."""
         return self.places(voxels).read(picture)
 
 
@@ -94,8 +91,8 @@ def project_voxels(camera: Camera, domain: Domain) -> Projection:
 def inside(voxels: NDArray[np.bool_], values: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
     """The values (nx, ny, nz) at the marked voxels, zero elsewhere.
 
-    A page of memory that holds no marked voxel is never given, nor is it where only zeros are read: so what a density
-    takes follows the smoke, not the box.
+    Only pages of memory with marked voxels are allocated; reading zeros allocates none. So the memory of a density
+    follows the smoke, not the box.
     """
     result = np.zeros(voxels.shape, np.float32)
     np.copyto(result, values, where=voxels)
@@ -113,7 +110,7 @@ def _radius(projection: Projection) -> int:
 
 
 def visual_hull(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
-    """Voxels (nx, ny, nz) whose footprint meets the mask (rows, columns) of a picture's smoke pixels."""
+    """Voxels (nx, ny, nz) whose footprint touches the mask (rows, columns) of a picture's smoke pixels."""
     grown = ndimage.binary_dilation(mask, iterations=_radius(projection))
     return projection.shown(grown)
 
@@ -132,7 +129,7 @@ def common_hull(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projec
 def agreement(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> float:
     """Share of all pictures' smoke pixels behind which voxels lie that no picture rules out; 1 without any smoke.
 
-    About 1 for true views of the same smoke; little for cameras that are not where they are said to be.
+    It is about 1 for true views of the same smoke, and small for cameras that are not where they are said to be.
     """
     hull = common_hull(masks, projections)
     explained = shown = 0

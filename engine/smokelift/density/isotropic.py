@@ -1,11 +1,11 @@
-"""Pictures that are laid along the rays of many azimuths, filtered so that what they add up to has no level layers.
+"""Pictures laid along the rays of many azimuths, filtered so that their sum has no level layers.
 
 What changes smoke alike along level rays has no detail along them: its Fourier transform lies in the plane through the
-vertical that faces these rays. The planes of all azimuths meet at the vertical, so that the energy of changes that know
-nothing of each other adds up as 1 / k at a wave number k across the vertical. Smoke is drawn up in level layers
-(backprojection without its ramp filter: Kak and Slaney, "Principles of Computerized Tomographic Imaging", 1988, ch. 3).
-Here every wave of a picture is weighed by the root of the sine of its angle with the vertical, which undoes that and
-keeps how much of each size there is (docs/experiments/level-layers.md).
+vertical that faces these rays. The planes of all azimuths share the vertical. So the energy of independent changes adds
+up as 1 / k at a wave number k across the vertical, and smoke is drawn up in level layers (backprojection without its
+ramp filter: Kak and Slaney, "Principles of Computerized Tomographic Imaging", 1988, ch. 3). Here every wave of a
+picture is weighed by the root of the sine of its angle with the vertical. That undoes the layers and keeps how much of
+each size there is (docs/experiments/level-layers.md).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 GAIN = (np.pi / 2) ** 0.5
-"""Root of one over the mean sine over all angles: a picture whose detail has no direction keeps its energy."""
+"""Root of one over the mean sine of all angles, so that a picture whose detail has no direction keeps its energy."""
 
 
 def isotropic(picture: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,8 +1,8 @@
-"""A moment on grids that are each half as fine, and what was found there on the finer grid.
+"""A moment on grids that are each half as fine, and changes found there applied to the finer grid.
 
-Detail of several voxels needs no single voxels: on a grid half as fine it takes an eighth of the work and the memory.
-What changes there changes the finer density by the same factor, linear between the voxels' middles, so that what the
-finer density holds of its own stays. Only the last octave is left for it to find.
+Detail of several voxels needs no single voxels: a grid half as fine takes an eighth of the work and the memory. What
+changes there changes the finer density by the same factor, linear between the voxels' middles. So the finer density
+keeps its own detail, and only the last octave is left to find on it.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from smokelift.scene.domain import box_around
 from smokelift.scene.projection import voxel_width
 
 BLUR_REACH = 3.0
-"""Standard deviations up to which a blur reaches: 0.3 % of a Gaussian lie beyond."""
+"""Reach of a blur in its standard deviations: 0.3 % of a Gaussian lie beyond."""
 
 MIN_DEVIATION = 1.5
-"""Standard deviation of a blur in voxels of its own grid, at least. Means of two voxels, and what is linear between
-their middles, have a variance of 11/12 of a finer voxel: they make a blur there 5 % wider at most."""
+"""Smallest standard deviation of a blur in voxels of its own grid. Means of two voxels, and what is linear between
+their middles, have a variance of 11/12 of a finer voxel. So a blur there is 5 % wider at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +40,8 @@ class MomentLevel:
 
     Attributes
     ----------
-    views
-        The pictures.
     inside : tuple of (rows, columns)
-        Of each, the share of every ray's smoke that lies inside the domain.
+        For each view, the share of every ray's smoke that lies inside the domain.
     coarseness
         Voxels of the finest grid along one of this.
     """
@@ -54,7 +52,7 @@ class MomentLevel:
 
     @cached_property
     def coarser(self) -> MomentLevel | None:
-        """Return the level of a grid half as fine; None where the smoke has few voxels."""
+        """The level of a grid half as fine; None where the smoke has few voxels."""
         views = self.views
         if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
             return None
@@ -73,7 +71,7 @@ class MomentLevel:
         return _core.prolong_values(values[box], of.views.hull[fine])
 
     def changed(self, density: Volume, of: MomentLevel, change: Callable[[Volume], Volume]) -> Volume:
-        """A density of the next finer grid, changed as its means on this grid are by `change`."""
+        """A density of the next finer grid, changed as `change` changes its means on this grid."""
         fine, box = self._boxes(of)
         means = self.means(density, of)
         after = change(means)
@@ -91,7 +89,7 @@ class MomentLevel:
     def blurred(self, values: Volume, deviation: float) -> NDArray[np.float32]:
         """A volume blurred by a Gaussian of so many voxels, (n,) at those that may hold smoke.
 
-        Beside another one, blurred alike: where the smoke ends both fade.
+        It fades where the smoke ends, so compare it only with another one that is blurred alike.
         """
         box = box_around(self.views.hull, round(BLUR_REACH * deviation))
         return _blurred(values[box], self.views.hull[box], deviation)
@@ -121,7 +119,7 @@ def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDA
 
 
 def _shrunk(view: ObservedView, domain: Domain) -> Observation:
-    """What a view's camera saw, at a pixel a voxel of a domain if its pixels are finer."""
+    """What a view's camera saw, at one pixel a voxel of a domain if its pixels are finer."""
     shrink = max(1.0, voxel_width(view.camera, domain))
     columns, rows = (max(1, round(side / shrink)) for side in view.camera.size)
 

@@ -1,21 +1,21 @@
 """The multiplicative front fit: every ray's smoke is scaled until the picture is right, its depth profile kept.
 
-For one ray with scattered radiance S and transmittance T the effective source is J = S / (1 - T). If all smoke on
-the ray is scaled by s, the picture becomes J (1 - T^s) + T^s B; the transmittance that explains the target I best is
+For one ray with scattered radiance S and transmittance T the effective source is J = S / (1 - T). If all smoke on the
+ray is scaled by s, the picture becomes J (1 - T^s) + T^s B. The transmittance that explains the target I best is
 
     t = <I - J, B - J> / <B - J, B - J>,   s = ln t / ln T,
 
 with the colours as much as they count in the objective.
 
-Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s,
-and where smoke and background look alike the picture says little, so the neighbours' step counts instead.
+Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s.
+Where smoke and background look alike the picture says little, so the neighbours' step counts instead.
 
 Where detail in depth is made up, what a picture adds or takes is detail as well, about as deep as it is wide. Scaled
-evenly, all of a ray would share it: from the side a layer along the rays. So a step that would scale smoke to rho is
-itself scaled, by p / rho where it adds smoke and by rho / p where it takes some, for a plausible smoke p: it goes to
-where that is denser and comes from where that is thinner.
+evenly, all of a ray would share it: from the side a layer along the rays. So a step that would scale smoke rho is
+itself scaled, with a plausible smoke p: by p / rho where it adds smoke, by rho / p where it takes some. It adds where p
+is denser and takes where p is thinner.
 
-Of several pictures each has its turn, so that the density becomes the one nearest to the start that all agree with:
+Several pictures take turns, so that the density becomes the one nearest to the start that all agree with:
 multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 """
 
@@ -40,17 +40,17 @@ RELAXATION = 0.9
 """Share of a step that is made."""
 
 MAX_UNEVENNESS = 2.0
-"""Largest factor by which the plausible smoke scales a step. With it and `RELAXATION`, less than twice the step that a
-ray asks for is made, so that the iterations converge."""
+"""Largest factor by which the plausible smoke scales a step. With `RELAXATION`, less than twice the step that a ray
+asks for is made, so that the iterations converge."""
 
 DAMPING = 0.4
 """Relative sensitivity at which the step is halved."""
 
 MIN_DENSITY_SHARE = 1e-6
-"""Share of the plausible smoke's largest density below which voxels are alike."""
+"""Share of the plausible smoke's largest density below which voxels count alike."""
 
 MIN_SCALE = 1e-30
-"""Lower bound of that density, so that no smoke at all is no division by zero."""
+"""Lower bound of that density, so that empty smoke is no division by zero."""
 
 PROBE = 1.05
 """Scale of the density for the difference quotient dL / d ln s."""
@@ -66,24 +66,13 @@ def fit_multiplicative(
     plausible: Volume | None = None,
     recorded: bool = False,
 ) -> Fit:
-    """Scale the smoke of every ray until the pictures match; returns the best density seen.
+    """Scale the smoke of every ray until the pictures match; the best density found.
 
-    Parameters
-    ----------
-    terms
-        Of the objective. Where a pixel counts less, its steps are shorter as well.
-    density : (nx, ny, nz)
-        Start; voxels at zero stay there.
-    iterations
-        At most so many, in each of which every term has a turn.
-    tolerance
-        Stop when an iteration lowers the objective by less than this share.
-    within
-        The views of the terms, outside whose hull the density is known to be zero.
-    plausible : (nx, ny, nz), optional
-        Smoke towards whose distribution along the rays the steps lead; see the module. By default they are even.
-    recorded
-        Keep the renderers' records of the last iteration's pictures, for a descent that goes on from there.
+    In each iteration every term has a turn; where a pixel counts less, its steps are shorter. Voxels of the start (nx,
+    ny, nz) at zero stay there. It stops when an iteration lowers the objective by less than the share ``tolerance``.
+    Outside the hull of ``within``, the views of the terms, the start is known to be zero. The steps lead towards the
+    distribution of ``plausible`` (nx, ny, nz) along the rays; without it they are even. ``recorded`` keeps the
+    renderers' records of the last iteration's pictures, for a descent that goes on from there.
     """
     smoke, enough = _Smoke(terms, density, within, plausible), noise_floor(terms)
     current = best = smoke.values()
@@ -110,16 +99,8 @@ def fit_multiplicative(
 def take_turns(terms: Sequence[Term], density: Volume, rounds: int, *, within: ViewSet | None = None) -> Volume:
     """Scale the smoke of every ray towards each picture in turn, whatever the others lose by it.
 
-    Parameters
-    ----------
-    terms
-        The pictures, in the order of their turns. The last is fitted best.
-    density : (nx, ny, nz)
-        Start; voxels at zero stay there.
-    rounds
-        Turns of each.
-    within
-        As of `fit_multiplicative`.
+    Each term has as many turns as there are rounds; the last one is fitted best. Voxels of the start (nx, ny, nz) at
+    zero stay there. ``within`` is that of `fit_multiplicative`.
     """
     smoke = _Smoke(terms, density, within)
     values = smoke.values()
@@ -130,9 +111,9 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int, *, within: V
 
 
 class _Smoke:
-    """The voxels of a density that may hold smoke, which change while the others stay at zero.
+    """The voxels of a density that may hold smoke; the others stay at zero.
 
-    Their values (n,) are what is computed with; one volume is filled with them again and again for the renderers.
+    Their values (n,) are what is computed with. One volume is filled with them again and again for the renderers.
     """
 
     def __init__(
@@ -156,19 +137,19 @@ class _Smoke:
         return self._values
 
     def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
-        """The volume (nx, ny, nz) with these values, times a factor, until the next call."""
+        """The volume (nx, ny, nz) with these values, times a factor; valid until the next call."""
         _core.write_at(self._volume, self._where, values, factor)
         return self._volume
 
     def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32]) -> Array:
-        """Values scaled along the rays of a term by a share of the steps (rows, columns) in their logarithm."""
+        """Values scaled along a term's rays by a share (`RELAXATION`) of the logarithmic steps (rows, columns)."""
         places, uneven = self._places[turn], (self._faint, MAX_UNEVENNESS)
         at = (places.rows, places.columns, places.visible)
         return _core.scale_along_rays(values, self._plausible, logarithm, *at, *uneven, RELAXATION)
 
 
 def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image) -> Array:
-    """Values whose picture is nearer to that of a term, whose turn it is, from those that render to `image`."""
+    """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
     return smoke.scaled(values, turn, _log_scale(image, transmittance, slope, term))
@@ -182,7 +163,7 @@ def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance
 
 
 def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> NDArray[np.float32]:
-    """Logarithm of each pixel's scale, damped and smoothed, (rows, columns)."""
+    """Logarithm (rows, columns) of each pixel's scale, damped and smoothed."""
     background, share = term.view.plate.image, np.sqrt(term.weight)
     clear = transmittance[..., None]
     solid = np.maximum(1 - clear, 1e-6)

@@ -1,12 +1,12 @@
-"""What a density fit minimises: one form of objective for both of its optimisers and for where they stop.
+"""What a density fit minimises: one objective for both of its optimisers and for where they stop.
 
     E(rho) = sum over terms, pixels of  w (L(rho) - I) C (L(rho) - I),    0 <= rho <= bound,  rho = 0 outside the hull
 
 A term is a picture I with the weight w of its pixels and C of their colours (3 x 3, the identity before a background
-that is known; `colour_weight`). Both stay as they are during a fit. There is one term a camera. What a
-depth prior makes up (`Detail`) is no part of it: before, the start is scaled towards it in turn with the cameras'
-pictures, and what is left of it is what those allow. A prior has no penalty term. It acts through the voxels that may
-hold smoke, the start and, with it, the preconditioner of the descent.
+that is known; `colour_weight`). Neither changes during a fit. There is one term a camera. Detail that a depth prior
+makes up (`Detail`) has none: before the fit, the start is scaled in turn towards it and the cameras' pictures, and what
+these allow of it is left. A prior has no penalty term. It acts through the voxels that may hold smoke, the start and,
+with it, the preconditioner of the descent.
 
 Noise of standard deviation s leaves E = sum w c s^2 at the true density, c of C's diagonal. Below that a fit reproduces
 noise, so it stops there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of
@@ -34,14 +34,8 @@ puts outside is missing in the picture; with more, density spikes grow at floor 
 class Term:
     """One picture that the density has to show.
 
-    Attributes
-    ----------
-    view
-        The picture.
-    renderer
-        Of the view's camera, before the view's plate.
-    weight : (rows, columns)
-        How much each pixel counts, at least 0; at most 1 for a camera's.
+    The renderer is of the view's camera, before the view's plate. `weight` (rows, columns) is how much each pixel
+    counts, from 0 to 1.
     """
 
     view: ObservedView
@@ -49,12 +43,12 @@ class Term:
     weight: NDArray[np.float32]
 
     def loss(self, residual: Image) -> float:
-        """The term's part of the objective, of L - I (rows, columns, 3)."""
+        """The term's part of the objective, from L - I (rows, columns, 3)."""
         power = np.multiply(residual, self.view.weighted(residual), dtype=np.float64)
         return float(np.sum(self.weight[..., None] * power))
 
     def image_gradient(self, residual: Image) -> Image:
-        """Derivative of the term's part by the rendered picture."""
+        """Derivative of the term's part by the rendered picture (rows, columns, 3)."""
         return 2 * self.weight[..., None] * self.view.weighted(residual)
 
     def noise_floor(self) -> float:
@@ -66,17 +60,10 @@ class Term:
 
 
 def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
-    """Return a term for every camera's picture.
+    """A term for every camera's picture.
 
-    Smoke of a ray that lies outside the domain is not modelled. The residual counts by the share inside, so that the
-    few voxels which a ray crosses on its way out do not have to hold all that it shows.
-
-    Parameters
-    ----------
-    views
-        The pictures.
-    inside : sequence of (rows, columns)
-        Of each, the share of every ray's smoke that lies inside the domain.
+    A pixel counts by ``inside`` (one picture a view): the share of its ray's smoke that lies inside the domain. Smoke
+    outside is not modelled, and the few voxels that a ray crosses on its way out must not hold all that it shows.
     """
     return [
         Term(view, renderer, view.counted * np.maximum(share, MIN_SHARE) ** 2)
@@ -98,8 +85,7 @@ class Fit:
     iterations
         Steps that were made.
     recorded : (rows, columns, 3), one a term
-        The residuals if the terms' renderers hold the records of this density's pictures, ready for their gradients;
-        else none.
+        The residuals, if the terms' renderers hold the records of this density's pictures; else none.
     """
 
     density: Volume
@@ -110,7 +96,7 @@ class Fit:
 
 
 def objective(terms: Sequence[Term], residuals: Sequence[Image]) -> float:
-    """E, of what is left of each term's picture."""
+    """E, from what is left of each term's picture."""
     return sum(term.loss(residual) for term, residual in zip(terms, residuals, strict=True))
 
 
