@@ -11,9 +11,9 @@ Where shadows or thickness make the picture insensitive to s, the step is damped
 Where smoke and background look alike the picture says little, so the neighbours' step counts instead.
 
 Where detail in depth is made up, what a picture adds or takes is detail as well, about as deep as it is wide. Scaled
-evenly, all of a ray would share it: from the side a layer along the rays. So a step that would scale smoke rho is
-itself scaled, with a plausible smoke p: by p / rho where it adds smoke, by rho / p where it takes some. It adds where p
-is denser and takes where p is thinner.
+evenly, all of a ray would share it: from the side a layer along the rays. So a step that would scale smoke to rho is
+itself scaled, by p / rho where it adds smoke and by rho / p where it takes some, for a plausible smoke p. It adds most
+where p is denser, and takes most where p is thinner.
 
 Several pictures take turns, so that the density becomes the one nearest to the start that all agree with:
 multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).

@@ -1,4 +1,4 @@
-"""What cameras saw of the smoke at one moment, and what each picture says by itself against the grid."""
+"""What cameras saw of the smoke at one moment, and what each picture alone says on the grid."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from smokelift.scene import SHADOWED, Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
 
 THINNEST_CLEAR = 0.05
-"""Transmittance at least: a brightness does not show an optical depth above 3."""
+"""Lower bound of the transmittance: a brightness does not show an optical depth above 3."""
 
 SHADED, PATCH = 4.0, 3
 """Noise by which a shaded side of smoke turns away from its source radiance, and pixels along it, at least
@@ -34,7 +34,7 @@ SHADED_DEPTH = 1.5
 (docs/experiments/thick-smoke.md)."""
 
 MAX_DARK_RADIANCE = 0.1
-"""Radiance of a dark background over the smoke's source radiance, at most: before a brighter one a picture itself tells
+"""Largest radiance of a dark background over the smoke's source radiance. Before a brighter one a picture itself tells
 smoke in shadow from thin smoke."""
 
 MIN_CONTRAST = 0.1
@@ -42,11 +42,11 @@ MIN_CONTRAST = 0.1
 more: in deep shadow noise would be taken for smoke."""
 
 ROUNDS = 2
-"""Times that optical depth and the weight of the colours are found from each other."""
+"""Times that optical depth and the weight of the colours are each found from the other."""
 
 
 def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
-    """The plate of a known background, (rows, columns, 3) or (3,), with the noise of 8 bits; size as a camera's."""
+    """The plate of a known background (rows, columns, 3) or (3,), of a camera's size, with the noise of 8 bits."""
     width, height = size
     picture = np.broadcast_to(background, (height, width, 3)).astype(np.float32)
     return Plate(picture, np.ones((height, width), np.float32), EIGHT_BIT_NOISE)
@@ -122,22 +122,17 @@ class ObservedView:
 
     Attributes
     ----------
-    camera, plate
-        As in `Observation`.
     image : (rows, columns, 3)
-        The observation's, faded to the plate as far as it is uncertain that a pixel shows smoke: so a faint rim ends
-        where its light does, not at the mask.
+        The observation's, faded to the plate by `share`: so a faint rim ends where its light does, not at the mask.
     share : (rows, columns)
-        How certain a pixel shows smoke, from 0 to 1: the share of the observation, and of its noise, that is left.
+        How certainly a pixel shows smoke, from 0 to 1; what is left of the observation and of its noise.
     mask : (rows, columns) bool
-        Pixels that may show smoke: where that share is not 0.
+        Pixels that may show smoke: where `share` is not 0.
     optical_depth : (rows, columns)
-        Of smoke without shadows that explains the picture, or as much as shows where only smoke in its own shadow
-        does; 0 outside the mask.
-    projection
-        Where the voxels lie in the picture.
+        Of smoke without shadows that explains the picture, or as much as can be shown where only smoke in its own
+        shadow does; 0 outside the mask.
     counted : (rows, columns) bool
-        Pixels that the voxels behind the mask can change: those that a fit is judged by.
+        Pixels that the voxels behind the mask can change: a fit is judged by them.
     colours
         How much each combination of the colours counts; None if all do alike, as before a background that is known.
     """
@@ -171,7 +166,7 @@ class ObservedView:
         return ObservedView(camera, image, plate, share, mask, depth, projection, reached(mask, projection), colours)
 
     def weighted(self, colours: Image) -> Image:
-        """Colours (rows, columns, 3) as much as they count."""
+        """Colours (rows, columns, 3), weighed by how much they count."""
         return colours if self.colours is None else self.colours.weighted(colours)
 
     def before_darkness(self, source: NDArray[np.float64]) -> bool:
@@ -185,7 +180,7 @@ class ObservedView:
 
     @cached_property
     def noise_left(self) -> Image:
-        """Standard deviation (rows, columns, 3) of the noise of `image`, which fades with it."""
+        """Standard deviation (rows, columns, 3) of the noise of `image`, faded like it."""
         return self.share[..., None] * self.noise
 
 
@@ -199,8 +194,6 @@ class ViewSet:
         At least one, the input's first.
     hull : (nx, ny, nz) bool
         Voxels that all of them allow to hold smoke.
-    optics
-        How light travels through the domain.
     frame
         Number of the moment in its clip, from 0; a depth prior that has seen the clip knows the others.
     """
@@ -212,7 +205,7 @@ class ViewSet:
 
     @cached_property
     def where(self) -> NDArray[np.intp]:
-        """The hull's voxels (n,) in an array of all. To read an array at them leaves the memory between untouched."""
+        """The hull's voxels (n,) in the flat grid: reading an array at them leaves the memory between untouched."""
         return np.flatnonzero(self.hull)
 
     @cached_property
@@ -229,11 +222,8 @@ class ViewSet:
     def of(observations: Sequence[Observation], optics: Optics, frame: int = 0) -> ViewSet:
         """Set observations of one moment against the grid.
 
-        Raises
-        ------
-        ValueError
-            If a picture is not finite or has another size than its camera, or if a camera moves or stands inside the
-            domain.
+        It raises ValueError if a picture is not finite or has another size than its camera, or if a camera moves or
+        stands inside the domain.
         """
         for observation in observations:
             _check(observation, optics.domain)
@@ -247,10 +237,10 @@ def apparent_optical_depth(
 ) -> NDArray[np.float32]:
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
-    J is the source radiance of smoke in the middle of the domain, B the plate. Over the three channels, or their
-    combinations as much as they count, T is the least squares solution. None explains a pixel which the smoke makes
-    darker although J is brighter than B. Only smoke in its own shadow does so, and such a pixel counts as thick as can
-    be shown: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
+    J is the source radiance of smoke in the middle of the domain, B the plate. T is the least squares solution over the
+    three channels, or over their combinations as much as they count. No T explains a pixel that the smoke darkens
+    although J is brighter than B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a
+    fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
@@ -269,20 +259,10 @@ def shadowed_optical_depth(
 ) -> NDArray[np.float32]:
     """Optical depth (rows, columns) that explains a view's picture in an estimate's shadows: SHADED_DEPTH ln(1 + r).
 
-    The estimate's picture has the source radiance J = (image - T B) / (1 - T), and r is the share of the contrast B - J
-    that the view shows. If J were right the optical depth would be -ln(1 - r), which has no bound where r comes near to
-    1. But where the shadows fall is only assumed, so that J may be off by a factor of two.
-
-    Parameters
-    ----------
-    view
-        Whose `ObservedView.optical_depth` the estimate has.
-    image : (rows, columns, 3)
-        The estimate as the view's camera sees it before the view's plate.
-    transmittance : (rows, columns)
-        What the estimate lets through of the plate.
-    optics
-        How light travels through the domain.
+    The estimate has the view's optical depth. ``image`` (rows, columns, 3) and ``transmittance`` (rows, columns) are
+    what the view's camera sees of it before the view's plate B. Its source radiance is J = (image - T B) / (1 - T), and
+    r is the share of the contrast B - J that the view shows. If J were right the optical depth would be -ln(1 - r),
+    which has no bound as r nears 1. But where the shadows fall is only assumed, so J may be off by a factor of two.
     """
     plate, clear = view.plate.image, transmittance[..., None]
     contrast = plate - (image - clear * plate) / np.maximum(1 - clear, 1e-6)
@@ -299,9 +279,9 @@ def shadowed_optical_depth(
 def _in_shadow(image: Image, plate: Plate, mask: NDArray[np.bool_], contrast: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Where smoke has to be in its own shadow: it turns the picture away from its source radiance.
 
-    ``contrast`` (rows, columns, 3) is that of the background to the source radiance. Where the background is continued
-    from around the smoke, it may as well be too bright, by its errors. A shaded side is a patch of pixels; single ones
-    are a codec's errors.
+    ``contrast`` (rows, columns, 3) is that of the background to the source radiance. A background that is continued
+    from around the smoke may as well be too bright, by its errors. A shaded side is a patch of pixels; single ones are
+    a codec's errors.
     """
     away = np.sum((image - plate.image) * contrast, -1)
     noise = np.sum((noise_at(image, plate) * contrast) ** 2, -1)

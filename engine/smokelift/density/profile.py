@@ -5,15 +5,14 @@ One picture says how much smoke lies along a ray, not where. The profile
     rho(x, y, z) = m(x, z) g(y),   g(y) = exp(-(|y - y0| / A)^q)
 
 keeps the picture m as it is and spreads it about the smoke's axis y0. Where g is below `PROFILE_CUT` no smoke is
-expected, and what is spread is g - `PROFILE_CUT`: smoke that is cut off shows a shell. For a distribution of that form
-and standard deviation sigma, A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). Its width sigma is the geometric mean of two that
-the picture shows: the spread of the smoke's row, right for what rises as a column, and that of balls which fill the
-silhouette (inflated outlines: Igarashi, Matsuoka and Tanaka 1999), right for what is longer than it is thick in any
-direction, and round. Over four scenes with their axis known the mean was better in new views than either, by 0.4 to 0.9
-dB.
+expected, and g - `PROFILE_CUT` is spread: smoke that is cut off shows a shell. For such a distribution of standard
+deviation sigma, A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). sigma is the geometric mean of two widths that the picture
+shows. The spread of the smoke's row is right for what rises as a column. The width of balls that fill the silhouette
+(inflated outlines: Igarashi, Matsuoka and Tanaka 1999) is right for what is round and longer than thick in any
+direction. Over four scenes with their axis known the mean was better in new views than either, by 0.4 to 0.9 dB.
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
-density can have, so a ray's middle is moved along it to where most of the profile is inside as well
+density can have, so a ray's middle is moved along it until most of the profile is inside too
 (docs/experiments/inside-box.md).
 """
 
@@ -36,18 +35,18 @@ from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
 FLATNESS = 3.5
-"""q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes
+"""q: between a Gaussian (2) and a box. 3 to 4 were equally good over four scenes
 (docs/experiments/density-profile.md)."""
 
 SCALE = float(np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS)))
 """A in standard deviations."""
 
 PROFILE_CUT = 0.03
-"""Share of the profile's peak from which smoke is expected. It is there 1.4 times as wide as it is assumed to be, which
-is how far its width may be wrong (docs/experiments/every-view.md)."""
+"""Share of the profile's peak from which smoke is expected. The profile is there 1.4 times as wide as its width is
+assumed to be, which is how far that may be wrong (docs/experiments/every-view.md)."""
 
 ROOM = 0.5
-"""Distance, in A, of a ray's middle from the ends of a domain that holds all smoke: four fifths of the profile, about,
+"""Distance, in A, of a ray's middle from the ends of a domain that holds all smoke: about four fifths of the profile
 are inside then (docs/experiments/inside-box.md)."""
 
 SILHOUETTE = 0.05
@@ -58,28 +57,20 @@ THINNEST = 0.7
 """Half the thickness of a silhouette's thinnest parts, in pixels (docs/experiments/density-profile.md)."""
 
 DISTANCE_SHARE = 0.5
-"""Share of the distance between columns behind one another that lasts on the way up: they draw together
+"""Share of the distance between columns behind one another that lasts on the way up, as they draw together
 (docs/experiments/density-columns.md)."""
 
 SMOOTHING = 1.5
-"""Standard deviation of the Gaussian that smooths the thickness, in pixels (docs/experiments/density-profile.md)."""
+"""Standard deviation (pixels) of the Gaussian that smooths the thickness (docs/experiments/density-profile.md)."""
 
 
 def lateral_spread(
     amount: NDArray[np.float32], camera: Camera, domain: Domain
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Standard deviation (m) of the smoke across the picture, for each height.
+    """Heights (n,) and the smoke's standard deviation (n,) across the picture at each, in metres.
 
-    Parameters
-    ----------
-    amount : (rows, columns)
-        Optical depth, or anything proportional to it.
-
-    Returns
-    -------
-    heights, spread : (n,)
-        Heights (m, along the picture's height direction through the domain's centre) and the spread there, filled
-        from the neighbours where there is no smoke and smoothed over two voxels.
+    ``amount`` (rows, columns) is the optical depth, or proportional to it. Heights are above the domain's centre, along
+    `view_frame`'s height. Where there is no smoke the neighbours fill the spread; it is smoothed over two voxels.
     """
     rows = upright_rows(amount, camera, domain, per_voxel=1)
     # normalised convolution: heights count by the smoke that they hold
@@ -95,8 +86,8 @@ def lateral_spread(
 def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Half the thickness (pixels), seen from the front, of the balls that fill a silhouette (rows, columns).
 
-    About every pixel inside stands the largest ball whose outline stays inside; what a pixel shows of them all is as
-    thick as the one that is thickest there.
+    About every pixel inside stands the largest ball that stays inside the outline. A pixel shows the ball that is
+    thickest there.
     """
     half = np.where(mask, THINNEST, 0.0)
     # smoke goes on beyond the picture's edge, unless it is everywhere
@@ -111,7 +102,7 @@ def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 
 def ball_spread(amount: NDArray[np.float32], camera: Camera, domain: Domain) -> NDArray[np.float32]:
-    """Standard deviation (m) along the depth of the balls that fill the silhouette, for each pixel (rows, columns)."""
+    """Standard deviation (m) along the depth of the balls that fill the silhouette, at each pixel (rows, columns)."""
     smoky = amount > 0
     mask = amount > SILHOUETTE * (np.percentile(amount[smoky], 90) if smoky.any() else 1.0)
     weight = amount + 1e-3 * amount.max(initial=1e-30)
@@ -130,16 +121,10 @@ def _pixel_size(camera: Camera, domain: Domain) -> float:
 
 
 class _Rays(NamedTuple):
-    """Where the rays of pixels (rows, columns) meet the domain, in metres behind its centre.
+    """Where the rays of pixels meet the domain (rows, columns), in metres behind its centre.
 
-    Attributes
-    ----------
-    near, far
-        Where they enter and leave it.
-    middle, width
-        The axis, and A.
-    missed
-        Those that do not meet it.
+    A ray enters at `near` and leaves at `far`; `missed` marks those that do not meet the domain. `middle` is the axis
+    and `width` A.
     """
 
     near: NDArray[np.float64]
@@ -152,17 +137,8 @@ class _Rays(NamedTuple):
 class DepthProfile:
     """The profile that a picture suggests.
 
-    Parameters
-    ----------
-    amount : (rows, columns)
-        Optical depth, or anything proportional to it.
-    camera, domain
-        What is seen, from where.
-    axis
-        Where in depth its middle is, on the mean.
-    scatter
-        How the rays' middles scatter about it; None lets them stand on it. The profile is narrower then, so that the
-        smoke is as deep as without.
+    ``amount`` (rows, columns) is the optical depth, or proportional to it. The profile's middle stands on the axis, or
+    scatters about it, on the mean. With scatter the profile is narrower, so that the smoke is as deep as without.
     """
 
     def __init__(
@@ -225,7 +201,7 @@ class DepthProfile:
     def _shape_and_width(
         self, places: Places, voxels: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """The profile g and its A (m) at the marked voxels (n,): compiled, since there are millions on a large grid."""
+        """The profile g and its A (m) at the marked voxels (n,); compiled, as a large grid has millions."""
         axis, offsets = self._axis, zip(voxel_axes(self._domain), self._centre, strict=True)
         across = self._heights, np.zeros(1), self._spread[:, None]
         return _core.depth_profile(
@@ -263,10 +239,7 @@ class DepthProfile:
     def _kept_inside(self, aside: NDArray[np.float32]) -> NDArray[np.float32]:
         """How far (m) behind the axis each pixel's smoke has its middle (rows, columns) if all of it is inside.
 
-        Parameters
-        ----------
-        aside : (rows, columns)
-            The same wherever the domain ends.
+        ``aside`` (rows, columns) is the same without regard to the domain's ends.
         """
         ray = self._rays
         room = np.minimum(ROOM * ray.width, (ray.far - ray.near) / 2)

@@ -17,8 +17,8 @@ from smokelift.scene.projection import project_points, ray_through_pixels
 def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Lateral, depth and height directions (unit, world) in which one picture is understood.
 
-    Height is the world's Z, because smoke rises, unless the camera looks so steeply (over 45 degrees up or down)
-    that its own up direction is the better row of the picture.
+    Height is the world's Z, because smoke rises. It is the camera's up direction if the camera looks over 45 degrees up
+    or down: then that is the better row of the picture.
     """
     matrix = np.array(camera.matrix, np.float64)
     height = np.array([0.0, 0.0, 1.0])
@@ -51,7 +51,7 @@ class Upright:
     Attributes
     ----------
     heights : (n,)
-        Of the rows, in metres above the centre.
+        Metres above the centre.
     total : (n,)
         Amount in each row, times metres.
     mean, spread : (n,)
@@ -86,7 +86,7 @@ class Screen:
     width: float
 
     def rows(self, part: slice = slice(None)) -> Upright:
-        """Sums along the rows, of some of the columns."""
+        """Sums along the rows, over some of the columns."""
         across, values = self.laterals[part], self.values[:, part]
         total = values.sum(1)
         safe = np.where(total > 0, total, 1.0)
@@ -96,7 +96,7 @@ class Screen:
 
 
 def upright_rows(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Upright:
-    """Sum a picture (rows, columns) up along the rows of the upright screen, ``per_voxel`` of them to a voxel."""
+    """Sum up a picture (rows, columns) along the rows of the upright screen, ``per_voxel`` rows to a voxel."""
     return upright_screen(amount, camera, domain, per_voxel=per_voxel).rows()
 
 
@@ -115,7 +115,7 @@ def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, 
 
 
 def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
-    """Return what a picture (rows, columns) shows at points (..., 3), in metres; zero outside and behind the camera."""
+    """What a picture (rows, columns) shows at points (..., 3), in metres; zero outside and behind the camera."""
     pixels, distance = project_points(camera, points)
     at = pixels[..., 1] - 0.5, pixels[..., 0] - 0.5
     values = ndimage.map_coordinates(picture.astype(np.float64), at, order=1, mode="constant")

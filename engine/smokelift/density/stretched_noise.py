@@ -1,8 +1,8 @@
 """Noise that breaks the smooth answer's symmetry: as strong as the clip's own detail on every scale, and stretched.
 
-Each octave has the strength that the clip's pictures show on its scale, so turbulent smoke gets lobes, and laminar
-smoke stays as it is. Each is looked up where random motion of the coarser scales has taken it from: a flow draws smoke
-out into sheets and threads, where plain noise has round grains (Perlin, "An image synthesizer", 1985).
+Each octave is as strong as the clip's pictures are on its scale: turbulent smoke gets lobes, laminar smoke stays as it
+is. Each is read where random motion of the coarser octaves has taken it from: a flow draws smoke out into sheets and
+threads, where plain noise has round grains (Perlin, "An image synthesizer", 1985).
 """
 
 from __future__ import annotations
@@ -24,46 +24,36 @@ MAX_NODE_DISTANCE = 2.0
 """Distance between nodes of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large."""
 
 MIN_NODE_DISTANCE = 3.5
-"""Voxels between nodes of the finest octave, at least: finer ones flicker (docs/experiments/stretched-noise.md), and
-where their detail is made to last the front loses (docs/experiments/detail-strength.md)."""
+"""Smallest distance (voxels) between nodes of the finest octave. Finer ones flicker
+(docs/experiments/stretched-noise.md), and where their detail is made to last the front loses
+(docs/experiments/detail-strength.md)."""
 
 STRETCH = 0.2
-"""Standard deviation of the motion of each scale, over the distance between its nodes: more draws the smoke out into
-straws (docs/experiments/stretched-noise.md)."""
+"""Standard deviation of each octave's motion, over the distance between its nodes: more draws the smoke out into straws
+(docs/experiments/stretched-noise.md)."""
 
 LATTICE = 32
 """Nodes along each side of a lattice, which repeats."""
 
 NODES = np.float32((2 / 3) ** 1.5)
-"""Standard deviation of what is interpolated linearly between nodes of unit variance in three dimensions."""
+"""Standard deviation of linear interpolation in three dimensions between nodes of unit variance."""
 
 BODY = 0.1
 """Share of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not count."""
 
 NEIGHBOURS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
-"""Blurs of the octaves whose energy is found in a band, over the band's own: others add less than a hundredth."""
+"""Blurs of the octaves whose energy a band holds, over the band's own: others add less than a hundredth."""
 
 FINE_ENOUGH = 1.5
-"""Standard deviation (pixels) of the blurs that measure detail, at least: larger pictures are reduced first."""
+"""Smallest standard deviation (pixels) of the blurs that measure detail: larger pictures are reduced first."""
 
 
 def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
-    """Measure how much the density of some smoke fluctuates on the scale of every octave.
+    """Standard deviation of the logarithm of some smoke's density by octave, the coarsest first.
 
-    A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart, is divided
-    by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
-
-    Parameters
-    ----------
-    pictures
-        Optical depth, a pixel a voxel.
-    width
-        Standard deviation of the smoke across its axis, in voxels.
-
-    Returns
-    -------
-    tuple
-        Standard deviation of the logarithm of the density by octave, the coarsest first.
+    The pictures are optical depths, a pixel a voxel; the smoke is ``width`` voxels wide (standard deviation across its
+    axis). A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart, is
+    divided by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
     """
     octaves = max(1, 1 + int(np.log2(MAX_NODE_DISTANCE * width / MIN_NODE_DISTANCE)))
     blurs = [MAX_NODE_DISTANCE * width / 2**octave / np.sqrt(6) for octave in range(octaves)]
@@ -95,18 +85,16 @@ def _unit_energy(blur: float, width: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class StretchedNoise:
-    """Noise in octaves that each are stretched by the coarser ones' motion.
+    """Octaves of noise, each stretched by the motion of the coarser ones.
 
     Attributes
     ----------
     moved : (3,)
-        How far it has moved, in voxels of the finest grid.
+        How far the noise has moved, in voxels of the finest grid.
     width
         Standard deviation of the smoke across its axis, in voxels of that grid.
     strengths
         Standard deviation by octave, the coarsest first.
-    seed
-        Of the noise.
     """
 
     moved: NDArray[np.float64]
@@ -143,7 +131,7 @@ class StretchedNoise:
 
 
 class _Octaves(NamedTuple):
-    """The sum (n,) of some octaves of noise, the motion (3, n) in voxels that draws out the next, their number."""
+    """The sum (n,) of some octaves of noise, the motion (3, n) in voxels that draws out the next, and their number."""
 
     noise: NDArray[np.float32]
     motion: NDArray[np.float32]
@@ -151,14 +139,14 @@ class _Octaves(NamedTuple):
 
 
 def _finer(values: NDArray[np.float32], coarser: MomentLevel, level: MomentLevel) -> NDArray[np.float32]:
-    """Values at the voxels that may hold smoke on one grid, at those of the next finer one."""
+    """Values at the voxels of one grid that may hold smoke, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
     field.ravel()[coarser.views.where] = values
     return coarser.finer(field, level)
 
 
 class _Lattice(NamedTuple):
-    """Values of unit variance between nodes, and where in the lattice the domain's low corner lies, (3, 1) nodes."""
+    """Values at nodes, of unit variance between them, and the place (3, 1) of the domain's low corner, in nodes."""
 
     values: NDArray[np.float32]
     corner: NDArray[np.float32]
@@ -166,7 +154,7 @@ class _Lattice(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _lattices(seed: int, count: int) -> tuple[_Lattice, ...]:
-    """The lattices of a clip's octaves: they are the same in all of its frames."""
+    """The lattices of a clip's octaves, the same in all of its frames."""
     random = np.random.default_rng(seed)
     return tuple(
         _Lattice(

@@ -1,16 +1,16 @@
 """Where the fit of a frame starts, from the depth prior's density and the one carried along from the frame before.
 
-The carried (advected) density knows optical depths that the renderer has corrected for shadows already, and structures
-along the rays. `BlendCarried`, for the smooth answer, judges it before any correction by D, the squared difference
-between the input's picture and what a density renders to. It blends in two shares:
+The carried (advected) density has structures along the rays, and optical depths that the renderer has corrected for
+shadows already. `BlendCarried`, for the smooth answer, judges densities before any correction by D, the squared
+difference between the input's picture and what a density renders to. It blends the carried density in by two shares:
 
     of the rays' optical depths, by skill against the prior:      largest (1 - D(carried) / (D(prior) + noise))
     of the density itself, by skill against persistence:          largest (1 - D(carried) / (D(before) + noise))
 
 and never below zero. `before` is the density of the frame before, left where it was: persistence, by which the skill of
 weather forecasts is measured. A wrong velocity is no better than none, and then nothing is blended in. `largest` limits
-both (docs/experiments/temporal-prior.md), so that errors which no picture corrects, in thick smoke or in shadow, do not
-grow from frame to frame.
+both shares (docs/experiments/temporal-prior.md), so that errors which no picture corrects, in thick smoke or in shadow,
+do not grow from frame to frame.
 
 `GuidedSimulation`, for smoke with made-up detail, is a simulation that the clip guides: the detail of the frame before
 moves on with the flow, and the smooth answer of the new picture says how much smoke is where.
@@ -34,27 +34,23 @@ TINY = np.finfo(np.float32).tiny
 """Smallest normal number, for divisions and logarithms."""
 
 MIN_DEPTH_SHARE = 1e-3
-"""Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
+"""Share of the largest optical depth below which a logarithm means nothing."""
 
 LARGEST_GAIN = 3.0
-"""Bound of the factor by which carried smoke is made denser. Where that is too little the prior's smoke is added: there
-smoke has entered, or has moved otherwise than was predicted."""
+"""Bound of the factor that makes carried smoke denser. Where that is too little the prior's smoke is added: there smoke
+has entered, or has moved otherwise than was predicted."""
 
 
 MIN_NEW_DENSITY = np.float32(0.3)
 """Mean densities of the smooth answer below which nothing is taken to have entered. Faint smoke that leaves at the
-support's edge would be filled up again in every frame, and show as a shell (docs/experiments/level-layers.md)."""
+support's edge would be filled up again in every frame and show as a shell (docs/experiments/level-layers.md)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smoke:
     """The smoke of a moment.
 
-    Attributes
-    ----------
-    density : (nx, ny, nz) float32
-    smooth : (nx, ny, nz) float32, optional
-        The same without what the depth prior makes up; None if that is all of it.
+    `smooth` (nx, ny, nz) is the density without what the depth prior makes up; None if that is all of it.
     """
 
     density: Volume
@@ -63,14 +59,7 @@ class Smoke:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where the fit of a frame starts.
-
-    Attributes
-    ----------
-    density : (nx, ny, nz) float32
-    figures
-        What decided it, by name.
-    """
+    """Where the fit of a frame starts: a density (nx, ny, nz), and the figures that decided it."""
 
     density: Volume
     figures: Mapping[str, float]
@@ -106,10 +95,7 @@ class NothingCarried:
 class BlendCarried:
     """A prior that takes over as much of the carried density as proves right; see the module.
 
-    Attributes
-    ----------
-    largest
-        Largest share of the carried density, 0 to 1.
+    `largest` is the largest share of it, 0 to 1.
     """
 
     largest: float
@@ -117,9 +103,9 @@ class BlendCarried:
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The prior's density, mixed with the carried one; see `TemporalPrior`.
 
-        Its figures are ``share`` of the density and ``amounts``, the share of the rays' optical depths, with
-        what decided them: ``loss_prior``, ``loss_carried`` and ``loss_before`` (sums of squares over the input's
-        picture, linear radiance).
+        Its figures are ``share``, that of the density, and ``amounts``, that of the rays' optical depths, with what
+        decided them: ``loss_prior``, ``loss_carried`` and ``loss_before`` (sums of squares over the input's picture,
+        linear radiance).
         """
         prior, moved, view = depth.density, carried.density, views.views[0]
         if not (prior.any() and moved.any()):
@@ -163,15 +149,9 @@ class GuidedSimulation:
 
     Detail is born where nothing is carried, at inlets above all, and moves on from there. A hole at an inlet is
     narrower than the blur, and a gap may be detail: the smooth answer, which has no gaps, tells them apart
-    (docs/experiments/level-layers.md). In every frame `kept` leaves some to be renewed
-    (docs/experiments/every-view.md).
-
-    Attributes
-    ----------
-    largest
-        Of `BlendCarried`, which stands in where the depth prior makes nothing up.
-    kept
-        Share of the detail that a frame takes over.
+    (docs/experiments/level-layers.md). `kept` is the share of the detail that a frame takes over: the rest is renewed
+    (docs/experiments/every-view.md). `largest` is that of `BlendCarried`, which stands in where the depth prior makes
+    nothing up.
     """
 
     largest: float
@@ -180,7 +160,7 @@ class GuidedSimulation:
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The carried density in the smooth answer's amounts; see `TemporalPrior`.
 
-        Its figure ``share`` is the share of the smoke that is taken over.
+        Its figure ``share`` is that of the smoke which is taken over.
         """
         if depth.detail is None or not views.hull.any():
             return BlendCarried(self.largest).start(views, depth, carried, before)
@@ -208,9 +188,9 @@ def _skill(loss: float, reference: float) -> float:
 def _with_optical_depth(
     density: Volume, view: ObservedView, have: NDArray[np.float32], want: NDArray[np.float32], share: float
 ) -> Volume:
-    """A density, its rays changed from the optical depths (rows, columns) that they have towards others.
+    """A density, its rays' optical depths (rows, columns) changed by a share towards others.
 
-    They are mixed in logarithms. Where none is wanted nothing is known, because smoke may have come in.
+    The depths are mixed in logarithms. Where none is wanted nothing is known, because smoke may have come in.
     """
     faint = MIN_DEPTH_SHARE * want.max()
     step = share * np.log((want + faint) / (have + faint)) * want / (want + faint)

@@ -24,13 +24,8 @@ Spans = NDArray[np.int32]
 class Turntable:
     """A domain on a turntable before a camera, with a screen through its centre.
 
-    Attributes
-    ----------
-    lateral, depth, height : (3,)
-        Directions (unit, world) of the view that faces the screen. The domain turns about the last, which is an axis of
-        the grid.
-    domain
-        Its centre is on the axis.
+    `lateral`, `depth` and `height` (3,) are the directions (unit, world) of the view that faces the screen. The domain
+    turns about `height`, an axis of the grid through its centre.
     """
 
     lateral: Doubles
@@ -40,7 +35,7 @@ class Turntable:
 
     @staticmethod
     def before(camera: Camera, domain: Domain, axis: int | None = None) -> Turntable:
-        """Put a domain before a camera; the axis is the one that is nearest to the view's height unless it is given."""
+        """Put a domain before a camera, on the given axis of the grid or the one nearest to the view's height."""
         _, depth, up = view_frame(camera)
         axis = int(np.argmax(np.abs(up))) if axis is None else axis
         height = np.zeros(3)
@@ -64,7 +59,7 @@ class Turntable:
         return int(np.ceil(2 * columns - 1e-6)), self.domain.resolution[self.axis]
 
     def camera(self, degrees: float) -> Camera:
-        """Return the orthographic camera that sees the domain turned; it stands to the right at 90 degrees."""
+        """The orthographic camera that sees the domain turned; it stands to the right at 90 degrees."""
         right = self._right(degrees)
         back = np.cross(right, self.height)
         distance = np.linalg.norm(np.array(self.domain.max) - self.domain.min)
@@ -76,7 +71,7 @@ class Turntable:
         return Camera("orthographic", as_matrix(matrix), (columns, rows), scale, scale, columns / 2, rows / 2)
 
     def degrees(self, camera: Camera) -> float:
-        """Return how far the domain is turned for a camera: the inverse of `camera`."""
+        """How far the domain is turned for a camera: the inverse of `camera`."""
         back = np.array(camera.matrix)[:3, 2]
         return float(np.degrees(np.arctan2(back @ self.lateral, -(back @ self.depth))))
 
@@ -126,7 +121,7 @@ class Turntable:
         return np.asarray(np.cos(turn) * self.lateral + np.sin(turn) * self.depth)
 
     def _turned(self, degrees: float, corner: tuple[int, int]) -> tuple[float, tuple[float, float]]:
-        """Column of the first column of voxels, and the steps to the next ones along both other axes."""
+        """Screen column of the first column of voxels, and the steps to the next ones along both other axes."""
         right = self._right(degrees)
         a, b = (axis for axis in range(3) if axis != self.axis)
         steps = float(right[a]), float(right[b])
@@ -136,5 +131,5 @@ class Turntable:
 
 
 def filled_spans(upright: Volume) -> Spans:
-    """Where the columns of an upright volume are not zero: there alone is something to be done."""
+    """Where the columns of an upright volume are not zero: the work is there alone."""
     return _core.filled_spans(upright)

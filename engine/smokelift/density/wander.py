@@ -1,9 +1,9 @@
 """Smoke that wanders in depth: where the middle of each ray's smoke stands beside the axis.
 
-The axis of one picture's smoke is a mean, and smoke about it is a lathe's work from the side. In true smoke the rays'
-middles scatter about it by a share of the smoke's depth (docs/experiments/wander.md). What scatters them are the lobes
-that roughen the pictures, so each octave of the scatter is as strong as the clip's detail is on its scale, and laminar
-smoke stays straight. It travels with the smoke.
+The axis of one picture's smoke is a mean. From the side, smoke about it looks turned on a lathe. In true smoke the
+rays' middles scatter about it by a share of the smoke's depth (docs/experiments/wander.md). The lobes that scatter them
+roughen the pictures too. So each octave of the scatter is as strong as the clip's detail on its scale, and laminar
+smoke stays straight. The scatter travels with the smoke.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NODES = (1.6, 0.8)
 (docs/experiments/wander.md)."""
 
 LARGEST_SHARE = 0.9
-"""Bound of the standard deviation of the rays' middles over the smoke's: what is left of it is each ray's own."""
+"""Bound of the standard deviation of the rays' middles over the smoke's: the rest is each ray's own depth."""
 
 LARGEST = 2.0
 """Bound of the scatter, in its standard deviations: smoke stays where the domain is likely to hold it."""
@@ -36,22 +36,17 @@ LATTICE = 32
 """Nodes along each side of a lattice, which repeats."""
 
 NODE_DEVIATION = (151 / 315) ** 1.5
-"""Standard deviation of cubic B-splines with coefficients of unit variance in three dimensions: the squares of those
-that reach a place have the sum 151 / 315 along each, on the mean."""
+"""Standard deviation of cubic B-splines in three dimensions with coefficients of unit variance: along each dimension
+the squares of those that reach a place add up to 151 / 315 on the mean."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
     """Where the middles of the rays' smoke stand at one moment.
 
-    Attributes
-    ----------
-    aside : (rows, columns)
-        How far behind the axis, over the smoke's standard deviation in depth.
-    share
-        Standard deviation of that.
-    width
-        Of the smoke across its axis, in metres: a lobe moves as one.
+    `aside` (rows, columns) is how far behind the axis, over the smoke's standard deviation in depth, and `share` the
+    standard deviation of that. The smoke is `width` metres wide (standard deviation across its axis): a lobe moves as
+    one.
     """
 
     aside: NDArray[np.float32]
@@ -71,8 +66,6 @@ class Wander:
         Standard deviation of the smoke across its axis, in voxels.
     roughness
         Standard deviation of the logarithm of its density by octave, the coarsest first; see `stretched_noise`.
-    seed
-        Of another way to wander.
     """
 
     velocity: Doubles
@@ -95,10 +88,8 @@ class Wander:
     def aside(self, places: Doubles, frame: int) -> Doubles:
         """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
 
-        Parameters
-        ----------
-        places : (rows, columns, 3)
-            Where the pixels' rays cross an upright plane through the domain's centre, in voxels from there.
+        ``places`` (rows, columns, 3) are where the pixels' rays cross an upright plane through the domain's centre, in
+        voxels from there.
         """
         random = np.random.default_rng(self.seed)
         at = np.moveaxis(places - frame * self.velocity, -1, 0)

@@ -15,9 +15,9 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)
 
 from coarse to fine grids (`pyramid`), linearised anew after every solve (`linearisation`, `coarse_to_fine`). Before and
-after are the densities that `preparation` makes of the given ones. Dividing by s makes every weight independent of the
-scales of density, space and time. k is `unexplained` over the share of the change that u_p leaves unexplained, so it
-grows as u_p gets better.
+after are the densities as `preparation` makes them. Division by s makes every weight independent of the scales of
+density, space and time. k is `unexplained` over the share of the change that u_p leaves unexplained: it grows as u_p
+gets better.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
 """

@@ -30,16 +30,16 @@ from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.source_detection import SourceDetection
 
 ONE_VIEW_SMOOTHNESS = 10.0
-"""Factor on `smoothness` for densities of one view: what moves is mixed along its rays, and a depth that is assumed
+"""Factor on `smoothness` for densities of one view. What moves is mixed along its rays, and a depth that is assumed
 anew in every frame moves as well (docs/experiments/velocity-one-view.md)."""
 
 CONFIDENCE_WIDTH = 2.0
-"""Standard deviation in voxels over which gradients count: smoothness carries what they show about as far."""
+"""Standard deviation (voxels) over which gradients count: smoothness carries what they show about as far."""
 
 
 @dataclass(frozen=True)
 class CoarseToFine:
-    """The default estimator (a `VelocityEstimator`); see `smokelift.velocity` for the function that it minimises."""
+    """The default estimator (a `VelocityEstimator`); `smokelift.velocity` has the function that it minimises."""
 
     settings: VelocitySettings = field(default_factory=VelocitySettings)
 
@@ -75,26 +75,19 @@ class CoarseToFine:
         return estimate.velocity(pair.dt, pair.voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
-        """The velocity of the next frame if no force acts, carried along on its grid."""
+        """The velocity of the next frame if no force acts, carried along on its own grid."""
         predicted = predict_velocity(velocity, dt)
         return smoothed(predicted) if self.settings.coarsening else predicted
 
     def of_one_view(self) -> CoarseToFine:
-        """Return itself with more smoothness."""
+        """The estimator with more smoothness."""
         return replace(self, settings=replace(self.settings, smoothness=ONE_VIEW_SMOOTHNESS * self.settings.smoothness))
 
 
 class _Solved(NamedTuple):
     """What a solve found, and what of its problem is still needed.
 
-    Attributes
-    ----------
-    u
-        In voxels of its grid a frame.
-    direction, weight, smoke
-        Of the `Linearisation`.
-    smoothness
-        Weight of |grad curl v|^2.
+    `u` is in voxels of its grid a frame, `smoothness` the weight of |grad curl v|^2; the rest is the `Linearisation`'s.
     """
 
     u: StaggeredGrid
@@ -105,22 +98,10 @@ class _Solved(NamedTuple):
 
 
 class _Estimation:
-    """One estimate: from coarse to fine, or on the finest grid alone where a prediction is good enough to start from.
+    """One estimate: from coarse to fine, or on the finest grid alone if a prediction is good enough to start from.
 
-    Parameters
-    ----------
-    finest
-        The densities.
-    prediction
-        What the velocity should be near; None if there is none.
-    sources
-        How smoke that enters is found; None looks for none.
-    pair
-        The densities with what is known of their noise and contrast.
-    closed
-        Sides that are walls.
-    settings
-        See `VelocitySettings`.
+    ``finest`` are the densities, ``pair`` the same with what is known of their noise and contrast. Without ``sources``
+    no smoke that enters is searched for.
     """
 
     def __init__(
@@ -172,7 +153,7 @@ class _Estimation:
         return VelocityEstimate(self._u, {**self._effort, **self._figures}, confidence, source, residual)
 
     def _linearisations(self, level: Level) -> int:
-        """How many times the change is linearised on a grid, at most."""
+        """Largest number of linearisations on a grid."""
         settings = self._settings
         large = level is self._finest and level.after.size > settings.large_grid
         return 1 if large else settings.linearisations
@@ -249,7 +230,7 @@ def _around_prediction(
 
 
 def _regularisation(unexplained: float, settings: VelocitySettings) -> Regularisation:
-    """The weights for a centre that leaves a share of the change unexplained: the less, the stiffer."""
+    """The weights around a centre: the less of the change it leaves unexplained, the stiffer."""
     stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
     return Regularisation(
         second_order=stiffness * settings.smoothness,
@@ -261,7 +242,7 @@ def _regularisation(unexplained: float, settings: VelocitySettings) -> Regularis
 def _source(
     level: Level, u: StaggeredGrid, weight: Array, settings: VelocitySettings, pair: PreparedPair
 ) -> tuple[Array, ResidualMeans]:
-    """Density that enters in a frame, that is what is left unexplained where changes are not motion; and all of it."""
+    """Density that enters in a frame, unexplained and no motion; and the means of all that is unexplained."""
     carried, after = advect_cells(level.before, u), level.after
     detection = settings.sources or SourceDetection()
     residual = detection.means(after - carried, np.maximum(after, carried), 1.0, level.past)
@@ -281,7 +262,7 @@ def _confidence(direction: Faces, weight: Array, smoothness: float) -> Array:
 
 
 def _step(solution: StaggeredGrid, u: StaggeredGrid, smoke: npt.NDArray[np.bool_]) -> float:
-    """Root mean square of what a solve changed, in voxels, on the low faces of voxels with smoke."""
+    """Root mean square change (voxels) that a solve made on the low faces of voxels with smoke."""
     nx, ny, nz = smoke.shape
     pairs = zip(solution.faces, u.faces, strict=True)
     return float(np.sqrt(sum(np.square((new - old)[:nx, :ny, :nz][smoke]).mean() for new, old in pairs)))
@@ -290,6 +271,6 @@ def _step(solution: StaggeredGrid, u: StaggeredGrid, smoke: npt.NDArray[np.bool_
 def _clamped(solution: StaggeredGrid, u: StaggeredGrid, largest: float) -> StaggeredGrid:
     """The solution, with increments cut to what the linearisation around `u` can know.
 
-    Beyond that the data term says nothing, and thin or noisy smoke would throw single wisps many voxels far.
+    Beyond that the data term says nothing: thin or noisy smoke would throw single wisps many voxels far.
     """
     return u.with_faces(_core.clamp_increment(solution.faces, u.faces, largest, u.walls))

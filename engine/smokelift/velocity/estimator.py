@@ -30,10 +30,10 @@ from smokelift.velocity.pair import Density, DensityPair
 from smokelift.velocity.pyramid import coarsen_faces, prolonged
 
 REACH = 1
-"""Coarse voxels around a box that its fine velocity depends on: see `prolonged`."""
+"""Coarse voxels around a box that its fine velocity depends on; see `prolonged`."""
 
 LARGEST_DENSITY = 1e12
-"""Above this, sums of fourth powers of densities are not finite in 32 bits."""
+"""Largest density of which sums of fourth powers are finite in 32 bits."""
 
 
 class VelocityEstimator(Protocol):
@@ -56,31 +56,21 @@ class VelocityEstimator(Protocol):
 
 
 def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
-    """The velocity of the next frame if no force acts: carried along by itself, then projected.
+    """The velocity of the next frame (after ``dt`` seconds) if no force acts: carried along by itself, then projected.
 
-    Parameters
-    ----------
-    velocity
-        Velocity of one frame.
-    dt
-        Time between frames in seconds.
-
-    Returns
-    -------
-    Velocity
-        Without divergence; `residual` stays as it is, because inlets stand still.
+    Its residual stays as it is, because inlets stand still.
     """
     return replace(project(advect(velocity, velocity, dt)), residual=velocity.residual)
 
 
 def coarsened(velocity: Velocity) -> Velocity:
-    """A velocity on a grid half as fine; the residual is on that already."""
+    """A velocity on a grid half as fine, where its residual already is."""
     coarse = coarsen_faces(velocity)
     return Velocity(coarse.faces, coarse.voxel_size, coarse.closed, residual=velocity.residual)
 
 
 def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
-    """A velocity of a coarser grid, halved from one of so many voxels, on that; itself if it is on that already.
+    """A velocity refined to the grid (shape) that its own was halved from; itself if it is on that already.
 
     It has no divergence there. The residual stays as it is.
     """
@@ -92,7 +82,7 @@ def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
 
 
 def refined_figures(coarse: Velocity, fine: Velocity) -> dict[str, float]:
-    """The figures of a velocity on a finer grid; its divergence is found there."""
+    """The figures of a velocity on a finer grid, with the divergence there."""
     if not coarse.figures:
         return {}
     return {**coarse.figures, "divergence": _core.relative_divergence(fine.faces)}
@@ -130,18 +120,9 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
 
 @dataclass(frozen=True, eq=False)
 class VelocityEstimate:
-    """A velocity in voxels a frame, and what is known about it.
+    """A velocity `u` in voxels a frame, how it was found, and what is known of it.
 
-    Attributes
-    ----------
-    u
-        The velocity.
-    figures
-        How it was found.
-    confidence, source : (nx, ny, nz) float32
-        As in `Velocity`, the source per frame.
-    residual
-        As in `Velocity`.
+    The rest is as in `Velocity`, but `source` is per frame.
     """
 
     u: StaggeredGrid
@@ -182,7 +163,7 @@ def checked(pair: DensityPair, prediction: Velocity | None) -> tuple[Array, Arra
 
 
 def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:
-    """1 where changes may be taken for motion, 0 where smoke is known to enter, shape (nx, ny, nz)."""
+    """1 in voxels (nx, ny, nz) where changes may be taken for motion, 0 where smoke is known to enter."""
     if inflow is None:
         return np.broadcast_to(np.float32(1), shape)
     # blur and gradients take the change there one voxel further

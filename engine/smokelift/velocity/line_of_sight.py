@@ -1,8 +1,8 @@
 """What one camera alone leaves open in a velocity: how it changes along the line of sight.
 
-A density from one view has its detail in the right place of the picture. Its depth and its profile along the ray are
-assumed. The velocity to expect there is the mean over all depths that the smoke may have: one that hardly changes
-along the ray. So it is averaged along the line of sight (docs/experiments/velocity-one-view.md).
+The detail of a density from one view is in the right place of the picture. Its depth and its profile along the ray are
+assumed. The expected velocity is the mean over all depths that the smoke may have, which hardly changes along the ray.
+So the velocity is averaged along the line of sight (docs/experiments/velocity-one-view.md).
 """
 
 from __future__ import annotations
@@ -19,18 +19,13 @@ SPREAD = 1 / 8
 """Standard deviation of the average, in shortest sides of the box, which is cut out around the smoke."""
 
 REACH = 2.5
-"""Standard deviations up to which it reaches."""
+"""Reach of the average, in standard deviations."""
 
 
 def averaged_along(velocity: Velocity, line: Direction) -> Velocity:
-    """A velocity averaged along a line of sight, without divergence.
+    """A velocity averaged along a line of sight, without divergence; what is known of it stays as it is.
 
-    Parameters
-    ----------
-    velocity
-        With all that is known of it, which stays as it is.
-    line
-        Its direction; of any length, either way.
+    The line has any length and either direction.
     """
     kernel = _line(np.array(line) / np.linalg.norm(line), SPREAD * min(velocity.shape))
     # one kernel for all components keeps the divergence zero, but not at the sides of the box
@@ -39,7 +34,7 @@ def averaged_along(velocity: Velocity, line: Direction) -> Velocity:
 
 
 def _line(direction: NDArray[np.float64], deviation: float) -> NDArray[np.float32]:
-    """A Gaussian of so many voxels on a line through the middle of a box: every point is shared by its eight voxels."""
+    """A Gaussian of so many voxels on a line through the middle of a box: eight voxels share every point."""
     ends = int(np.ceil(REACH * deviation))
     along = np.arange(-ends, ends + 1)
     points, amounts = along[:, None] * direction, np.exp(-0.5 * np.square(along / deviation))

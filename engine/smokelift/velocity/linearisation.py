@@ -30,7 +30,7 @@ class Linearisation:
     smoke : (nx, ny, nz) bool
         Where there is smoke.
     scale
-        Density gradient by which all of it is divided: its root mean square in the smoke.
+        Density gradient that divides all of it: the root mean square in the smoke.
     """
 
     direction: Faces
@@ -45,7 +45,7 @@ class Linearisation:
         return replace(self, offset=self.offset + np.float32(share) * self.carried) if share else self
 
     def unexplained(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
-        """What a velocity leaves of the squared change: the share beyond noise of a variance, and all of it."""
+        """The share of the squared change that a velocity leaves beyond noise of a variance, and all that it leaves."""
         whole, rest, inside = _core.residual_sums(self.direction, self.offset, self.weight, self.smoke, u.faces)
         floor = noise / self.scale**2 * inside
         return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
@@ -53,18 +53,9 @@ class Linearisation:
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Weights of what a velocity u costs beside the data term, with v = u - centre.
+    """Weights of what a velocity u costs beside the data term.
 
-    Attributes
-    ----------
-    first_order
-        Of |grad v|^2.
-    second_order
-        Of |grad curl v|^2.
-    kinetic
-        Of |v|^2.
-    irrotational
-        Of |curl u|^2 outside the smoke.
+    With v = u - centre they weigh |grad v|^2, |grad curl v|^2, |v|^2, and |curl u|^2 outside the smoke, in this order.
     """
 
     first_order: float = 0.0
@@ -76,18 +67,10 @@ class Regularisation:
 def linearise(
     level: Level, u: StaggeredGrid, threshold: float, sources: SourceDetection | None
 ) -> Linearisation | None:
-    """The change around `u`; None where there is no structure to follow.
+    """The change around `u`, in voxels of the level a frame; None where there is no structure to follow.
 
-    Parameters
-    ----------
-    level
-        The densities.
-    u
-        In voxels of the level a frame.
-    threshold
-        Fraction of the largest density from which a voxel counts as smoke.
-    sources
-        How smoke that enters is found; None looks for none.
+    A voxel counts as smoke from the fraction ``threshold`` of the largest density. Without ``sources`` no smoke that
+    enters is searched for.
     """
     (gx, gy, gz), offset, residual, carried, density, smoke, scale = _core.linearise(
         level.before, level.after, u.faces, threshold

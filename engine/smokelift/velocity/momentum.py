@@ -6,13 +6,13 @@ alone sets the whole box in motion at P(m), with P the pressure projection. From
     m = density * (a + B x),     x from -1 to 1 over the box,
 
 a and B are twelve numbers: enough for smoke that rises, leans, spreads or speeds up on its way. After a prediction m is
-only the momentum gained in one frame, buoyancy say, and B = 0. The numbers are fitted by least squares to the same
+only the momentum gained in one frame, by buoyancy say, and B = 0. The numbers are fitted by least squares to the same
 linearised change as the velocity itself, together with the trust t in the prediction and the dissipation d:
 
     min sum W (r + d before + g . (t u_p + P(m) - u_k))^2
 
-d is the share of the smoke that dissolves or, below zero, that gets denser, as a clip that flickers has it. Without d
-either would be fitted as motion. The regulariser penalises the distance from the velocity that is fitted here.
+d is the share of the smoke that dissolves. Below zero smoke gets denser, as in a clip that flickers. Without d either
+would be fitted as motion. The regulariser penalises the distance from the velocity that is fitted here.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from smokelift.transport import Array, StaggeredGrid, Velocity
 from smokelift.velocity.linearisation import Linearisation
 
 RIDGE = 1e-3
-"""Relative to the diagonal of the normal equations, so that what the smoke does not determine stays small."""
+"""Ridge over the diagonal of the normal equations: what the smoke does not determine stays small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Prediction:
         return self.dt / self.velocity.voxel_size
 
     def displacement(self) -> StaggeredGrid:
-        """Displacement in voxels a frame."""
+        """The prediction in voxels a frame."""
         return self.velocity.displacement(self.dt)
 
 
@@ -73,7 +73,7 @@ class Centre:
         return grid.with_faces(_core.add_momentum(density, self.momentum, weight, faces, grid.walls))
 
     def refined(self) -> Centre:
-        """Return the centre on a grid that is twice as fine."""
+        """The centre on a grid twice as fine."""
         return Centre(self.trust, self.dissipation, 2 * self.momentum)
 
 
@@ -87,20 +87,8 @@ def fit_centre(
 ) -> Centre:
     """Fit trust, momentum and dissipation to a linearised change.
 
-    Parameters
-    ----------
-    prediction
-        None if there is none.
-    density : (nx, ny, nz) float32
-        What momentum goes with.
-    linear
-        The linearised change.
-    grid
-        Any field on the grid of the estimate.
-    share
-        Part of the fitted momentum that is kept.
-    brightening
-        See `VelocitySettings`.
+    The density (nx, ny, nz) is what momentum goes with. ``grid`` is any field on the estimate's grid. ``share`` is the
+    part of the fitted momentum that is kept; `VelocitySettings` has ``brightening``.
     """
     rows = 4 if prediction is None else 1
     columns = []
@@ -124,7 +112,7 @@ def fit_centre(
 def _least_squares(products: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], float]:
     """The factors x that make |offset + columns . x|^2 least, and what is left of it.
 
-    From the products of all columns, the last the offset.
+    ``products`` are those of all columns, the last one the offset.
     """
     normal, right = products[:-1, :-1], -products[:-1, -1]
     size = np.sqrt(np.diag(normal)) + 1e-30

@@ -15,34 +15,19 @@ from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, 
 from smokelift.velocity.estimator import refined_figures, refined_in
 
 MIN_SLAB_VOXELS = 4_000_000
-"""Voxels of a box around smoke, above which it is cut into slabs: each is as narrow as the smoke is there."""
+"""Voxels of a box around smoke above which it is cut into slabs, each as narrow as the smoke is there."""
 
 SLAB = 64
-"""Voxels across a slab, many beside how far smoke moves in a step."""
+"""Voxels across a slab: many more than smoke moves in a step."""
 
 
 def carry(
     densities: Sequence[Array], velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False
 ) -> tuple[Array, ...]:
-    """Carry densities along by a velocity of their grid or of a coarser one.
+    """Carry densities (nx, ny, nz), not negative, along by a velocity of their grid or of one that was halved from it.
 
-    Parameters
-    ----------
-    densities : (nx, ny, nz) each
-        Not negative.
-    velocity
-        On the densities' grid, or on one that was halved from it.
-    dt
-        Time step in seconds.
-    voxel_size
-        Of the densities, in metres.
-    conserve
-        As of `advect`.
-
-    Returns
-    -------
-    tuple of (nx, ny, nz) float32
-        What `advect` makes of each with `refined_to`, but for rounding.
+    It gives what `advect` makes of each with `refined_to`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of
+    the densities in metres; ``conserve`` is that of `advect`.
     """
     results = tuple(np.zeros(density.shape, np.float32) for density in densities)
     smoke = functools.reduce(np.logical_or, (density > 0 for density in densities))
@@ -62,23 +47,10 @@ def carry(
 
 
 def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) -> Velocity:
-    """Refine a velocity where smoke can arrive.
+    """Refine a velocity to the grid of the smoke where that can arrive; it is zero elsewhere.
 
-    Parameters
-    ----------
-    velocity
-        On the grid of the smoke, or on one that was halved from it.
-    smoke : (nx, ny, nz) bool
-        Voxels with smoke.
-    dt
-        Time step in seconds.
-    voxel_size
-        Of the smoke's grid, in metres.
-
-    Returns
-    -------
-    Velocity
-        On the smoke's grid, zero elsewhere; itself if it is on that already.
+    ``smoke`` (nx, ny, nz) marks voxels of ``voxel_size`` metres; ``dt`` is in seconds. The velocity's grid was halved
+    from that of the smoke; a velocity on the smoke's grid is returned as it is.
     """
     x, y, z = smoke.shape
     if velocity.shape == smoke.shape:
@@ -108,21 +80,21 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
 
 
 def _known(velocity: Velocity) -> tuple[Array | None, Array | None]:
-    """What is known of a velocity beside it."""
+    """The confidence and the source of a velocity."""
     return velocity.confidence, velocity.source
 
 
 def _reach(velocity: Velocity, voxels_at_one: float) -> int:
-    """Voxels that smoke can arrive in or come from; at 1 m/s it moves by so many."""
+    """Voxels that smoke can arrive in or come from, if it moves ``voxels_at_one`` at 1 m/s."""
     fastest = max(float(np.abs(component).max()) for component in velocity.faces) * voxels_at_one
     # what arrives was a step away, and the correction of advection looks a step further
     return 2 * (math.ceil(fastest) + 1)
 
 
 def _boxes(smoke: Mask, reach: int, *, whole: bool = False) -> list[tuple[VoxelBox, VoxelBox]]:
-    """Boxes of the voxels where smoke can arrive, each in the one that it comes from.
+    """Boxes of the voxels where smoke can arrive, each with the one that it comes from.
 
-    There is one, or slabs along the longest side of a large one.
+    There is one box, or a large one is cut into slabs along its longest side.
     """
     box = box_around(smoke, reach)
     sides = [side.stop - side.start for side in box]

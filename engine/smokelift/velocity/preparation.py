@@ -1,14 +1,13 @@
-"""What is done to densities before their motion is estimated: noise is blurred, contrast reduced.
+"""Densities made ready before their motion is estimated: noise is blurred, contrast reduced.
 
-Noise: white noise is as strong in the finest scale, where neighbours alternate along all axes at once, as in any other;
-smoke has next to nothing there. So the median of that scale's magnitude inside the smoke measures the noise and not the
-smoke (Donoho and Johnstone 1994). Blur is chosen by it, because gradients have to stand out from what noise makes of
-them.
+Noise: white noise is as strong in the finest scale, where neighbours alternate along all axes at once, as in any other.
+Smoke has next to nothing there. So the median of that scale's magnitude inside the smoke measures the noise and not the
+smoke (Donoho and Johnstone 1994). It chooses the blur: gradients have to stand out from what noise makes of them.
 
-Contrast: any function of a density is carried along just like the density, so the one to follow is free to choose.
-With the density itself the thick smoke at the base of a plume decides everything. With its power of 3/4 thin smoke
-counts as well (docs/experiments/velocity-weights.md). Noise would count as well, so noisy densities are followed as
-they are, and so are smooth ones.
+Contrast: any function of a density is carried along just like the density, so the one to follow is free to choose. With
+the density itself the thick smoke at the base of a plume decides everything. With its power of 3/4 thin smoke counts as
+well (docs/experiments/velocity-weights.md). Noise would count as well, so noisy densities are followed as they are. So
+are smooth ones.
 """
 
 from __future__ import annotations
@@ -24,10 +23,10 @@ from smokelift.transport import Array
 from smokelift.velocity.settings import VelocitySettings
 
 NOISE_WIDTHS = (1.0, 1.5, 2.0)
-"""Standard deviations in voxels to choose from where the usual blur leaves too much noise."""
+"""Standard deviations (voxels) to choose from where the usual blur leaves too much noise."""
 
 MAD = 0.6745
-"""Median magnitude of a normal variable in standard deviations."""
+"""Median magnitude of a normal variable, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +61,7 @@ class PreparedPair:
 
 
 def prepare(before: Array, after: Array, settings: VelocitySettings) -> PreparedPair:
-    """Blur two densities and reduce their contrast; leave them as they are where smooth, and only blur where noisy.
-
-    Parameters
-    ----------
-    before, after : (nx, ny, nz) float32
-        The densities.
-    settings
-        Their `blur`, `noise`, `smooth` and `smoke_threshold`.
-    """
+    """Blur two densities and reduce their contrast; leave smooth ones as they are, and only blur noisy ones."""
     threshold = settings.smoke_threshold
     smooth, enough = without_noise(before, after, ((0.0, settings.smooth),), threshold)
     if enough:
@@ -111,22 +102,10 @@ def without_noise(
 ) -> tuple[tuple[Array, Array, float], bool]:
     """Blur two densities as much as their noise asks for.
 
-    Parameters
-    ----------
-    before, after : (nx, ny, nz) float32
-        The densities.
-    widths
-        Standard deviations in voxels to choose from, rising, 0 for none, and how much noise each may leave, in root
-        mean square gradients. The last is taken where none is enough.
-    threshold
-        Fraction of the largest density from which a voxel counts as smoke.
-
-    Returns
-    -------
-    before, after, variance
-        Blurred, and the variance of the noise that is left in their difference.
-    enough
-        Whether that is within what the last width may leave.
+    ``widths`` are standard deviations in voxels (0 for none), rising, each with the noise that it may leave, in root
+    mean square gradients. The last is taken where none is enough. A voxel counts as smoke from the fraction
+    ``threshold`` of the largest density. Returned are the densities with the variance of the noise that is left in
+    their difference, and whether that is within the limit.
     """
     smoke = after > threshold * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
@@ -147,7 +126,7 @@ def _gradient(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
 
 
 def _passed(width: float) -> float:
-    """Share of the standard deviation of white noise that a Gaussian lets through."""
+    """Share of white noise's standard deviation that a Gaussian lets through."""
     if width <= 0:
         return 1.0
     spike = np.zeros(int(8 * width) * 2 + 3)

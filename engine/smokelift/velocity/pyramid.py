@@ -11,10 +11,9 @@ import smokelift._core as _core
 from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, Velocity, faces_in, without_divergence
 
 SMOOTHING = 1 / 4
-"""Weight of each neighbour along an axis: nothing is left of what changes its sign from voxel to voxel.
+"""Weight of each neighbour along an axis, which leaves nothing of what changes its sign from voxel to voxel.
 
-What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-grid.md).
-"""
+What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-grid.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +25,7 @@ class Level:
     before, after : (nx, ny, nz) float32
         The densities.
     weight : (nx, ny, nz) float32
-        How far changes may be taken for motion, as far as it is known beforehand.
+        How far changes may be taken for motion, as far as that is known beforehand.
     coarseness
         Voxels of the finest grid along one of this.
     past
@@ -41,7 +40,7 @@ class Level:
 
 
 def pyramid(finest: Level, levels: int) -> list[Level]:
-    """Grids from the coarsest, which is left with at least eight voxels a side, to the given one."""
+    """Grids from the coarsest, with at least eight voxels a side, to the given one."""
     result = [finest]
     while len(result) < levels and min(result[0].before.shape) >= 16:
         last = result[0]
@@ -59,8 +58,8 @@ def refine(u: StaggeredGrid, shape: Sequence[int]) -> StaggeredGrid:
 def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
     """The faces of a velocity on the next finer grid, in the same unit, without divergence.
 
-    The formulas for a coarse voxel (Toth and Roe 2002) look at its neighbours alone. Along an odd number of voxels the
-    last coarse one is cut in half.
+    The formulas for a coarse voxel (Toth and Roe 2002) read only its neighbours. Along an odd number of voxels the last
+    coarse one is cut in half.
     """
     x, y, z = _core.prolong(u.faces)
     faces = faces_in((x, y, z), tuple(slice(0, count) for count in shape))
@@ -80,7 +79,7 @@ def smoothed(velocity: Velocity) -> Velocity:
 
 
 def _smoothed_along(component: Array, axis: int, along: int) -> Array:
-    """A component smoothed along an axis; beyond the box it goes on such that its divergence does, too."""
+    """A component smoothed along an axis; it goes on beyond the box such that its divergence does, too."""
     values = np.moveaxis(component, axis, 0)
     result = np.float32(1 - 2 * SMOOTHING) * component
     near, drawn = np.moveaxis(result, axis, 0), np.float32(SMOOTHING) * values

@@ -30,13 +30,8 @@ class Solver(Protocol):
 class ProjectedCG:
     """Conjugate gradients on the velocities without divergence, preconditioned with constant coefficients.
 
-    Attributes
-    ----------
-    tolerance
-        Stops at this fraction of the preconditioned gradient at rest.
-    iterations
-        Limit for each solve: ten are as exact against known velocities as a hundred
-        (docs/experiments/velocity-solver.md).
+    A solve stops at `tolerance`, a fraction of the preconditioned gradient at rest, or after so many `iterations`: ten
+    are as exact against known velocities as a hundred (docs/experiments/velocity-solver.md).
     """
 
     tolerance: float = 0.01
@@ -55,8 +50,8 @@ class PrimalDual:
     Attributes
     ----------
     sigma, tau, theta
-        Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1. The paper gives no values:
-        docs/experiments/velocity-solver.md has the sweep.
+        Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1, or `solve` raises ValueError.
+        The paper gives no values: docs/experiments/velocity-solver.md has the sweep.
     absolute_tolerance, relative_tolerance
         Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels a frame.
     iterations
@@ -64,11 +59,6 @@ class PrimalDual:
     inner_tolerance, inner_iterations
         By how much, and in how many steps at most, the conjugate gradients in each proximal operator reduce their
         residual.
-
-    Raises
-    ------
-    ValueError
-        By `solve`, for steps that do not converge.
     """
 
     sigma: float = 0.1

@@ -5,8 +5,8 @@ not made. Where smoke enters, the change is positive all over. So a source shows
 voxels, beside the mean of its magnitude: their ratio, the coherence, is near one in an inlet and near zero elsewhere.
 
 A source also stands out from what is left unexplained in the rest of the smoke, and from other sources. The front of
-smoke that is faster than the estimate looks like a wide, weak source; were it taken for one, the estimate would get
-slower still. An inlet that is read as motion turns the flow at the base around.
+smoke that is faster than the estimate looks like a wide, weak source; taken for one, it would slow the estimate more.
+An inlet that is read as motion turns the flow at the base around.
 
 Before anything is known of the velocity, an inlet cannot be seen: its smoke is renewed as it leaves, so it stands still
 like smoke at rest. Taken for rest it holds the flow, and a flow that is held leaves nothing unexplained that would show
@@ -24,10 +24,10 @@ import smokelift._core as _core
 from smokelift.transport import Array, Faces, ResidualMeans
 
 MIN_DENSITY_SHARE = np.float32(1e-4)
-"""Fraction of the largest density below which a residual means nothing."""
+"""Share of the largest density below which a residual means nothing."""
 
 RESTING = np.float32(0.05)
-"""Voxels a frame below which smoke rests."""
+"""Speed (voxels a frame) below which smoke rests."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class SourceDetection:
     prominence
         The same for the mean residual as a share of the strongest source's: inlets of one scene are of one kind.
     news
-        How much the frame at hand counts in an exponential moving average over frames. Inlets stand still; what a
-        wrong velocity leaves moves on.
+        Weight of the frame at hand in an exponential moving average. Inlets stand still; what a wrong velocity leaves
+        moves on.
     still
         Speed that smoke is seen to move at, in medians over the smoke, at which a first estimate believes it by half.
     """
@@ -61,18 +61,11 @@ class SourceDetection:
     still: float = 8.0
 
     def means(self, residual: Array, density: Array, coarseness: float, past: ResidualMeans | None) -> ResidualMeans:
-        """Means of a residual over a few voxels, and over the frames before.
+        """Means over a few voxels, and over the frames before, of what the velocity so far leaves unexplained.
 
-        Parameters
-        ----------
-        residual : (nx, ny, nz) float32
-            What the velocity so far leaves unexplained: density after less density carried along.
-        density : (nx, ny, nz) float32
-            The larger of the two.
-        coarseness
-            Voxels of the finest grid along a voxel.
-        past
-            Means up to the frame before.
+        ``residual`` (nx, ny, nz) is the density after less the one carried along, ``density`` the larger of the two,
+        and ``coarseness`` the number of voxels of the finest grid along a voxel. ``past`` are the means up to the frame
+        before.
         """
         width, relative = self.width / coarseness, residual / max(density.max(), np.float32(1e-30))
         mean = _core.blur(relative, width, 3.0)
@@ -84,21 +77,11 @@ class SourceDetection:
         return ResidualMeans(mean, magnitude)
 
     def first_weight(self, direction: Faces, change: Array, smoke: npt.NDArray[np.bool_]) -> Array:
-        """How far the change of each voxel may be taken for motion before anything is known of the velocity.
+        """How far each voxel's change may be taken for motion before anything is known of the velocity.
 
-        Parameters
-        ----------
-        direction
-            Gradient of the density at voxel centres, one array (nx, ny, nz) for each component.
-        change : (nx, ny, nz) float32
-            Of the density from one frame to the next.
-        smoke : (nx, ny, nz) bool
-            Where there is smoke.
-
-        Returns
-        -------
-        (nx, ny, nz) float32
-            0 where smoke stands still, 1 where it is seen to move fast.
+        The weight (nx, ny, nz) is 0 where smoke stands still, 1 where it is seen to move fast. ``direction`` is the
+        gradient of the density at voxel centres, one array (nx, ny, nz) a component; ``change`` is from one frame to
+        the next.
         """
         squares = np.square(change), np.sum([np.square(g) for g in direction], axis=0)
         moved, steepness = (_core.blur(values, 1.0, 3.0) for values in squares)
@@ -109,19 +92,9 @@ class SourceDetection:
         return weight
 
     def weight(self, found: ResidualMeans, smoke: npt.NDArray[np.bool_]) -> Array:
-        """How far the change of each voxel may be taken for motion.
+        """How far each voxel's change may be taken for motion (nx, ny, nz): 0 where smoke enters, 1 where nothing does.
 
-        Parameters
-        ----------
-        found
-            What the velocity so far leaves unexplained.
-        smoke : (nx, ny, nz) bool
-            Where there is smoke.
-
-        Returns
-        -------
-        (nx, ny, nz) float32
-            0 where smoke enters, 1 where nothing does.
+        ``found`` is what the velocity so far leaves unexplained.
         """
         mean = found.mean
         typical = float(np.median(np.abs(mean[smoke]))) if smoke.any() else 0.0
