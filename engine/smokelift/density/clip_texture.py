@@ -33,18 +33,10 @@ VOXEL = 12**-0.5
 class ClipTexture:
     """The texture of a clip's smoke.
 
-    Attributes
-    ----------
-    turntable
-        Before the input's camera. It turns about the smoke's own axis: what is seen on the way about it looks alike.
-    exemplars
-        One a scale, the coarsest first; the coarsest's patches are as wide as the smoke.
-    width
-        Standard deviation of the smoke across the axis, in voxels.
-    drift
-        Mean motion of the pictures along the axis, in voxels a frame.
-    roughness
-        Strength of each octave of `StretchedNoise`.
+    The `turntable` is before the input's camera. It turns about the smoke's own axis: what is seen on the way about it
+    looks alike. There is one of the `exemplars` a scale, the coarsest first: its patches are as wide as the smoke.
+    `width` is the standard deviation of the smoke across the axis, in voxels. `drift` is the mean motion of the
+    pictures along it, in voxels a frame, and `roughness` the strength of each octave of `StretchedNoise`.
     """
 
     turntable: Turntable

@@ -32,12 +32,8 @@ MIN_VARIANCE = 1e-12
 class ColourWeight:
     """The weight of each pixel's colours.
 
-    Attributes
-    ----------
-    axes : (3, 3)
-        The combinations: orthonormal columns.
-    shares : (rows, columns, 3)
-        How much each of them counts, from 0 to 1.
+    `axes` (3, 3) has the combinations as orthonormal columns. `shares` (rows, columns, 3) is how much each of them
+    counts, from 0 to 1.
     """
 
     axes: NDArray[np.float32]

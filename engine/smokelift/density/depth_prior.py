@@ -95,12 +95,8 @@ class DepthPrior(Protocol):
 class RoundDepth:
     """Smoke that is as deep as it is wide; see the module.
 
-    Attributes
-    ----------
-    axis
-        Where the smoke of one view stands in depth. None takes the clip's axis, else the middle of the domain.
-    wander
-        How one view's smoke wanders about the axis; None lets it stand there. Several views show where it stands.
+    The smoke of one view stands on `axis`, by default on the clip's, else in the middle of the domain, and may `wander`
+    about it. Several views show where it stands.
     """
 
     axis: SmokeAxis | None = None
@@ -198,7 +194,7 @@ def _common(
     count = np.sum(seen, axis=0)
     # a round blob's two profiles make it up, and more of them must not make it smaller
     power = np.minimum(1, 2 / count)
-    # what only one shows it would fill with all that the others contradict
+    # without the condition, voxels that only one shows would fill with all that the others contradict
     least = np.where(count > 1, MIN_SHAPE, 0)
     values = np.ones(count.shape)
     for places, profile in zip(seen_at, profiles, strict=True):

@@ -119,18 +119,10 @@ def descend(
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """The objective of the hull's voxels.
+    """The objective of the hull's voxels, which are at `where` (n,) in the flat volume.
 
-    Attributes
-    ----------
-    where : (n,)
-        The hull's voxels in the flat volume.
-    volume : (nx, ny, nz)
-        The last density that was shown.
-    slopes : (nx, ny, nz)
-        Room for a gradient.
-    scale : (n,)
-        Unit of each voxel.
+    `volume` (nx, ny, nz) is the density that was shown last, `slopes` (nx, ny, nz) room for a gradient, and `scale`
+    (n,) the unit of each voxel.
     """
 
     terms: Sequence[Term]
@@ -180,7 +172,7 @@ def _step(
 ) -> _Step | None:
     """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
     for _ in range(SHORTENINGS):
-        # new memory takes as long as the arithmetic, so there is little of it
+        # allocation takes as long as the arithmetic, so there is little of it
         density = direction * np.float32(-length)
         density *= problem.scale
         density += current

@@ -42,7 +42,7 @@ SMOOTH_TOLERANCE = 0.02
 """Share of the objective that each has to gain for another to follow, as in the fit."""
 
 AMOUNTS = 0.5
-"""Standard deviation, in those of the smoke's width, of a blur by which the density is the same with noise as without.
+"""Standard deviation of a blur, in those of the smoke's width: the blurred density is the same with noise as without.
 Noise makes lobes, and leaves the smoke of each where it is (docs/experiments/every-view.md)."""
 
 GUIDED_AMOUNTS = 0.75
@@ -50,7 +50,7 @@ GUIDED_AMOUNTS = 0.75
 finer is the simulation's, on any grid (docs/experiments/guided-simulation.md)."""
 
 LARGEST_GAIN = 5.0
-"""Bound of the factor that gives noisy smoke these amounts."""
+"""Bound of the factor that gives noisy smoke the smooth answer's amounts."""
 
 FRESH_ROUNDS = 4
 """Rounds on each scale for smoke that carries nothing on."""

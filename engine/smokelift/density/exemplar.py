@@ -92,7 +92,7 @@ class Exemplar:
             for picture in pictures
             for each in (picture, picture[::-1])
             for shift in shifts
-            if each[shift:, shift:].any()  # smoke along an edge alone is not in what is beside it
+            if each[shift:, shift:].any()  # a shift may cut off all of the smoke, along an edge
         ]
         random = np.random.default_rng(0)
         every = np.concatenate(samples, 1)

@@ -35,7 +35,7 @@ LARGEST_START = 1e12
 
 MIN_DENSITY = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
-range to 0 for a whole process; a resumed run would then differ in its last bits."""
+range to 0 for a whole process: without this bound a resumed run would differ in its last bits."""
 
 SINGLE_VOXELS = 1.0
 """Standard deviation (voxels) of the Gaussian that keeps of a change what lobes share
@@ -265,7 +265,7 @@ def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
-    """Figures of a fit (see `FittedDensity`) from its residuals (rows, columns, 3), of the first views at least."""
+    """Figures of a fit (see `FittedDensity`) from its residuals (rows, columns, 3), at least one a view."""
     losses, decibels = [], {}
     for number, (view, residual) in enumerate(zip(views.views, residuals, strict=False)):
         left = residual[view.counted]

@@ -3,7 +3,7 @@
 The picture shows the integral of the emission along each ray, less what the smoke before it takes away. It says nothing
 of the depth. As for smoke, a flame is assumed to be as deep as it is wide (`smokelift.density.profile`), about the
 middle of the smoke at its height. From there maximum likelihood expectation maximisation (Shepp and Vardi 1982) scales
-the emission until it shows the picture. The emission stays not negative, and its distribution along a ray stays about
+the emission until it shows the picture. The emission stays at least 0, and its distribution along a ray stays about
 what it was. Figures: docs/experiments/fire.md.
 """
 

@@ -20,12 +20,8 @@ from smokelift.scene.projection import world_to_pixel
 class Places:
     """Where some voxels lie in a picture.
 
-    Attributes
-    ----------
-    rows, columns : (n,) float32
-        Picture coordinates of their centres; pixel centres are integers.
-    visible : (n,) bool
-        Whether they are before the camera and their centre falls into the picture.
+    `rows` and `columns` (n,) are picture coordinates of their centres; pixel centres are integers. `visible` (n,) says
+    whether they are before the camera and their centre falls into the picture.
     """
 
     rows: NDArray[np.float32]

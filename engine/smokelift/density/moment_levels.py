@@ -36,14 +36,9 @@ their middles, have a variance of 11/12 of a finer voxel. So a blur there is 5 %
 
 @dataclass(frozen=True, eq=False)
 class MomentLevel:
-    """A moment on one grid.
+    """A moment on one grid, whose voxels are each `coarseness` voxels of the finest grid wide.
 
-    Attributes
-    ----------
-    inside : tuple of (rows, columns)
-        For each view, the share of every ray's smoke that lies inside the domain.
-    coarseness
-        Voxels of the finest grid along one of this.
+    `inside` has a picture (rows, columns) for each view: the share of every ray's smoke that lies inside the domain.
     """
 
     views: ViewSet

@@ -66,13 +66,13 @@ def fit_multiplicative(
     plausible: Volume | None = None,
     recorded: bool = False,
 ) -> Fit:
-    """Scale the smoke of every ray until the pictures match; the best density found.
+    """Scale the smoke of every ray until the pictures match, and return the best density.
 
-    In each iteration every term has a turn; where a pixel counts less, its steps are shorter. Voxels of the start (nx,
-    ny, nz) at zero stay there. It stops when an iteration lowers the objective by less than the share ``tolerance``.
-    Outside the hull of ``within``, the views of the terms, the start is known to be zero. The steps lead towards the
-    distribution of ``plausible`` (nx, ny, nz) along the rays; without it they are even. ``recorded`` keeps the
-    renderers' records of the last iteration's pictures, for a descent that goes on from there.
+    In each iteration every term has a turn; where a pixel counts less, its steps are shorter. Voxels of the start
+    (nx, ny, nz) at zero stay there. It stops when an iteration lowers the objective by less than the share
+    ``tolerance``. Outside the hull of ``within``, the views of the terms, the start is known to be zero. The steps lead
+    towards the distribution of ``plausible`` (nx, ny, nz) along the rays; without it they are even. ``recorded`` keeps
+    the renderers' records of the last iteration's pictures, for a descent that goes on from there.
     """
     smoke, enough = _Smoke(terms, density, within, plausible), noise_floor(terms)
     current = best = smoke.values()

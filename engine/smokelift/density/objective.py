@@ -62,8 +62,8 @@ class Term:
 def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
     """A term for every camera's picture.
 
-    A pixel counts by ``inside`` (one picture a view): the share of its ray's smoke that lies inside the domain. Smoke
-    outside is not modelled, and the few voxels that a ray crosses on its way out must not hold all that it shows.
+    Smoke outside the domain is not modelled. So a pixel counts by ``inside`` (one picture a view), the share of its
+    ray's smoke that lies inside: the few voxels that the ray crosses on its way out need not hold all that it shows.
     """
     return [
         Term(view, renderer, view.counted * np.maximum(share, MIN_SHARE) ** 2)
@@ -73,19 +73,11 @@ def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A density that an optimiser found.
+    """A density (nx, ny, nz) that an optimiser found in so many iterations.
 
-    Attributes
-    ----------
-    density : (nx, ny, nz)
-    loss
-        The objective.
-    residuals : (rows, columns, 3), one a term
-        What is left of the pictures, L - I.
-    iterations
-        Steps that were made.
-    recorded : (rows, columns, 3), one a term
-        The residuals, if the terms' renderers hold the records of this density's pictures; else none.
+    `loss` is the objective. `residuals` are what is left of each term's picture (rows, columns, 3), L - I. `recorded`
+    are the same if the terms' renderers hold the records of this density's pictures, ready for their gradients; else
+    none.
     """
 
     density: Volume

@@ -186,16 +186,10 @@ class ObservedView:
 
 @dataclass(frozen=True, eq=False)
 class ViewSet:
-    """All views of one moment.
+    """All views of one moment, the input's first.
 
-    Attributes
-    ----------
-    views
-        At least one, the input's first.
-    hull : (nx, ny, nz) bool
-        Voxels that all of them allow to hold smoke.
-    frame
-        Number of the moment in its clip, from 0; a depth prior that has seen the clip knows the others.
+    `hull` (nx, ny, nz) marks the voxels that all of them allow to hold smoke. `frame` is the number of the moment in
+    its clip, from 0: a depth prior that has seen the clip knows the other moments.
     """
 
     views: tuple[ObservedView, ...]

@@ -42,8 +42,8 @@ SCALE = float(np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS)))
 """A in standard deviations."""
 
 PROFILE_CUT = 0.03
-"""Share of the profile's peak from which smoke is expected. The profile is there 1.4 times as wide as its width is
-assumed to be, which is how far that may be wrong (docs/experiments/every-view.md)."""
+"""Share of the profile's peak from which smoke is expected. The profile is 1.4 times as wide there as assumed, which is
+how far its width may be wrong (docs/experiments/every-view.md)."""
 
 ROOM = 0.5
 """Distance, in A, of a ray's middle from the ends of a domain that holds all smoke: about four fifths of the profile
@@ -137,8 +137,8 @@ class _Rays(NamedTuple):
 class DepthProfile:
     """The profile that a picture suggests.
 
-    ``amount`` (rows, columns) is the optical depth, or proportional to it. The profile's middle stands on the axis, or
-    scatters about it, on the mean. With scatter the profile is narrower, so that the smoke is as deep as without.
+    ``amount`` (rows, columns) is the optical depth, or proportional to it. The rays' middles stand on the axis, or
+    scatter about it. With scatter the profile is narrower, so that the smoke is as deep as without.
     """
 
     def __init__(

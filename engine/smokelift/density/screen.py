@@ -48,14 +48,8 @@ def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:
 class Upright:
     """A picture on the upright screen through the domain's centre, row by row.
 
-    Attributes
-    ----------
-    heights : (n,)
-        Metres above the centre.
-    total : (n,)
-        Amount in each row, times metres.
-    mean, spread : (n,)
-        Its mean lateral position and standard deviation (m); 0 where there is nothing.
+    The rows are at `heights` (n,), in metres above the centre. `total` (n,) is the amount in each, times metres, `mean`
+    and `spread` (n,) its mean lateral position and standard deviation (m): 0 where there is nothing.
     """
 
     heights: NDArray[np.float64]
@@ -68,16 +62,8 @@ class Upright:
 class Screen:
     """A picture on the upright screen through the domain's centre.
 
-    Attributes
-    ----------
-    heights : (n,)
-        Of the rows, in metres above the centre.
-    laterals : (m,)
-        Of the columns, in metres from the centre.
-    values : (n, m)
-        What the picture shows there.
-    width
-        Of a column, in metres.
+    Its `values` (n, m) are at `heights` (n,) above the centre and `laterals` (m,) from it, in metres. A column is
+    `width` metres wide.
     """
 
     heights: NDArray[np.float64]

@@ -87,14 +87,8 @@ def _unit_energy(blur: float, width: float) -> float:
 class StretchedNoise:
     """Octaves of noise, each stretched by the motion of the coarser ones.
 
-    Attributes
-    ----------
-    moved : (3,)
-        How far the noise has moved, in voxels of the finest grid.
-    width
-        Standard deviation of the smoke across its axis, in voxels of that grid.
-    strengths
-        Standard deviation by octave, the coarsest first.
+    The noise has `moved` (3,), and the smoke is `width` wide (standard deviation across its axis), both in voxels of
+    the finest grid. `strengths` are standard deviations by octave, the coarsest first.
     """
 
     moved: NDArray[np.float64]

@@ -44,8 +44,8 @@ the squares of those that reach a place add up to 151 / 315 on the mean."""
 class Scatter:
     """Where the middles of the rays' smoke stand at one moment.
 
-    `aside` (rows, columns) is how far behind the axis, over the smoke's standard deviation in depth, and `share` the
-    standard deviation of that. The smoke is `width` metres wide (standard deviation across its axis): a lobe moves as
+    `aside` (rows, columns) is how far they stand behind the axis, over the smoke's standard deviation in depth; `share`
+    is the standard deviation of that. `width` is the smoke's standard deviation (m) across its axis: a lobe moves as
     one.
     """
 
@@ -58,14 +58,9 @@ class Scatter:
 class Wander:
     """How the smoke of one camera's clip wanders.
 
-    Attributes
-    ----------
-    velocity : (3,)
-        Of the smoke, in voxels a frame.
-    width
-        Standard deviation of the smoke across its axis, in voxels.
-    roughness
-        Standard deviation of the logarithm of its density by octave, the coarsest first; see `stretched_noise`.
+    `velocity` (3,) is in voxels a frame, `width` the standard deviation of the smoke across its axis in voxels.
+    `roughness` is the standard deviation of the logarithm of its density by octave, the coarsest first: see
+    `stretched_noise`.
     """
 
     velocity: Doubles

@@ -51,14 +51,9 @@ class Prediction:
 class Centre:
     """The motion around which the velocity is regularised: t u_p + P(m).
 
-    Attributes
-    ----------
-    trust
-        Factor t of the prediction, 0 to 1.
-    dissipation
-        Share of the smoke that dissolves in a frame, at most 1; below zero where all of it gets denser.
-    momentum : (1 or 4, 3)
-        Voxels a frame at density 1: constant, and along x, y, z, for each component.
+    `trust` is t, from 0 to 1. `dissipation` is the share of the smoke that dissolves in a frame, at most 1, and below
+    zero where all of it gets denser. `momentum` (1 or 4, 3) is in voxels a frame at density 1: constant, and along x,
+    y, z, for each component.
     """
 
     trust: float

@@ -31,18 +31,10 @@ MAD = 0.6745
 
 @dataclass(frozen=True, eq=False)
 class PreparedPair:
-    """Two densities as their motion is estimated from.
+    """Two densities (nx, ny, nz) as their motion is estimated from: blurred, and perhaps with less contrast.
 
-    Attributes
-    ----------
-    before, after : (nx, ny, nz) float32
-        Blurred, and perhaps with less contrast.
-    noise
-        Variance of the noise that is left in their difference.
-    reduced
-        Whether they are the power of 3/4 of the densities.
-    noisy
-        Whether noise is so strong that smoke at rest seems to move.
+    `noise` is the variance of the noise that is left in their difference. If `reduced`, they are the power of 3/4 of
+    the densities. If `noisy`, noise is so strong that smoke at rest seems to move.
     """
 
     before: Array

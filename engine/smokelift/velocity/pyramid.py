@@ -18,18 +18,10 @@ What a reconstruction's coarse grid shows of that is most often wrong (docs/expe
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One grid of the pyramid.
+    """One grid of the pyramid, whose voxels are each `coarseness` voxels of the finest grid wide.
 
-    Attributes
-    ----------
-    before, after : (nx, ny, nz) float32
-        The densities.
-    weight : (nx, ny, nz) float32
-        How far changes may be taken for motion, as far as that is known beforehand.
-    coarseness
-        Voxels of the finest grid along one of this.
-    past
-        What velocities left unexplained up to the frame before, on the finest grid.
+    `weight` (nx, ny, nz) is how far changes may be taken for motion, as far as that is known beforehand. `past` is what
+    velocities left unexplained up to the frame before, on the finest grid.
     """
 
     before: Array
