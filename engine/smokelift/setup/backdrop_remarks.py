@@ -1,4 +1,4 @@
-"""What a user should know of what stands behind the smoke: how it was found, and why it may be wrong."""
+"""Remarks on the background of a clip: how it was found, and why the result may be wrong."""
 
 from __future__ import annotations
 
@@ -10,29 +10,27 @@ from smokelift.footage.clip import Clip
 from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, unknown_part
 
 BLACK = 0.001
-"""Linear radiance below which a background is called black: less than a third of a step of 8 bit video from 0."""
+"""Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
 
 MOSTLY = 0.5
-"""Share from which on it is most of a whole: of the smoke's pixels, those without a known background; of what lies
-between bars, the smoke of a frame. A majority, by definition."""
+"""Share that is a majority: of the smoke's pixels without a known background, or of smoke between bars in a frame."""
 
 BETWEEN_BARS = 0.95
-"""Share of the picture between two bars which smoke covers at some time there, if it is not the picture itself: smoke
-that crosses all of a picture has no two straight edges. A generated clip with bars has .98, fog and mist .70 and .75
-over all of their rows (docs/clips.md). Each frame shows most of that picture, while a puff that passes fills a strip in
-the course of time."""
+"""Share between two bars that is covered at some time, from which the picture itself was taken for smoke: real smoke
+has no two straight edges. A generated clip with bars has .98; fog and mist have .70 and .75 over all of their rows
+(docs/clips.md). Each frame has to cover most of it too, since a passing puff fills a strip in the course of time."""
 
 MIN_SAME_FRAMES = 4
-"""Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
+"""Smallest number of frames in which smoke hardly looks the same by chance: half of its pairs of successive samples
+do."""
 
 COARSE_QUANTISER = 42.0
-"""Quantiser from which on faint smoke is taken for background, in front of one of more than one colour. Before a brick
-wall crf 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50
-(docs/experiments/disturbed-clips.md)."""
+"""Quantiser from which faint smoke is taken for background, if that has more than one colour. Before a brick wall crf
+32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/disturbed-clips.md)."""
 
 
 def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
-    """Return what was assumed or noticed of a clip before a background that may be given, the doubts among it."""
+    """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
     found, change = estimate.found, estimate.samples.exposure
     return (
         *backdrop_remarks(found),
@@ -43,7 +41,7 @@ def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
 
 
 def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
-    """Return how a background was found, and what is before it if it has one colour."""
+    """Return how a background was found, and how much stands before it if it has one colour."""
     clip, plates = found.clip, found.plates
     if found.source == "alpha":
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
@@ -66,15 +64,7 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
 
 
 def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, ...]:
-    """Return why the result may be nothing, or wrong.
-
-    Parameters
-    ----------
-    found, given
-        The background, and whether the scene says it.
-    samples
-        The frames that were examined.
-    """
+    """Return why the result may be empty or wrong; ``given`` if the scene says the background."""
     clip, said = found.clip, []
     if not samples.smoky:
         said.append(Doubt("no smoke examined", {"frames": len(clip.spread(SAMPLE_FRAMES))}))
@@ -100,7 +90,7 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
 
 
 def what_helps(clip: Clip, given: bool) -> Doubt:
-    """Return what may show the smoke of a clip in which none is found, see `doubts`."""
+    """Return what may help where no smoke is found; ``given`` as in `doubts`."""
     if given:
         return Doubt("no smoke before the given background")
     if len(clip) == 1 and clip.backdrop is None:
@@ -109,7 +99,7 @@ def what_helps(clip: Clip, given: bool) -> Doubt:
 
 
 def _between_bars(samples: SmokeSamples) -> bool:
-    """Whether only bars beside the picture are background."""
+    """Whether bars beside the picture are all that is background."""
     at_a_time = len(samples.colours) / max(len(samples.gains), 1)
     for covered in (samples.covered, samples.covered.T):
         rows = np.flatnonzero(covered.any(1))

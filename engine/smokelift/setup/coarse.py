@@ -1,9 +1,9 @@
 """A few frames of a clip at low resolution, and the one judge of lights and scattering on them.
 
-A wrong light can still reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
-shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels. What they let through of the
-background is taken away from the other half, and the rest is light that the smoke scatters. How strong the lights have
-to be for that is the least-squares factor, zero at least.
+A wrong light can reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
+shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels and judged on the other. What they
+let through of the background is subtracted there; the rest is light that the smoke scatters. The lights' strength is
+its least-squares factor, zero at least.
 """
 
 from __future__ import annotations
@@ -28,30 +28,25 @@ from smokelift.scene.projection import voxel_width
 from smokelift.setup.shot import ShotView
 
 COARSE_SIDE = 32
-"""Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place
+"""Largest number of voxels along the longest side: a few per cent of the work of 96, and every large shadow is there
 (docs/experiments/scattering-selection.md)."""
 
 SHORTEST = 4
-"""Voxels along the shortest side at least, two of which are not at its ends."""
+"""Smallest number of voxels along the shortest side: two are not at its ends."""
 
 PIXELS = 2.0
-"""Pixels of the clip along a voxel at least, so that each half of them shows every voxel."""
+"""Smallest number of the clip's pixels along a voxel: each half of the chequerboard shows every voxel."""
 
 MIN_CHANNEL_POWER = 1e-3
-"""Power of a channel's light over that of the brightest one, below which the channel has no strength of its own: its
-light is lost in 8 bits."""
+"""Power of a channel's light over the brightest one's, below which 8 bits lose it: it gets no strength of its own."""
 
 
 @dataclass(frozen=True, eq=False)
 class CoarseView:
-    """One camera's picture of one moment, at two pixels of the clip a coarse voxel at least.
+    """One camera's small picture of one moment, with its camera and plate.
 
-    Attributes
-    ----------
-    camera, plate
-        Of the small picture.
-    picture, fitted, held_out : (rows, columns, 3)
-        The small picture, linear radiance; and the same of either colour of a chequerboard of the clip's pixels.
+    ``picture``, ``fitted`` and ``held_out`` (rows, columns, 3) are linear radiance: of all pixels of the clip, and of
+    either colour of their chequerboard.
     """
 
     camera: Camera
@@ -66,23 +61,16 @@ class CoarseView:
         return matte(self.picture, self.plate).mask
 
     def over(self, gain: NDArray[np.float32]) -> CoarseView:
-        """The view with its pictures and background over a gain (3,)."""
+        """The view with its pictures and background divided by a gain (3,)."""
         plate = self.plate.through(lambda part: part / gain if part.ndim == 3 else part)
         return CoarseView(self.camera, plate, self.picture / gain, self.fitted / gain, self.held_out / gain)
 
 
 @dataclass(frozen=True, eq=False)
 class CoarseFrame:
-    """One moment before a coarse grid.
+    """One frame on a coarse grid.
 
-    Attributes
-    ----------
-    number
-        Of the frame.
-    scene
-        With the first camera's small picture and the coarse domain.
-    views
-        What the cameras saw, the input's first.
+    ``scene`` has the coarse domain and the camera of the input's small picture. ``views`` has the input first.
     """
 
     number: int
@@ -95,15 +83,15 @@ class CoarseFrame:
 
 
 def coarse_frames(views: Sequence[ShotView], numbers: Sequence[int], scene: CompleteScene) -> tuple[CoarseFrame, ...]:
-    """Return those of some frames in which every camera shows smoke; see `coarse_frame`."""
+    """Return those of some frames in which every camera shows smoke, coarse as by `coarse_frame`."""
     frames = (coarse_frame(views, number, scene) for number in numbers)
     return tuple(frame for frame in frames if frame is not None and all(view.smoke.any() for view in frame.views))
 
 
 def coarse_frame(views: Sequence[ShotView], number: int, scene: CompleteScene, times: int = 1) -> CoarseFrame | None:
-    """Make a frame coarse, on a grid so many times finer than `COARSE_SIDE` asks for.
+    """Make a frame coarse; None if a camera does not see the domain.
 
-    None if one of the cameras, of which the input is the first, does not see the domain.
+    The grid has `COARSE_SIDE` voxels, so many ``times``, along its longest side at most. The first view is the input.
     """
     try:
         pixels = voxel_width(views[0].camera.at(number), scene.domain)
@@ -115,9 +103,9 @@ def coarse_frame(views: Sequence[ShotView], number: int, scene: CompleteScene, t
 
 
 def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
-    """Return the box with fewer voxels: a whole number of fine ones in each if possible, else a little less of it.
+    """Return a box with at most ``most_voxels`` along its longest side, where a fine voxel is ``pixels`` wide.
 
-    Of the fine ones each is so many pixels of the clip wide; ``most_voxels`` lie along the longest side.
+    Each coarse voxel holds a whole number of fine ones if possible; else the box loses a little of its size.
     """
     longest = max(domain.resolution)
     most = min(most_voxels, int(longest * pixels / PIXELS))
@@ -140,15 +128,14 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What densities show beside the other half of the pixels.
+    """How densities compare with the half of the pixels that they were not fitted to.
 
     Attributes
     ----------
     error
-        Root mean square of the difference, in shares of what the smoke changes there; of several cameras the root mean
-        square of theirs.
+        Root mean square difference, as a share of what the smoke changes there; over all cameras alike.
     colours : (cameras, 3)
-        Strength of the light, in multiples of the scene's, that brings the same densities nearest, by camera and
+        Strength of the light, in multiples of the scene's, that fits best with the same densities, by camera and
         channel: more than 1 where they are too dark. 1 without scattered light.
     """
 
@@ -157,7 +144,7 @@ class HeldOut:
 
 
 def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:
-    """Fit a model's densities to one half of the pixels of all cameras, and let the judge show them to the other half.
+    """Fit densities by one model to half of all cameras' pixels; compare them by the judge's model with the other half.
 
     Only pixels that the smoke's voxels can change count.
     """
@@ -176,7 +163,7 @@ def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering
             reach = reached(view.smoke, project_voxels(view.camera, scene.domain))
             parts = shown, view.held_out - behind, view.held_out - view.plate.image
             of_camera.append(np.stack([part[reach].astype(np.float64) for part in parts]))
-    # of each camera and channel: squares of the light that is shown and its products with what is seen
+    # by camera and channel: squares of the light that is shown, and its products with what is seen
     power, product, wrong, contrast = (np.zeros((len(pixels), 3)) for _ in range(4))
     for camera, parts_of in enumerate(pixels):
         shown, seen, changed = np.concatenate(parts_of, 1)

@@ -1,4 +1,4 @@
-"""What was decided for a clip, by what, and how well it is known; and what other qualities would take."""
+"""Decisions about a clip, with what decided them; and the grids of qualities."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ class Estimate(Remark, Generic[Value]):
     Attributes
     ----------
     what
-        ``"scattering"``, ``"resolution"``,
-        ``"velocity grid coarsening"``, ``"axis depth"``, ``"smoke colour"``, ``"smoke thickness"``,
-        ``"gain of view 1"`` or ``"fire"``.
+        ``"scattering"``, ``"resolution"``, ``"velocity grid coarsening"``, ``"axis depth"``, ``"smoke colour"``,
+        ``"smoke thickness"``, ``"gain of view 1"`` or ``"fire"``.
     value
         What will be used, or `UNDETERMINED`.
     source
         The user gives it, the clip shows it, or nothing decides it and it is assumed.
     spread
-        Standard deviation of what was measured: metres of an axis depth, a share of a smoke thickness; None of others.
+        Standard deviation: metres of an axis depth, a share of a smoke thickness, None of others.
     tolerance
-        What the deciding figure was held against.
+        What the deciding figure was compared with.
     """
 
     what: str
@@ -42,14 +41,9 @@ class Estimate(Remark, Generic[Value]):
 
 @dataclass(frozen=True)
 class Grid:
-    """The grid that a quality takes of a clip.
+    """The voxels (x, y, z) that a quality takes for a clip.
 
-    Attributes
-    ----------
-    resolution
-        Voxels along x, y, z.
-    lost
-        Share of the smoke's contrast in the clip that is finer than it shows; None where that was not measured.
+    ``lost`` is the share of the smoke's contrast that is finer than they show; None where that was not measured.
     """
 
     resolution: tuple[int, int, int]

@@ -20,11 +20,11 @@ from smokelift.scene.checks import Vector
 from smokelift.setup.thickness import seen_texture
 
 SAMPLE_FRAMES, SAMPLE_SIDE = 16, 320
-"""Frames that are examined, so that smoke of a sixteenth of the clip is seen, and pixels along their longer side: five
+"""Frames that are examined, so that smoke in a sixteenth of the clip is seen; and pixels along their longer side, five
 to a voxel of a draft."""
 
 UNKNOWN = 0.5
-"""Confidence of a plate below which what is behind the smoke is unknown there: it is as likely smoke as not."""
+"""Confidence of a plate below which a background is unknown: it is as likely smoke as not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,23 +34,19 @@ class SmokeSamples:
     Attributes
     ----------
     scale
-        Full pixels to a reduced one.
-    covered : (rows, columns) bool
-        Pixels with smoke in at least one sample.
-    unknown : (rows, columns) bool
-        Pixels whose background is unknown, likewise.
-    colours : (n, 3)
-        Radiance of all smoke pixels.
-    behind : (n, 3)
-        Background radiance at the same pixels.
+        Full pixels along a reduced one.
+    covered, unknown : (rows, columns) bool
+        Pixels with smoke, and pixels with an unknown background, in at least one sample.
+    colours, behind : (n, 3)
+        Radiance of all smoke pixels, and of their background.
     smoky
         Numbers of the frames with smoke, those with the most first.
     gains
-        By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
+        How many times as bright as its background's a sample's exposure is, (3,), by frame number; it is evened out.
     textures
-        What the samples with smoke show of the texture behind it.
+        Sums of `seen_texture` for each sample with smoke.
     amounts
-        Numbers of smoke pixels of the samples that have any, in their order in ``colours``.
+        Numbers of smoke pixels of these samples, in the order of ``colours``.
     """
 
     scale: float
@@ -65,12 +61,12 @@ class SmokeSamples:
 
     @property
     def typical(self) -> tuple[int, ...]:
-        """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
+        """Numbers of the frames that models are tried on: those with the most smoke and with the median amount."""
         return tuple(dict.fromkeys((*self.smoky[:1], *self.smoky[len(self.smoky) // 2 :][:1])))
 
     @property
     def exposure(self) -> float:
-        """Share by which the exposure of a sample differs from its background's at most."""
+        """Largest share by which the exposure of a sample differs from its background's."""
         return float(np.expm1(np.abs(np.log(list(self.gains.values()))).max()))
 
     @property
@@ -84,14 +80,8 @@ class SmokeSamples:
 class Fire:
     """What shines by itself.
 
-    Attributes
-    ----------
-    share
-        Of the smoke's pixels that do.
-    light
-        The clip of the light that it adds, in the place of smoke.
-    color
-        Of that light, as the clip shows it.
+    ``share`` is that of the smoke's pixels. ``light`` is a clip of the added light in the place of smoke; ``color`` is
+    its colour in the clip.
     """
 
     share: float
@@ -101,18 +91,9 @@ class Fire:
 
 @dataclass(frozen=True, eq=False)
 class FirstEstimate:
-    """What a clip shows.
+    """What a clip shows: its background, its smoke, and its fire if any burns.
 
-    Attributes
-    ----------
-    clip
-        The footage at its background's exposure, without fire and without the brightness that noise adds.
-    found
-        What stands behind the smoke.
-    samples
-        Its smoke.
-    fire
-        None where none burns.
+    ``clip`` is the footage at its background's exposure, without fire and without the brightness that noise adds.
     """
 
     clip: Clip
@@ -122,7 +103,7 @@ class FirstEstimate:
 
 
 def first_estimate(clip: Clip, camera: Camera | None, background: Background | None) -> FirstEstimate:
-    """Estimate what a clip shows; the parameters and errors are those of `find_backdrop`."""
+    """Estimate what a clip shows; parameters and errors as of `find_backdrop`."""
     found = find_backdrop(clip, camera, background)
     samples = sample_smoke(found.clip, found.plates)
     exposed = evened(found.clip, found.plates, samples.gains)
@@ -136,7 +117,7 @@ def first_estimate(clip: Clip, camera: Camera | None, background: Background | N
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
-    """Return where the background of a frame is unknown (rows, columns), and no mask hides it."""
+    """Return the pixels (rows, columns) whose background is unknown in a frame and not hidden by a mask."""
     unknown = plates.at(number).confidence < UNKNOWN
     seen = clip.seen(number, *unknown.shape[::-1])
     return unknown if seen is None else unknown & seen

@@ -1,9 +1,9 @@
 """Further calibrated cameras: their clips in step with the input's, their backgrounds and exposures, their agreement.
 
-Cameras have exposures and white balances of their own. Two pictures of one smoke bind each other: every slice across
-both cameras holds as much smoke in one as in the other. So a density is fitted to both, on coarse frames. How much
-brighter than the density the further one shows it, over how much brighter the input does, is the camera's gain; both
-are fitted again with that evened out, until little is left. Figures: docs/experiments/view-gain.md.
+Cameras have exposures and white balances of their own. But every slice across two cameras holds as much smoke in one
+picture as in the other. So one density is fitted to both, on coarse frames. A camera's gain is how much brighter than
+that density it shows the smoke, over how much brighter the input does. Both are fitted again with the gain evened out,
+until little is left. Figures: docs/experiments/view-gain.md.
 """
 
 from __future__ import annotations
@@ -31,26 +31,24 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 
 AGREEMENT_SAMPLES = 4
-"""Frames in which the views are compared: one that is wrong does not decide their median."""
+"""Frames in which the views are compared: a wrong one does not decide their median."""
 
 MIN_AGREED_SHARE = 0.9
-"""Share of the smoke's pixels that the views agree on below which something is wrong. True views agree on all of it,
-cameras upside down on a tenth to nine tenths (docs/experiments/view-agreement.md)."""
+"""Smallest share of the smoke's pixels that right views agree on: true views agree on all, cameras upside down on a
+tenth to nine tenths (docs/experiments/view-agreement.md)."""
 
 SAME_RATE = 0.01
 """Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""
 
 ROUNDS = 3
-"""Fits from which a gain is found, each with the one before evened out: a fourth changes it by .3 % at most
-(docs/experiments/view-gain.md)."""
+"""Fits from which a gain is found: a fourth changes it by .3 % at most (docs/experiments/view-gain.md)."""
 
 RATIO = 1.35
-"""Ratio of brightness from which on it is the cameras' where light is taken to come from everywhere: light from one
-side is brighter there, and cameras that are exposed alike are found to differ by up to 1.30
-(docs/experiments/view-gain.md)."""
+"""Smallest ratio of brightness that is the cameras' own, where light is assumed to come from everywhere. Smoke lit from
+one side is brighter there: cameras exposed alike differ by up to 1.30 (docs/experiments/view-gain.md)."""
 
 MAX_GAIN = 8.0
-"""Largest gain, and the inverse of the smallest: three stops. What asks for more is before another background."""
+"""Largest gain, and the inverse of the smallest: three stops. What asks for more has another background."""
 
 Gain = NDArray[np.float32]
 
@@ -58,14 +56,10 @@ Gain = NDArray[np.float32]
 def open_views(
     first: ShotView, scene: CompleteScene, numbers: Sequence[int], lit: bool, settings: Settings
 ) -> tuple[tuple[ShotView, ...], tuple[Estimate[str], ...], tuple[Remark, ...]]:
-    """Open the further views of a lit scene, at the input's exposure; with what was measured and noticed.
+    """Open the further views of a lit scene at the input's exposure; return what was measured and noticed too.
 
-    Brightness is compared in frames of some numbers. It says more where lights are given (``lit``), not estimated.
-
-    Raises
-    ------
-    ValueError
-        If a clip or a camera does not fit the input's.
+    Brightness is compared in frames ``numbers``. It says more where lights are given (``lit``). A clip or a camera that
+    does not fit the input's is a ValueError.
     """
     views, remarks = [], []
     estimates: list[Estimate[str]] = []
@@ -80,7 +74,7 @@ def open_views(
 
 
 def disagreement(shot: Shot) -> tuple[Doubt, ...]:
-    """A doubt if the views do not agree about where the smoke is."""
+    """A doubt if the views disagree about where the smoke is."""
     shares = []
     for frame in shot.spread(AGREEMENT_SAMPLES):
         views = ViewSet.of(shot.observe(frame), shot.optics).views
@@ -90,7 +84,7 @@ def disagreement(shot: Shot) -> tuple[Doubt, ...]:
 
 
 def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
-    """A further view of a complete scene before its background; with remarks on it."""
+    """A further view of a scene, from 0, with its background; and remarks on it."""
     view = scene.views[number]
     opened = _opened(view.clip, clip, scene)
     if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
@@ -141,7 +135,7 @@ def _evened(
     lit: bool,
     settings: Settings,
 ) -> tuple[ShotView, tuple[Estimate[str], ...]]:
-    """View ``number``, from 1, over its gain; as it is where no gain is better."""
+    """View ``number``, from 1, divided by its gain; as it is if no gain fits clearly better."""
     frames = coarse_frames((front, view), numbers, scene)
     if not frames:
         return view, ()

@@ -22,47 +22,35 @@ from smokelift.setup.resolution import DetailSpectrum, Shape, choose_grid, smoke
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 
 PICTURE_HEIGHT = 2.0
-"""Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
-a person."""
+"""Height in metres of an uncalibrated picture where the smoke is, unless its distance is given: a person's size."""
 
 FILM = 36.0, 24.0
 """Width and height (mm) of 35 mm film."""
 
 LENS = 50.0
-"""Focal length (mm) of an uncalibrated camera whose file says none: Blender's default lens."""
+"""Focal length (mm) where the clip's file says none: Blender's default lens."""
 
 BOX_MARGIN = 0.06
-"""Margin on each side of an estimated box, as a fraction of its longer side: two voxels of the coarsest grid, in which
-smoke that is fainter than the mask shows has its place."""
+"""Margin on each side of an estimated box, as a fraction of its longer side: two voxels of the coarsest grid, for smoke
+that is fainter than the mask shows."""
 
 NARROWEST = 0.25
-"""Width over height of an estimated box at least, and the reverse: eight voxels of the coarsest grid, the fewest that a
-side has."""
+"""Smallest width over height of an estimated box, and the reverse: eight voxels of the coarsest grid, which a side has
+at least."""
 
 MIN_SIDE_VOXELS = 32
-"""Voxels along the longest side at least: with fewer there is nothing more to save
+"""Smallest number of voxels along the longest side: fewer save nothing more
 (docs/experiments/resolution-selection.md)."""
 
 DETAIL_FRAMES = 3
-"""Frames whose detail decides the resolution: those with the most smoke (docs/selection.md)."""
+"""Number of frames, those with the most smoke, whose detail decides the resolution (docs/selection.md)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Where the camera stands and where the smoke is.
+    """The camera of the clip's full pictures, and the box with its final resolution.
 
-    Attributes
-    ----------
-    camera
-        Of the clip's full pictures.
-    domain
-        With its final resolution.
-    resolution
-        Why it has that resolution.
-    qualities
-        The grid that each quality would take of this clip.
-    remarks
-        What was assumed.
+    ``resolution`` says why it is that one, ``qualities`` which each quality would take, ``remarks`` what was assumed.
     """
 
     camera: Camera
@@ -75,11 +63,8 @@ class Geometry:
 def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> Geometry:
     """Complete camera and domain.
 
-    Raises
-    ------
-    ValueError
-        If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
-        looks steeply up or down, or is orthographic.
+    It is a ValueError if a box lacks its camera or an inlet its box, or if no box is given for a camera that moves,
+    looks steeply up or down, or is orthographic.
     """
     clip, samples, box = estimate.clip, estimate.samples, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
@@ -88,7 +73,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     camera = known or _level(clip.size, focal, settings.distance)
     metres, multiple = 0.0, 1
     if box is None:
-        # multiples of four, so that pyramids halve them evenly
+        # multiples of four: pyramids halve them evenly
         (floor, size, metres), multiple = _around(camera, samples, settings.distance), 4
     else:
         floor, size = np.array([*box.centre[:2], box.min[2]]), np.array(box.size)
@@ -136,18 +121,12 @@ def _require_place(scene: Scene, known: Camera | None) -> None:
 
 
 def _focal(size: tuple[int, int], lens: float | None) -> float:
-    """Focal length in pixels where no camera is given: that of the file's lens (mm), or of the usual one."""
+    """Focal length in pixels: that of the file's lens (mm), or of `LENS`."""
     return LENS / FILM[0] * max(size) if lens is None else lens / math.hypot(*FILM) * math.hypot(*size)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
-    """The camera with as many pixels as its clip.
-
-    Raises
-    ------
-    ValueError
-        If its picture has another shape than the clip's.
-    """
+    """The camera with as many pixels as its clip; ValueError if its picture has another shape."""
     if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
         raise ValueError(
             f"The camera's picture is {camera.size[0]} x {camera.size[1]}, the clip's {clip.size[0]} x {clip.size[1]} "
@@ -157,9 +136,9 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
 
 
 def _assumed(given: Camera | None, lens: float | None, height: float) -> Remark:
-    """What is assumed of a camera, or of the scale where that alone is unknown.
+    """What is assumed of a camera, or of the scale alone if the camera is given.
 
-    The file may say its lens (mm); the picture is so many metres high where the smoke is.
+    ``lens`` (mm) is the file's, ``height`` (m) that of the picture where the smoke is.
     """
     if given is not None:
         return Remark("assumed scale", {"height": height})
@@ -169,7 +148,7 @@ def _assumed(given: Camera | None, lens: float | None, height: float) -> Remark:
 
 
 def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
-    """A level camera of a focal length in pixels that looks along +Y at the smoke above the world's origin."""
+    """A level camera that looks along +Y at the smoke above the world's origin; ``focal`` in pixels."""
     width, height = size
     metres = _pixel_at(distance, height, focal)
     up = metres * height / 2
@@ -178,12 +157,12 @@ def _level(size: tuple[int, int], focal: float, distance: float | None = None) -
 
 
 def _pixel_at(distance: float | None, height: int, focal: float) -> float:
-    """Metres that a pixel of a picture so many pixels high shows where the smoke is; its distance (m) may be given."""
+    """Metres that a pixel shows where the smoke is, in a picture ``height`` pixels high; ``distance`` (m) if given."""
     return PICTURE_HEIGHT / height if distance is None else distance / focal
 
 
 def _boxes(camera: Camera) -> bool:
-    """Whether a box can be put around the smoke in a camera's picture: all of it shows what is ahead, not above."""
+    """Whether a box can be put around the smoke: a still camera whose whole picture shows what is ahead."""
     if camera.type != "perspective" or camera.moves:
         return False
     _, along, up = view_frame(camera)
@@ -193,20 +172,16 @@ def _boxes(camera: Camera) -> bool:
 
 
 def _ways(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
-    """Directions (n, 3) in the world to what shows at some pixels; ``fy`` long along the way that the camera looks."""
+    """Directions (n, 3) in the world through some pixels; each is ``fy`` long along the camera's axis."""
     turn = np.array(camera.matrix, np.float64)[:3, :3]
     pixels = [(x - camera.cx) * camera.fy / camera.fx, camera.cy - y, np.full(x.shape, -camera.fy)]
     return np.asarray(np.stack(pixels, -1) @ turn.T)
 
 
 def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Doubles, Doubles, float]:
-    """The box around the smoke before a camera, upright at a distance (m).
+    """The upright box around the smoke at a distance (m), or where a level camera's picture is `PICTURE_HEIGHT` high.
 
-    That is where the picture of a level one is `PICTURE_HEIGHT` high, unless it is given.
-
-    Returns
-    -------
-    The middle of its floor (3,) and its size (3,) in metres, and the metres that a pixel of the picture shows there.
+    Returns the middle of its floor (3,) and its size (3,) in metres, and the metres that a pixel shows there.
     """
     metres = _pixel_at(distance, camera.size[1], camera.fy)
     distance = camera.fy * metres
@@ -226,9 +201,9 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
 
 
 def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
-    """A box of a size in metres about the middle of its floor, with every number of voxels, the fewest first.
+    """The box of a size (m) about the middle of its floor, with every allowed number of voxels, the fewest first.
 
-    Where multiples of so many cubes do not fill it, it grows upward and to all sides.
+    Each side has a multiple of ``multiple`` cubes. Where these do not fill the box, it grows upward and to all sides.
     """
     grids = []
     for longest in range(MIN_SIDE_VOXELS, max(allowed, MIN_SIDE_VOXELS) + 1, 4):
@@ -239,14 +214,14 @@ def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[
 
 
 def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
-    """A remark where a box that is given without a resolution grows to whole voxels."""
+    """A remark if a given box had to grow to whole voxels."""
     if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
         return ()
     return (Remark("grown box", {"size": domain.size}),)
 
 
 def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
-    """The box of voxels of a size in metres about the middle of its floor."""
+    """The box of so many voxels (m) about the middle of its floor."""
     size = np.array(resolution) * voxel
     low = floor - size * (0.5, 0.5, 0)
     high = low + size
@@ -257,7 +232,7 @@ def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
 
 def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
     """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
-    # a hundredth of the smoke's pixels on each side may be noise or the last wisps; without smoke any box will do
+    # a hundredth of the smoke's pixels at each side may be noise or the last wisps; without smoke any box will do
     rows, columns = np.nonzero(samples.covered if samples.covered.any() else ~samples.covered)
     left, right = (float(v) * samples.scale for v in np.percentile(columns, [1, 99]) + np.array([0, 1]))
     top, bottom = (float(v) * samples.scale for v in np.percentile(rows, [1, 99]) + np.array([0, 1]))
@@ -266,7 +241,7 @@ def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, flo
 
 
 def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
-    """The box with every number of cubic voxels that fills it exactly, the fewest first; none finer than allowed."""
+    """The box with every number of cubic voxels that fills it exactly, the fewest first; ``most`` along a side."""
     common = math.gcd(*domain.resolution)
     x, y, z = (n // common for n in domain.resolution)
     longest = max(x, y, z)
@@ -278,7 +253,7 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
 
 
 def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
-    """The detail of the smoke in some frames, at the clip's own pixels; None without smoke."""
+    """The smoke's detail in the frames with the most of it, at the clip's own pixels; None without smoke."""
     smoky, frames = estimate.samples.smoky, []
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
@@ -288,5 +263,5 @@ def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpect
 
 
 def _pixels(camera: Camera, box: Domain) -> float:
-    """How many pixels of a still camera's picture lie along the longest side of a box."""
+    """Pixels of a still camera's picture along the longest side of a box."""
     return voxel_width(camera, box) * max(box.resolution)

@@ -1,4 +1,4 @@
-"""The light of a shot and how its smoke scatters it, each question asked once, in the order in which they need answers.
+"""The light of a shot, and how its smoke scatters it.
 
     what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   first_light
     coarse densities in it -> the cheapest scattering that is as good                                   find_scattering
@@ -29,41 +29,33 @@ MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multipl
 """Models of scattering, from the cheapest to the richest."""
 
 MAX_ERROR_RATIO = 0.75
-"""Error of multiple over single scattering below which it is taken: 0.01 to 0.63 where paths were traced, but for smoke
-that either model fits, and 0.82 and more where light is scattered once (docs/experiments/scattering-selection.md)."""
+"""Error of multiple over single scattering, below which multiple is taken. It is 0.01 to 0.63 for traced paths, unless
+either model fits, and from 0.82 for light scattered once (docs/experiments/scattering-selection.md)."""
 
 MAX_DESCENT_STEPS = 64
-"""Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
-by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
+"""Steps of descent of a fit where models differ little: enough for every fit to end by itself. One that is cut off has
+the error of the steps that it lacks (docs/experiments/scattering-selection.md)."""
 
 DOUBTFUL = 0.12
-"""Error of held-out pixels, as a share of the smoke's contrast, from which the light that is taken before one colour is
-likely wrong: from there on the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
+"""Error of held-out pixels, as a share of the smoke's contrast, from which an assumed light before one colour is likely
+wrong: from there the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
 (docs/experiments/surroundings.md)."""
 
 MAX_COLOUR_SPREAD = 0.1
-"""Spread of a background of one colour at most, as a share of its mean."""
+"""Largest spread of a background of one colour, as a share of its brightness."""
 
 MAX_QUIET_NOISE = 2 / 255
-"""Noise up to which what is left is not the noise's (docs/experiments/surroundings.md)."""
+"""Largest noise that does not explain the error itself (docs/experiments/surroundings.md)."""
 
 
 def first_light(
     lights: tuple[Light, ...], scattering: Scattering | None, geometry: Geometry, medium: Medium, samples: SmokeSamples
 ) -> tuple[tuple[Light, ...], Scattering, tuple[Estimate[str], ...], tuple[Remark, ...]]:
-    """Return the light of a scene, or one from everywhere without shadows as strong as the clip shows.
+    """Return the lights of a scene, or one from everywhere without shadows, as strong as the clip shows.
 
-    Every environment gets the number of directions that stand for it.
-
-    Returns
-    -------
-    The lights, the richest model of scattering that they allow, or the one that is given, and where light is needed and
-    not given what is known of the smoke's thickness, and what is assumed.
-
-    Raises
-    ------
-    ValueError
-        If the user wants shadows without a light to cast them.
+    An environment gets the number of directions that stand for it. Returned next is the given model of scattering, or
+    the richest that the lights allow. Where light is needed but not given, the smoke's thickness and a remark follow.
+    Shadows without a light to cast them are a ValueError.
     """
     if scattering in SHADOWED and not lights:
         raise ValueError(
@@ -80,17 +72,17 @@ def first_light(
 
 
 def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
-    """The light, as so many directions if it is an environment."""
+    """The light; an environment with the number of directions that it needs."""
     if not isinstance(light, EnvironmentLight) or light.directions is not None:
         return light
     return replace(light, directions=environment_count(light, geometry.camera.at(0), geometry.domain, medium))
 
 
 def light_doubts(scattering: Estimate[str], samples: SmokeSamples, noise: Noise, *, burns: bool) -> tuple[Doubt, ...]:
-    """Whether a light that is not given is likely wrong, by what it leaves unexplained; ``burns`` says if fire does.
+    """A doubt if an assumed light leaves much unexplained; ``burns`` if there is fire.
 
-    Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
-    the light leaves unexplained is its own fault.
+    It is said only before one colour that is not black. What moves there is smoke, and its brightness shows its light,
+    so the light itself is at fault.
     """
     error = scattering.figures.get(f"error_{scattering.value}", 0.0)
     assert isinstance(error, float)
@@ -107,20 +99,13 @@ def find_scattering(
 ) -> tuple[Scattering, Estimate[str]]:
     """Return the cheapest model of scattering that finds as good a density as the richest, which judges all.
 
-    Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Of these two
-    multiple scattering is the richest only where its own picture of its own density is clearly nearer: smoke whose
-    picture both models fit is twice as dense in one as in the other (docs/experiments/multiple-scattering.md). Neither
-    is the cheaper answer, so that the tolerance of cheaper models says nothing here: errors are compared as a ratio, in
-    which what no model fits counts for both.
+    Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Where both fit a
+    picture, one is twice as dense as the other (docs/experiments/multiple-scattering.md). So multiple scattering is the
+    richest only if it fits its own picture clearly better. Neither is the cheaper answer, so the tolerance of cheaper
+    models does not apply. Errors are compared as a ratio, in which what no model fits counts for both.
 
-    Parameters
-    ----------
-    frames
-        Those that models are tried on, one at least, with the richest model that their light allows.
-    finer
-        Returns one of them on twice the voxels, for models that are nearly alike on these; None if there is none.
-    settings
-        How to fit, and what errors a cheaper model may have.
+    ``frames`` (one at least) have the richest model that their light allows. ``finer`` returns one of them on twice the
+    voxels, or None; it is asked if the models are nearly alike on these.
     """
     fit, tolerance = settings.density, settings.selection.scattering_error
     richest, isotropic = frames[0].scene.scattering, frames[0].scene.medium.anisotropy == 0.0
@@ -128,7 +113,7 @@ def find_scattering(
     errors = {each: held_out(frames, each, each, fit).error for each in rivals}
     if len(rivals) > 1:
         alike = errors["multiple"] >= MAX_ERROR_RATIO * errors["single"]
-        # the errors may be those of the coarse grid: either model seems to fit the smoke, or neither does
+        # the errors may be the coarse grid's: either model seems to fit, or neither
         if alike and (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
             frames = [larger]
             fit = replace(fit, descent_iterations=max(MAX_DESCENT_STEPS, fit.descent_iterations))
@@ -147,7 +132,7 @@ def find_scattering(
     )
     if len(errors) == 1:
         return chosen, found
-    # beside the one that it is compared with: the richest, or of that the next cheaper one
+    # the one that it is compared with is the richest, or the next cheaper one if it is the richest itself
     other = MODELS[MODELS.index(richest) - 1] if chosen == richest else richest
     figures = {**figures, "error": errors[chosen], "other": other, "other_error": errors[other]}
     return chosen, replace(found, kind="compared scattering", figures=figures)

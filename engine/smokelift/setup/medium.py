@@ -1,10 +1,9 @@
-"""The smoke as a medium: of the scene, or the usual one in the colour that its pixels show; and its source radiance.
+"""The smoke as a medium: the scene's, or the usual one in the colour that its pixels show; and its source radiance.
 
-A pixel shows T behind + (1 - T) source: it lies between its background and the source radiance, which is the light
-times the smoke's colour. So the source lies on the line from the background through the smoke, beyond the thickest
-smoke that is seen. Before black the line has one colour; before anything else it has many. Smoke has a colour of its
-own if no source on that line has a colour that light may have: white, as cameras balance it, or that of what is behind
-the smoke, which stands in the same light. Figures: docs/experiments/smoke-colour.md.
+A pixel shows T behind + (1 - T) source, where the source radiance is the light times the smoke's colour. So the source
+lies on the line from the background through the smoke, beyond the thickest smoke that is seen. Before black that line
+has one colour, else many. Light may be white, as cameras balance it, or have the colour of the background, which stands
+in it too. Smoke has a colour of its own if no source on the line has either. Figures: docs/experiments/smoke-colour.md.
 """
 
 from __future__ import annotations
@@ -25,26 +24,26 @@ from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 
 OPTICAL_DEPTH_AT_ONE = 5.0
-"""Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid. A convention,
-since a picture shows density times extinction."""
+"""Optical depth across the domain of smoke of density 1 if no medium is given: thick, not solid. It is a convention,
+since a picture shows density times extinction only."""
 
 SOURCE_EXCESS = 0.1
-"""Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
-of about 2.4, not an infinite one."""
+"""Share by which the source radiance exceeds the smoke's 99th percentile, whose optical depth is then about 2.4, not
+infinite."""
 
 COLOURED = 12.0
-"""Degrees between two colours as vectors of linear light, from which white balance does not explain their difference.
-Grey world and its kin are 5 to 6 degrees wrong on the mean, and 10 in the worst quarter of pictures (Gijsenij, Gevers
-and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
+"""Degrees between two colours, as vectors of linear light, from which white balance does not explain their difference.
+Grey world and its kin are wrong by 5 to 6 degrees on the mean and by 10 in the worst quarter of pictures (Gijsenij,
+Gevers and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
 
 THICK_PERCENTILE = 90
-"""Percentile of the change from which on smoke is measured: the thickest is nearest to the source."""
+"""Percentile of the change from which smoke is measured: the thickest is nearest to the source."""
 
 PIXELS = 50
-"""Smallest number of smoke pixels that have a colour: five of them are the thickest tenth."""
+"""Smallest number of smoke pixels that show a colour: their thickest tenth are five."""
 
 MIN_SOURCE_VALUE = 0.01
-"""Linear value of the brightest channel at least: a darker source has no colour that 8 bits show."""
+"""Smallest linear value of the brightest channel: 8 bits show no colour of a darker source."""
 
 WHITE: Vector = (1.0, 1.0, 1.0)
 """Colour of grey smoke."""
@@ -53,10 +52,7 @@ WHITE: Vector = (1.0, 1.0, 1.0)
 def find_medium(
     scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain
 ) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
-    """Complete the medium, with the colour of its flame where fire burns; with what was measured and assumed for it.
-
-    Smoke has the colour of the lights in the middle of the box times its own.
-    """
+    """Complete the medium, with its flame's colour if fire burns; return what was measured and assumed too."""
     medium, samples, fire = scene.medium, estimate.samples, estimate.fire
     estimates: list[Estimate[Any]] = []
     remarks: list[Remark] = []
@@ -84,11 +80,10 @@ def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, gre
 
 
 def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> Doubles:
-    """Return the source radiance (3,) of the smoke; white where the clip shows none.
+    """Return the source radiance (3,) of the smoke; white if the clip shows none.
 
-    Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it. If
-    a texture behind the smoke shows that of its mean, ``measured`` (3,), smoke that is brighter, or darker where it
-    darkens, is still fitted.
+    Thick smoke shows it: the brightest if smoke brightens its background, the darkest if it darkens it. ``measured``
+    (3,) is the mean that a texture behind the smoke shows; brighter or darker smoke moves it, so that it can be fitted.
     """
     if len(samples.colours) == 0:
         return np.ones(3)
@@ -99,7 +94,7 @@ def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> D
         return np.maximum(measured, bound) if brightens else np.minimum(measured, bound)
     if not brightens:
         return np.asarray((1 - SOURCE_EXCESS) * np.percentile(samples.colours, 1, axis=0))
-    # on the line of colours: the brightest of each channel may be other smoke, and together a colour that none shows
+    # on the line of colours: the channels' maxima may be of different smoke, and together a colour that none shows
     colours, behind = samples.colours.astype(np.float64), samples.behind.astype(np.float64)
     axis, start = _line_of_colours(colours, behind), behind.mean(0)
     farthest = start + (np.percentile(colours @ axis, 99) - start @ axis) * axis
@@ -107,9 +102,9 @@ def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> D
 
 
 def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimate[str]]:
-    """Return the smoke's own colour, and what decided it, in light of a colour (3,), ones where that is unknown.
+    """Return the smoke's own colour in a light (3,), and what decided it.
 
-    The largest of red, green and blue is 1; the colour is white where nothing says that the smoke is not grey.
+    An unknown light is ones. The colour's largest channel is 1; it is white unless the clip shows that it is not grey.
     """
     undetermined = Estimate(
         "smoke colour near the light's",
@@ -137,10 +132,10 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
 
 
 def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
-    """Return a doubt about smoke of more than one colour before black, at a time or one after the other.
+    """Return a doubt if smoke before black has more than one colour, at a time or one after the other.
 
-    Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
-    explains the most of the light is another colour's. White that is clipped has none.
+    Smoke of one colour has that colour before black, however thick it is. So what is off the colour that explains most
+    of the light is another colour's. Clipped white shows none.
     """
     usable = samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE
     shown = samples.colours[usable].astype(np.float64)
@@ -161,26 +156,26 @@ def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
 
 
 def _off_one_colour(colours: Doubles) -> float:
-    """Degrees by which light (n, 3) is off the one colour that explains the most of it, as root mean square."""
+    """Root mean square of the degrees by which light (n, 3) is off the one colour that explains most of it."""
     along = np.linalg.eigvalsh(colours.T @ colours)
     return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
 
 
 def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
-    """Direction (3,), of length 1, that explains most of what smoke (n, 3) changes of what is behind it."""
+    """Unit vector (3,) that explains most of how smoke (n, 3) changes its background."""
     change = colours - behind
     axis = np.linalg.eigh(change.T @ change)[1][:, -1]
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
 
 
 def _thickest(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
-    """Background and colour of the thickest smoke that is not clipped; None if there is too little of it."""
+    """Background (3,) and colour (3,) of the thickest smoke that is not clipped; None if there is too little."""
     clear = brightest_channel(samples.colours) < CLIPPED_VALUE
     if clear.sum() < max(PIXELS, 0.1 * len(clear)):
         return None
     colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
     change, axis = colours - behind, _line_of_colours(colours, behind)
-    # a small error of the line is all of a dark colour: only the thickest pixels show that
+    # a small error of the line is all of a dark colour, so that comes from the thickest pixels themselves
     amount = change @ axis if samples.brightens else np.linalg.norm(change, axis=-1)
     thick = amount >= np.percentile(amount, THICK_PERCENTILE)
     start = np.maximum(behind[thick].mean(0), 0)
@@ -189,7 +184,7 @@ def _thickest(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
 
 
 def _sources(behind: Doubles, seen: Doubles) -> Doubles:
-    """Source radiances (n, 3) that the line allows: from the smoke that is seen to where a channel is negative."""
+    """Source radiances (n, 3) on the line: from the smoke that is seen to where a channel gets negative."""
     change = seen - behind
     falling = change < 0
     most = min((behind[falling] / -change[falling]).min(), 1e3) if falling.any() else 1e3
@@ -197,6 +192,6 @@ def _sources(behind: Doubles, seen: Doubles) -> Doubles:
 
 
 def _degrees(colours: Doubles, other: Doubles) -> Doubles:
-    """Angle of colours (n, 3) from another."""
+    """Degrees (n,) between colours (n, 3) and another (3,)."""
     length = np.linalg.norm(colours, axis=-1) * np.linalg.norm(other)
     return np.asarray(np.degrees(np.arccos(np.clip(colours @ other / np.maximum(length, 1e-12), -1, 1))))

@@ -1,6 +1,6 @@
-"""A shot in which everything is decided, from what a user gives (a clip, perhaps a scene file).
+"""A shot in which everything is decided, from a clip and a scene that may leave things open.
 
-What a scene leaves out is estimated from the clip or defaulted; remarks and estimates say what, and why.
+What is open is estimated from the clip or defaulted; remarks and estimates say what, and why.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
 
 
 def place_estimate(place: AxisEstimate) -> Estimate[str]:
-    """Return where in depth the smoke stands as an estimate by one of the cues."""
+    """Return where in depth the smoke stands, as an estimate; undetermined if only the box says it."""
     undetermined = Estimate(
         f"axis depth by {place.cue}",
         {"depth": place.depth},
@@ -125,7 +125,7 @@ def place_estimate(place: AxisEstimate) -> Estimate[str]:
 
 
 def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
-    """Return how much coarser than the densities the grid of the velocity is; a side keeps eight voxels at least."""
+    """Return how many times the densities' grid is halved for the velocity; a side keeps eight voxels at least."""
     what = "velocity grid coarsening"
     if settings.velocity.coarsening is not None:
         return Estimate("given", what=what, value=settings.velocity.coarsening, source="given")
@@ -138,7 +138,7 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
 
 
 def _check(length: int, scene: Scene, settings: Settings) -> None:
-    """Refuse what can be seen to be wrong before any of so many frames is examined."""
+    """Refuse what is wrong already before any frame, of so many, is examined."""
     if settings.distance is not None and (scene.views or scene.inlets):
         known = "further views show" if scene.views else "inlets say"
         raise ValueError(f"The {known} where the smoke stands; leave the distance out.")

@@ -1,9 +1,8 @@
-"""How many voxels the smoke's detail in a clip asks for, in so far as that detail stands out from the noise.
+"""How many voxels the smoke's detail asks for, as far as it stands out from the clip's noise.
 
-The spectrum of what the smoke changes in the picture (cosine transform, in sRGB values, where a clip's noise is even)
-is compared with that of the noise beside it. A grid shows what is coarser than two of
-its voxels; the share of the smoke's contrast that is finer is what it loses. Figures:
-docs/experiments/resolution-selection.md.
+The spectrum of what the smoke changes is compared with that of the noise beside it. It is a cosine transform of sRGB
+values, in which a clip's noise is even. A grid shows what is coarser than two of its voxels, and loses the share of the
+contrast that is finer. Figures: docs/experiments/resolution-selection.md.
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ from smokelift.setup.settings import LOST_DETAIL, QUALITIES, Quality, Settings
 Shape = tuple[int, int, int]
 
 RINGS = 256
-"""Rings of equal width into which spatial frequencies are sorted, up to that of single pixels: finer than the step from
-one grid to the next, of four voxels, in a picture of up to 1,024 pixels."""
+"""Rings of equal width of spatial frequency, up to that of single pixels: in a picture of up to 1,024 pixels they are
+finer than the step of four voxels from one grid to the next."""
 
 NORMAL_MEDIAN = 1.4826
 """Standard deviation of normal noise over the median of its size."""
@@ -36,23 +35,18 @@ NORMAL_MEDIAN = 1.4826
 
 @dataclass(frozen=True, eq=False)
 class DetailSpectrum:
-    """The energy of the smoke's picture beyond the noise, by spatial frequency.
+    """The energy (RINGS,) of the smoke's picture beyond the noise, by spatial frequency.
 
-    Attributes
-    ----------
-    energy : (RINGS,)
-        In rings of the frequency, up to that of single pixels.
-    pixels
-        Along the longest side of the box.
+    ``pixels`` of the picture lie along the longest side of the box.
     """
 
     energy: NDArray[np.float64]
     pixels: float
 
     def lost(self, longest: float, finest: float | None = None) -> float:
-        """Share of the contrast (root of the energy) that is finer than a grid of so many voxels shows.
+        """Share of the clip's contrast (root of the energy) that a grid of ``longest`` voxels along a side loses.
 
-        Of what the clip shows, or a grid of ``finest`` voxels.
+        With ``finest``, only what a grid of so many voxels shows counts as lost.
         """
         whole = float(self.energy.sum())
         if whole <= 0:
@@ -61,7 +55,7 @@ class DetailSpectrum:
         return float(np.sqrt(between.sum() / whole))
 
     def _ring(self, longest: float) -> int:
-        """The first ring that a grid does not show."""
+        """The first ring that a grid of so many voxels does not show."""
         return min(round(RINGS * longest / self.pixels), RINGS)
 
 
@@ -70,18 +64,8 @@ def choose_grid(
 ) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
     """Choose the coarsest of a quality's grids that loses no more of what the finest shows than tolerated.
 
-    Parameters
-    ----------
-    grids
-        Returns those that a quality allows, the coarsest first.
-    detail
-        Returns the detail of the smoke in a box; None without smoke.
-    settings
-        With the quality and the tolerance.
-
-    Returns
-    -------
-    The grid, why it is that one, and what each quality would take of this clip.
+    ``grids`` returns those that a quality allows, the coarsest first; ``detail`` the smoke's detail in a box, None
+    without smoke. Returned are the grid, why it is that one, and what each quality would take.
     """
     own = grids(settings.quality)
     spectrum = detail(own[-1])
@@ -113,15 +97,15 @@ def choose_grid(
 
 
 def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> DetailSpectrum:
-    """Measure the detail in parts of linear pictures (rows, columns, 3) where the box is, and the plates behind them.
+    """Measure the smoke's detail in linear pictures (rows, columns, 3) of the box before their plates.
 
-    So many pixels lie along the longest side of the box.
+    ``pixels`` lie along the longest side of the box.
     """
     energy = np.zeros(RINGS)
     for picture, plate in frames:
         change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
         noise, still = float(plate.noise.total.mean()), ~matte(picture, plate).mask
-        # the channels' mean has less of it; half of what is beside the smoke has none that is too thin to be found
+        # the channels' mean has less noise; the median stays with pixels that have no thin smoke below the mask
         if still.any():
             noise = min(noise, NORMAL_MEDIAN * float(np.median(np.abs(change[still]))))
         energy += _beyond_noise(change, noise)
@@ -129,11 +113,11 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail
 
 
 def _beyond_noise(change: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
-    """Energy of a picture in each ring, less that of white noise of a standard deviation."""
-    # a cosine transform goes on beyond the edge as in a mirror, so that smoke which is cut off there is no detail
+    """Energy (RINGS,) of a picture, less that of white noise of a standard deviation."""
+    # a cosine transform mirrors the picture at its edge, so smoke that is cut off there is no detail
     power = np.square(scipy.fft.dctn(change, norm="ortho"))
     rows, columns = (np.arange(n) / n for n in change.shape)
-    # 1 alternates from pixel to pixel
+    # a frequency of 1 alternates from pixel to pixel
     frequency = np.hypot(rows[:, None], columns)
     inside = frequency < 1
     ring = (RINGS * frequency[inside]).astype(int)

@@ -22,14 +22,14 @@ QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine", "final")
 
 @dataclass(frozen=True)
 class GridLimit:
-    """How many voxels a quality allows along the domain's longest side: a share of the clip's pixels within bounds."""
+    """Voxels that a quality allows along the domain's longest side: a share of the clip's pixels, within bounds."""
 
     share: float
     least: int
     most: int
 
     def voxels(self, pixels: float) -> int:
-        """Return how many are allowed where the clip has so many pixels; a multiple of four, as grids of pyramids."""
+        """Return how many are allowed for so many pixels: a multiple of four, as pyramids need."""
         return 4 * math.ceil(min(pixels, max(self.least, min(self.share * pixels, self.most))) / 4)
 
 
@@ -39,17 +39,17 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "fine": GridLimit(1 / 2, 144, 256),
     "final": GridLimit(1, 0, MAX_SIDE_VOXELS),
 }
-"""Limits of each quality. What a share loses is much the same whatever the clip's size; the bounds keep the time of a
-frame, which goes with the voxels, from growing with the size of the clip (docs/experiments/resolution-selection.md)."""
+"""Limits of each quality. A share loses much the same whatever the clip's size; the bounds keep the time of a frame
+from growing with that size (docs/experiments/resolution-selection.md)."""
 
 LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005, "final": 0.0025}
-"""Share of the smoke's contrast that a chosen grid may lose beside the finest of its quality: each loses half as
-much as the one before (docs/experiments/resolution-selection.md)."""
+"""Share of the smoke's contrast that a grid may lose beside the finest of its quality, halved from each to the next
+(docs/experiments/resolution-selection.md)."""
 
 ITERATIONS: Mapping[Quality, tuple[int, int]] = {
     "draft": (4, 4), "balanced": (6, 14), "fine": (8, 14), "final": (8, 14)
 }  # fmt: skip
-"""Multiplicative iterations and steps of descent at most (docs/experiments/density-descent.md)."""
+"""Largest numbers of multiplicative iterations and of steps of descent (docs/experiments/density-descent.md)."""
 
 
 @dataclass(frozen=True)

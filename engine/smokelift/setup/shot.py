@@ -21,18 +21,10 @@ from smokelift.setup.settings import Quality, Settings
 
 @dataclass(frozen=True, eq=False)
 class ShotView:
-    """A camera of a shot with its clip.
+    """A camera of a shot, which may move, with its clip and what it sees without smoke in each frame.
 
-    Attributes
-    ----------
-    clip
-        Its frame 0 is of the same moment as the input's.
-    camera
-        Of the clip's pictures; it may move.
-    plates
-        What it sees without smoke in each frame.
-    working
-        The small picture that the grid is fitted to; of the first frame that shows the domain if the camera moves.
+    Frame 0 of ``clip`` is of the same moment as the input's. The grid is fitted to the small picture ``working``; for a
+    camera that moves it is that of the first frame that shows the domain.
     """
 
     clip: Clip
@@ -42,14 +34,14 @@ class ShotView:
 
     @staticmethod
     def before(domain: Domain, clip: Clip, camera: Camera, plates: Plates) -> ShotView:
-        """Return the view of a domain; CameraError if no frame shows it."""
+        """Return a camera's view of a domain; CameraError if no frame shows it."""
         for frame in range(len(camera.matrices)):
             with suppress(CameraError):
                 return ShotView(clip, camera, plates, working_picture(camera.at(frame), domain))
         return ShotView(clip, camera, plates, working_picture(camera, domain))
 
     def observe(self, frame: int, domain: Domain) -> Observation | None:
-        """What the camera saw in a frame, from 0, as a small picture; None if nothing of the domain is in it."""
+        """What the camera saw in a frame, from 0, as a small picture; None if that shows nothing of the domain."""
         working = self.working_at(frame, domain)
         if working is None:
             return None
@@ -61,7 +53,7 @@ class ShotView:
         return Observation(working.camera, image, plate)
 
     def working_at(self, frame: int, domain: Domain) -> WorkingPicture | None:
-        """The small picture of a frame, from 0; None if nothing of the domain is in it."""
+        """The small picture of a frame, from 0; None if the frame shows nothing of the domain."""
         if not self.camera.moves:
             return self.working
         try:
@@ -71,7 +63,7 @@ class ShotView:
 
     @cached_property
     def _still_plates(self) -> Plates:
-        """Plates of the small picture of a camera that stands still."""
+        """Plates of a still camera's small picture."""
         return self.plates.through(self.working.cut, self.working.pixels)
 
 

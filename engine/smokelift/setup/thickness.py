@@ -1,13 +1,13 @@
 """How thick the smoke is, where the background's texture shows through it.
 
-Thin smoke in strong light and thick smoke in faint light look alike before one colour. Smoke lets the share T of the
-texture behind it through, and adds light that hardly changes from one pixel to the next. So the differences of
-neighbouring pixels are those of the background times T, and the rest of the smoke's radiance is what it adds:
+Thin smoke in strong light and thick smoke in faint light look alike before one colour. But smoke lets a share T of the
+texture behind it through, and adds light that hardly changes between neighbouring pixels. So their differences are the
+background's times T, and the rest is what the smoke adds:
 
     source radiance = sum (I - T B) / sum (1 - T).
 
-What smoke-free parts of the same pictures show in place of T = 1, what single frames differ by, and how much of the
-background may be smoke, says how well that is known. Figures: docs/experiments/smoke-thickness.md.
+Three things say how well that is known: how far T is from 1 beside the smoke, how frames differ, and how much of the
+background may be smoke. Figures: docs/experiments/smoke-thickness.md.
 """
 
 from __future__ import annotations
@@ -24,32 +24,29 @@ from smokelift.footage.plate import Plate, noise_at
 from smokelift.setup.estimate import UNDETERMINED, Estimate
 
 BLOCK = 8
-"""Pixels along a block, inside which smoke is taken to let the same share of all light through."""
+"""Pixels along a block, in which smoke is taken to let the same share of light through."""
 
 CONTRAST = 2.0
-"""Texture of the background at least, in multiples of the noise of a frame: the background's own errors are textures
+"""Smallest texture of the background, in multiples of a frame's noise: below, the background's errors look like texture
 that no frame shows."""
 
 CONFIDENCE = 0.5
-"""Confidence of the background at least: what was hardly ever free of smoke holds some of it."""
+"""Smallest confidence of the background: what was hardly ever free of smoke holds some of it."""
 
 ERROR = 0.15
-"""Largest relative error (standard deviation) of the source radiance that counts as measured: half of the 30 % within
-which it has to be right."""
+"""Largest relative standard deviation of a measured source radiance: half of the 30 % within which it has to be
+right."""
 
 FRAMES = 3
-"""Smallest number of frames that their deviation is estimated from: without one of them two are left."""
+"""Smallest number of frames that a deviation is estimated from: two are left without one of them."""
 
 
 def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Doubles:
-    """Compare the texture of a linear frame (rows, columns, 3) with that of its background, where it shows smoke.
+    """Compare the texture of a linear frame (rows, columns, 3) with its background's; return sums (8,) over blocks.
 
-    Returns
-    -------
-    (8,)
-        Sums over blocks. Of those with smoke: the share of light that it takes away, their weight, how much of that has
-        a background that may be smoke itself. Of those without: their weight, how much of the texture is missing from
-        them, where all should be seen. Of those with smoke again: the radiance (3) that it adds.
+    With smoke: 0 the weighted share of light that it hides, 1 the weight, 2 the part of that whose background may be
+    smoke. Without smoke: 3 the weight, 4 the weighted share of texture that is missing, though all should show. With
+    smoke: 5 to 7 the weighted radiance that it adds.
     """
     seen, behind = np.asarray(picture, np.float64), np.asarray(plate.image, np.float64)
     confidence, covered = _blocks(plate.confidence.astype(np.float64)), _blocks(smoke.astype(np.float64))
@@ -69,9 +66,9 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
 
 
 def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate[str]]:
-    """Return the source radiance (3,) that the sums of `seen_texture` of frames show, None if none; and the thickness.
+    """Return the source radiance (3,) from the sums of `seen_texture` of frames, or None; and the thickness.
 
-    The deviation is estimated by leaving one frame out after the other (the jackknife).
+    The deviation is estimated by leaving out one frame after the other (the jackknife).
     """
     undetermined = Estimate(
         "uncertain smoke thickness",
@@ -88,7 +85,7 @@ def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate
     rest = seen.sum(0) - seen
     others = rest[:, 5:].sum(1) / np.maximum(rest[:, 0], 1e-12)
     spread = np.sqrt((len(seen) - 1) * np.var(others)) / max(sum(added) / hidden, 1e-12)
-    # what a background of smoke hides is missing from what the smoke before it seems to hide
+    # smoke in the background is missing from what the smoke before it seems to hide
     error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
         # more than all of it says nothing more
@@ -100,7 +97,7 @@ def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate
 
 
 def _texture(one: Doubles, other: Doubles) -> Doubles:
-    """Products of differences of neighbouring pixels, down and across, the mean over each block and all channels."""
+    """Mean over each block of products of differences of neighbouring pixels, down and across, summed over channels."""
     products = np.zeros(one.shape[:2])
     for axis, part in enumerate((products[:-1], products[:, :-1])):
         part += np.einsum("ijc,ijc->ij", np.diff(one, axis=axis), np.diff(other, axis=axis))
@@ -108,7 +105,7 @@ def _texture(one: Doubles, other: Doubles) -> Doubles:
 
 
 def _blocks(values: Doubles) -> Doubles:
-    """Means over whole blocks; what is left at the right and at the bottom does not count."""
+    """Means over whole blocks; what is left over at the right and bottom does not count."""
     rows, columns = (n // BLOCK for n in values.shape[:2])
     whole = np.ascontiguousarray(values[: rows * BLOCK, : columns * BLOCK])
     lines = whole.reshape(rows, BLOCK, -1).sum(1)  # along memory: several times faster
