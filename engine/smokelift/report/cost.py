@@ -1,9 +1,9 @@
-"""What a run takes, known before it is spent: time, memory and disk.
+"""A forecast of what a run takes: time, memory and disk.
 
 It follows the voxels of the box, and more so those that may hold smoke. The time of frames is counted in Poisson solves
-by cosine transforms, as long as one takes a voxel on this machine. What comes before the frames is not modelled: a
-forecast prepares the shot as the run does, and that takes as long and as much memory again. How long it waited for the
-processor is how busy the machine is. All constants: docs/experiments/memory-and-time.md.
+by cosine transforms, which are timed on this machine. The set-up is not modelled: a forecast prepares the shot as the
+run does, so the run takes that time and memory again. How long it waited for the processor says how busy the machine
+is. All constants: docs/experiments/memory-and-time.md.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from smokelift.report.workload import Workload
 Resolution = tuple[int, int, int]
 
 START_SECONDS = 1.5
-"""Seconds of a processor to start and to measure the clip's texture."""
+"""Processor seconds to start and to measure the clip's texture."""
 
 VOXELS_A_FRAME = 1.2e7
-"""Voxels whose solve takes as long as what every frame takes, however small its grid: decoding and files."""
+"""A frame's time without its voxels (decoding and files), in voxels of a solve."""
 
 SOLVES_A_VOXEL = 12.0
-"""Solves that take as long as what a frame takes for each voxel of the box."""
+"""A frame's time for each voxel of the box, in solves."""
 
 SOLVES_A_SMOKY_VOXEL = 250.0, 130.0
-"""Solves that take as long as what a frame takes for each voxel that may hold smoke in addition: as many of them as are
-fitted on their own grid, and those beyond, whose detail is found from coarse to fine."""
+"""A frame's additional time for each voxel that may hold smoke, in solves: for those that are fitted on their own grid,
+and for those beyond, whose detail is found from coarse to fine."""
 
 SHARE_A_VIEW = 0.5
 """Part of a frame's time that each further view adds."""
@@ -44,61 +44,54 @@ WITHOUT_DETAIL = 0.55
 """Part of a frame's time that is left without detail in depth."""
 
 FRESH_FRAMES = 2.0
-"""Frames that take as long as what the first two take in addition, for whose detail nothing is carried."""
+"""Additional time of the first two frames, to whose detail none is carried, in frames."""
 
 PAPER_SOLVES = 1100.0
-"""Solves that take as long as what a frame takes for each voxel by the paper's method."""
+"""A frame's time for each voxel by the paper's method, in solves."""
 
 BYTES_A_SMOKY_VOXEL_ON_DISK = 16
-"""Bytes of a density and three velocities at 16 bits, for each voxel that may hold smoke, and of the velocities around
-it: 8.6 to 16 are usual."""
+"""Bytes on disk for each voxel that may hold smoke: a density and three velocities at 16 bits, and velocities around.
+8.6 to 16 are usual."""
 
 BASE_BYTES = 190 * 2**20
 """Bytes of memory for the interpreter, libraries and kernels."""
 
 BYTES_A_PIXEL = 210
-"""Bytes of memory for each pixel of the clips' frames: those that are decoded, and what was estimated from them."""
+"""Bytes of memory for each pixel of the clips' frames: decoded frames and estimates from them."""
 
 BYTES_A_VOXEL = 12, 380
-"""Bytes at a run's peak for each voxel of the box, and for each that may hold smoke in addition."""
+"""Bytes at a run's peak for each voxel of the box, and in addition for each that may hold smoke."""
 
 SMALL = 2**23
-"""Voxels whose array takes 32 MiB. The C library gives smaller arrays of memory that it kept, which has to be cleared,
-so that they take their memory whether smoke is there or not."""
+"""Voxels whose array takes 32 MiB. Smaller arrays get memory that the C library kept and has to clear, so they take all
+of it whether there is smoke or not."""
 
 BYTES_A_VOXEL_OF_SMALL = 80, 100
-"""Bytes a voxel of such a grid, as `BYTES_A_VOXEL`."""
+"""`BYTES_A_VOXEL` of grids below `SMALL`."""
 
 BYTES_A_VOXEL_OF_SOLVER = 145
-"""Bytes for each voxel of the box that a velocity adds whose estimate has the grid of the density."""
+"""Bytes for each voxel of the box that a velocity on the density's grid adds."""
 
 TIMED, TIMES = (64, 64, 64), 9
 """Voxels of the grid whose solve is timed, and how often."""
 
 BYTES_A_SIMULATED_VOXEL = 170
-"""Bytes of memory at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a
-ball, less without an obstacle."""
+"""Bytes at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a ball, less
+without an obstacle."""
 
 MIN_VOXELS = 8
-"""Voxels along the shortest side of a grid that is suggested."""
+"""Smallest number of voxels along the shortest side of a suggested grid."""
 
 
 class NotEnoughMemoryError(MemoryError):
-    """The grid does not fit; says which would."""
+    """The grid does not fit into memory; the message says which would."""
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a run takes.
+    """What a run takes: seconds, bytes of memory at its peak, and at most so many bytes of OpenVDB files.
 
-    Attributes
-    ----------
-    seconds
-        Right to a factor of one and a half on a machine whose load does not change.
-    memory, memory_free
-        Bytes at the peak, and bytes that are free now.
-    disk
-        Bytes of the OpenVDB files, at most.
+    The seconds are right to a factor of 1.5 if the machine's load does not change. ``memory_free`` is bytes now.
     """
 
     seconds: float
@@ -109,16 +102,9 @@ class Cost:
 
 @dataclass(frozen=True)
 class Spent:
-    """What preparing a shot took.
+    """What preparing a shot took: seconds that passed, and processor seconds of all cores together.
 
-    Attributes
-    ----------
-    seconds
-        That passed.
-    processor
-        Seconds of all cores together.
-    memory
-        Bytes at the peak: of a large clip on a small grid as many as the run takes. None where that is not known.
+    ``memory`` is in bytes at the peak, None if unknown. A large clip on a small grid takes as much as the run.
     """
 
     seconds: float
@@ -127,12 +113,12 @@ class Spent:
 
     @property
     def wait(self) -> float:
-        """Seconds that pass for each in which the process could work: 1 on a machine without other work."""
+        """Seconds that pass for each second of work: 1 on a machine without other work."""
         return max(1.0, self.seconds / self.processor) if self.processor > 0 else 1.0
 
 
 def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Cost:
-    """Estimate the cost of a run, whose shot took some time to be prepared; it takes a part of a second."""
+    """Estimate the cost of a run from its grid, its smoke and what preparing it took, in a part of a second."""
     frames = START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
     return Cost(
         seconds=prepared.seconds + prepared.wait * frames,
@@ -143,7 +129,7 @@ def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Co
 
 
 def voxel_solves(resolution: Resolution, work: Workload) -> float:
-    """Return the voxels of Poisson solves that take as long as the frames of a run."""
+    """Return the time of a run's frames, in voxels of Poisson solves."""
     voxels = math.prod(resolution)
     if work.settings.method == "paper":
         return work.frames * PAPER_SOLVES * voxels
@@ -166,7 +152,7 @@ def memory_needed(resolution: Resolution, work: Workload) -> int:
 
 
 def affordable_room(resolution: Resolution) -> float:
-    """Return how many times as large as a clip's box one may be whose simulation fits into the memory that is free."""
+    """Return how many times as large as a clip's box a simulated one may be to fit into the free memory."""
     return (memory_free() - BASE_BYTES) / (BYTES_A_SIMULATED_VOXEL * math.prod(resolution))
 
 
@@ -176,9 +162,9 @@ def memory_free() -> int:
 
 
 def peak_memory() -> int | None:
-    """Return the peak of this process's memory in bytes; None where the system does not say.
+    """Return the peak of this process's memory in bytes; None if the system does not say.
 
-    The maximum of `getrusage` would not do: in a child process it starts at the parent's.
+    `getrusage` will not do: in a child process its maximum starts at the parent's.
     """
     try:
         status = Path("/proc/self/status").read_text(encoding="ascii")
@@ -188,14 +174,9 @@ def peak_memory() -> int | None:
 
 
 def require_memory(resolution: Resolution, work: Workload, *, given: bool = True) -> None:
-    """Check that a run fits into the memory that is free.
+    """Check that a run fits into the free memory; NotEnoughMemoryError with the largest resolution that does.
 
-    A box that is ``given`` keeps its proportions, so that voxels stay cubes; one that was found follows its voxels.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        With the largest resolution of the same shape that fits.
+    A ``given`` box keeps its proportions, so that voxels stay cubes; one that was found follows its voxels.
     """
     free = memory_free()
     needed = memory_needed(resolution, work)
@@ -215,7 +196,7 @@ def require_memory(resolution: Resolution, work: Workload, *, given: bool = True
 
 
 def _same_proportions(resolution: Resolution) -> Iterator[Resolution]:
-    """Smaller resolutions of exactly the same proportions, the largest first."""
+    """Smaller resolutions of the same proportions, the largest first."""
     common = math.gcd(*resolution)
     x, y, z = (n // common for n in resolution)
     candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
@@ -223,7 +204,7 @@ def _same_proportions(resolution: Resolution) -> Iterator[Resolution]:
 
 
 def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
-    """Smaller resolutions of the same proportions but for multiples of four, the largest first."""
+    """Smaller resolutions of about the same proportions in multiples of four, the largest first."""
     for longest in range(max(resolution) - 4, 0, -4):
         x, y, z = (4 * math.ceil(n * longest / max(resolution) / 4) for n in resolution)
         if min(x, y, z) >= MIN_VOXELS:
@@ -232,9 +213,9 @@ def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
 
 @cache
 def _seconds_a_voxel() -> float:
-    """Return the seconds that a Poisson solve takes on this machine, for each voxel; timed once, for all costs.
+    """Return the seconds of a Poisson solve on this machine, for each voxel.
 
-    The fastest of some is one that no other work held up.
+    The fastest of some solves is one that no other work held up.
     """
     field = np.zeros(TIMED, np.float32)
     spent = []

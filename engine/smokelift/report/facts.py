@@ -1,4 +1,4 @@
-"""What is known of a shot before it is reconstructed, fact by fact: its value, where that comes from, and how."""
+"""What is known of a shot before it is reconstructed, fact by fact: its value, and where that comes from."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
 CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
-"""Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
+"""Noise in 8 bit codes up to which a clip is clean, and from which it hides thin smoke
 (docs/experiments/background.md)."""
 
 
 def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
-    """Return what is known of a shot, a line each."""
+    """Return what is known of a shot; ``given`` is the user's scene."""
     scene, domain = shot.scene, shot.scene.domain
     plate = shot.views[0].plates.at(0)
     size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
@@ -83,13 +83,13 @@ def _cost(shot: Shot, cost: Cost) -> Fact:
 
 
 def _said(shot: Shot, *about: str) -> str:
-    """The remark on the input whose kind begins so: what was assumed of a part of the scene that is not given."""
+    """The sentence of the remark on the input whose kind begins with one of ``about``, else nothing."""
     own = (remark for remark in shot.remarks if "view" not in remark.figures)
     return next((sentence(remark) for remark in own if remark.kind.startswith(about)), "")
 
 
 def _given_or_undetermined(what: str, value: str, is_given: bool, how: str) -> Fact:
-    """The line of what a user gives and no measurement determines."""
+    """The fact about what a user may give and no measurement determines."""
     return Fact(what, value, "given") if is_given else Fact(what, value, UNDETERMINED, how)
 
 
@@ -110,7 +110,7 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
 
 
 def _mask(shot: Shot) -> tuple[Fact, ...]:
-    """The line of the mask, if there is one."""
+    """The fact about the mask, if there is one."""
     seen = shot.clip.seen(0, *shot.clip.size)
     if seen is None:
         return ()
@@ -137,7 +137,7 @@ def _noise(plate: Plate) -> Fact:
 
 
 def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
-    """The lines of the light: how strong it is, and what of it one picture does not show."""
+    """The facts about the light: how strong it is, and what one picture does not show of it."""
     if shot.scene.scattering == "absorption":
         return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
     thickness = _estimate(shot, "smoke thickness")
@@ -170,7 +170,7 @@ def _place(shot: Shot) -> Fact:
 
 
 def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fact:
-    """The line of an estimate, or of what was not estimated because it is given or was not measured."""
+    """The fact about an estimate, or about what was given or not measured instead."""
     estimate = _estimate(shot, what)
     if is_given or estimate is None:
         return Fact(name, value, "given" if is_given else UNDETERMINED)
@@ -183,7 +183,7 @@ def _estimate(shot: Shot, what: str) -> Estimate[Any] | None:
 
 
 def boundaries(scene: CompleteScene, settings: Settings) -> tuple[Remark, ...]:
-    """How smoke gets in and out of the box of a complete scene."""
+    """How smoke gets into the box and out of it."""
     inflow = scene.inflow()
     if inflow is None:
         search = settings.method == "default" and settings.velocity.sources

@@ -24,16 +24,16 @@ from smokelift.setup.shot import Shot
 Tile = NDArray[np.uint8]
 
 BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40), (230, 60, 200), (120, 255, 120)
-"""Colours of the box, of light, of smoke, of what is unknown and of the camera's path, sRGB."""
+"""Colours (sRGB) of the box, light, smoke, unknown background and camera's path."""
 
 MASK = (255, 60, 60)
-"""Colour of the mask's outline."""
+"""Colour (sRGB) of the mask's outline."""
 
 ARROW = 0.35
-"""Length of the arrow of a light over the diagonal of the box."""
+"""Length of a light's arrow over the diagonal of the box."""
 
 HEAD = 16.0
-"""Length of its head in pixels."""
+"""Length of the arrow's head in pixels."""
 
 STRONG = 16.0
 """Deviation from the background that is shown brightest, in units of noise."""
@@ -43,18 +43,10 @@ BINS = 96
 
 
 def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: Iterable[Remark]) -> Page:
-    """Return the page of a shot.
+    """Return the page of a shot, of which the user's scene was ``given``.
 
-    Parameters
-    ----------
-    shot
-        Everything decided.
-    given
-        What the user said of it.
-    known
-        The facts of it, see `smokelift.report.facts`.
-    remarks
-        What is said as well, doubts above the pictures.
+    The facts (``known``) are those of `smokelift.report.facts`. Remarks that they do not say follow below; doubts stand
+    above the pictures.
     """
     number = shot.smoky[0] if shot.smoky else 0
     columns, rows = fitted(*shot.clip.size)
@@ -86,14 +78,14 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
 
 
 def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: int) -> Tile:
-    """A frame with the mask's outline, the edges of the box, and an arrow for each light whose direction is known."""
+    """A frame with the mask's outline, the box's edges, and an arrow for each light with a direction."""
     codes, seen = eight_bit(picture), shot.clip.seen(number, *camera.size)
     if seen is not None:
         codes[seen & ~ndimage.binary_erosion(seen, np.ones((3, 3)), border_value=1)] = MASK
     domain, shown = shot.scene.domain, Image.fromarray(codes)
     draw = ImageDraw.Draw(shown)
     corners = domain.corners()
-    # corners that differ along one axis are joined
+    # an edge joins corners that differ along one axis
     edges = [(a, b) for a in range(8) for b in range(a) if np.sum(corners[a] != corners[b]) == 1]
     for a, b in edges:
         _line(draw, camera, corners[[a, b]], BOX)
@@ -103,7 +95,7 @@ def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: 
 
 
 def _light_starts(shot: Shot, domain: Domain) -> list[NDArray[np.float64]]:
-    """Where the arrows of the lights begin, on their way to the middle of the box."""
+    """Points (3,) where the lights' arrows to the middle of the box begin."""
     if shot.scene.scattering not in SHADOWED:
         return []
     middle = np.array(domain.centre)
@@ -120,7 +112,7 @@ def _line(
     colour: tuple[int, int, int],
     head: bool = False,
 ) -> None:
-    """A line through points of the world (n, 3), if all are before the camera; an arrow if asked for."""
+    """A line through world points (n, 3), if all are before the camera; with a ``head`` an arrow."""
     pixels, depth = project_points(camera, points)
     if (depth <= 0).any():
         return
@@ -135,21 +127,21 @@ def _line(
 
 
 def _matte_picture(seen: Matte) -> Tile:
-    """The deviation from the background, orange as far as it is certain to be smoke."""
+    """The deviation from the background, the more orange the surer it is smoke."""
     strength = np.clip(seen.deviation / STRONG, 0, 1)[..., None]
     white = np.full(3, 255)
     return np.asarray(np.rint(strength * (white + seen.share[..., None] * (SMOKE - white))), np.uint8)
 
 
 def _unknown_picture(plate: Plate, unknown: NDArray[np.bool_]) -> Tile:
-    """The background with what is unknown of it in one colour."""
+    """The background, with its unknown part in one colour."""
     codes = eight_bit(plate.image).astype(np.float64)
     codes[unknown] = 0.4 * codes[unknown] + 0.6 * np.array(HIDDEN)
     return np.asarray(np.rint(codes), np.uint8)
 
 
 def _histogram(picture: NDArray[np.float32], plate: Plate, seen: Matte) -> Tile:
-    """How many pixels have which sRGB value, on a logarithmic scale."""
+    """Histogram of sRGB values, on a logarithmic scale."""
     width, height = TILE[0], TILE[0] // 2
     shown = Image.new("RGB", (width, height), (12, 12, 14))
     draw = ImageDraw.Draw(shown)
@@ -168,7 +160,7 @@ def _histogram(picture: NDArray[np.float32], plate: Plate, seen: Matte) -> Tile:
 
 
 def _path(shot: Shot, camera: Camera, picture: NDArray[np.float32]) -> Tile | None:
-    """Where the middle of the box goes in the picture of a camera that moves; None of one that stands still."""
+    """Path of the box's middle in the picture of a camera that moves; None if it stands still."""
     if not shot.moves:
         return None
     shown = Image.fromarray(eight_bit(0.3 * picture))

@@ -1,4 +1,4 @@
-"""One page of pictures and of what is known about them, as a picture and as HTML that needs no other file."""
+"""A page of pictures and facts, as a picture or as HTML that needs no other file."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from smokelift.setup.estimate import UNDETERMINED
 PAGE_KINDS = (".png", ".html")
 
 TILE = (480, 400)
-"""Width and height of a picture on the page in pixels, at most."""
+"""Largest width and height of a picture on the page, in pixels."""
 
 COLUMNS = 3
 """Pictures side by side."""
 
 _GAP, _TEXT, _TITLE, _LINE = 16, 14, 22, 20
-"""Pixels between parts, sizes of two fonts, and from line to line."""
+"""Pixels between parts, of two fonts, and from line to line."""
 
 _WIDTH = COLUMNS * TILE[0] + (COLUMNS + 1) * _GAP
 _STARTS = (_GAP, 170, 520, 670)
 """Left edges of the columns of the table, in pixels."""
 
 PACKED = 2
-"""Level of the PNG's compression: half of the time of the usual 6, for a seventh more bytes."""
+"""Compression level of PNG files: half of the time of the usual 6, and a seventh more bytes."""
 
 _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165), (255, 170, 70)
 """Colours, sRGB."""
@@ -40,7 +40,7 @@ _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165),
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A picture: its title, and sRGB codes (rows, columns, 3)."""
+    """A picture (rows, columns, 3) in sRGB codes, with its title."""
 
     title: str
     picture: NDArray[np.uint8]
@@ -48,16 +48,9 @@ class Panel:
 
 @dataclass(frozen=True)
 class Fact:
-    """A line of the table.
+    """A line of the table: what it is about, the value that is taken, its origin, and a sentence that may be empty.
 
-    Attributes
-    ----------
-    what, value
-        What it is about, and what is taken.
-    origin
-        ``"given"``, ``"by hand"``, ``"measured"``, ``"estimated"`` or `UNDETERMINED`.
-    how
-        In a sentence; may be empty.
+    ``origin`` is ``"given"``, ``"by hand"``, ``"measured"``, ``"estimated"`` or `UNDETERMINED`.
     """
 
     what: str
@@ -72,7 +65,7 @@ class Fact:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """A page: its title, warnings below that, pictures, a table, and sentences below it."""
+    """A page, from top to bottom."""
 
     title: str
     warnings: Sequence[str]
@@ -82,7 +75,7 @@ class Page:
 
 
 def write_page(path: Path, page: Page) -> None:
-    """Write a page; the suffix says which of `PAGE_KINDS`. It appears whole or not at all."""
+    """Write a page as the suffix says, one of `PAGE_KINDS`. It appears whole or not at all."""
     with atomic_path(path) as aside:
         if path.suffix.lower() == ".html":
             aside.write_text(_as_html(page), encoding="utf-8")
@@ -91,7 +84,7 @@ def write_page(path: Path, page: Page) -> None:
 
 
 def fitted(width: int, height: int) -> tuple[int, int]:
-    """Return the size at which a picture goes on the page, in pixels."""
+    """Return width and height of a picture on the page, in pixels."""
     scale = min(TILE[0] / width, TILE[1] / height)
     return max(1, round(width * scale)), max(1, round(height * scale))
 
@@ -148,7 +141,7 @@ _ENDS = (*_STARTS[1:], _WIDTH)
 
 
 def _wrapped(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: float) -> list[str]:
-    """The lines of a text that are no wider than so many pixels, unless a single word is."""
+    """The lines of a text; none is wider than so many pixels unless a single word is."""
     lines: list[str] = []
     space, taken = font.getlength(" "), 0.0
     for word in text.split():
@@ -192,7 +185,7 @@ def _as_html(page: Page) -> str:
 
 
 def _data(picture: NDArray[np.uint8]) -> str:
-    """A picture as the address of itself."""
+    """A picture as a data URL."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, format="PNG", compress_level=PACKED)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"

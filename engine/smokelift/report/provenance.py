@@ -1,4 +1,4 @@
-"""What is kept with a result: what of it is measured and what is not, and what was decided for it, in words."""
+"""What is kept with a result, in words: which parts of it are measured, and what was decided for it."""
 
 from __future__ import annotations
 
@@ -23,16 +23,13 @@ class Provenance:
 
     Attributes
     ----------
-    what
-        The part.
     origin
-        ``"measured"``: the pictures show it. ``"estimated"``: it follows from what they show. ``"assumed"``: they leave
-        it undetermined, and one answer is taken for all clips. ``"made up"``: they leave it undetermined, and it is one
-        of many answers that show the same pictures.
+        ``"measured"``: the pictures show it. ``"estimated"``: it follows from what they show. The pictures leave the
+        others undetermined: ``"assumed"`` is one answer for all clips, ``"made up"`` one of many answers.
     how
-        What its sentence is made of.
+        The remark whose sentence explains it.
     settings
-        What chose it, by the names of `Settings`.
+        The values that chose it, by the names of `Settings`.
     """
 
     what: str
@@ -46,7 +43,7 @@ class Provenance:
 
 
 def record(estimate: Estimate[Any]) -> dict[str, Any]:
-    """Return an estimate as JSON holds it; figures to four digits, since further ones decide nothing."""
+    """Return an estimate as JSON holds it, with four digits, since further ones decide nothing."""
     known = {**estimate.figures, **({} if estimate.spread is None else {"spread": estimate.spread})}
     value = estimate.value
     return {
@@ -61,7 +58,7 @@ def record(estimate: Estimate[Any]) -> dict[str, Any]:
 
 
 def provenance(shot: Shot) -> tuple[Provenance, ...]:
-    """Where the parts of a shot's densities and velocities come from, the best known first."""
+    """Where the parts of a shot's result come from, the best known first."""
     settings, cameras = shot.settings, {"cameras": len(shot.views)}
     parts = [
         *_pictures(shot.clip),
@@ -78,12 +75,12 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
 
 
 def made_up(shot: Shot) -> tuple[Remark, ...]:
-    """What of a result will be made up, to be said before a run."""
+    """What a run will make up, to be said before it."""
     return tuple(part.how for part in provenance(shot) if part.origin == "made up")
 
 
 def _pictures(clip: Clip) -> Iterator[Provenance]:
-    """What was done to the input's pictures, and which of them are not its own."""
+    """What was done to the input's pictures, and which were replaced."""
     for note in clip.notes:
         yield Provenance("pictures", "measured", note)
     if clip.damaged:
@@ -92,7 +89,7 @@ def _pictures(clip: Clip) -> Iterator[Provenance]:
 
 
 def _distribution(shot: Shot) -> str:
-    """What is taken for the distribution along the rays, which no number of cameras determines."""
+    """The kind of remark on the distribution along the rays, which no number of cameras determines."""
     taken = "thin fog" if len(shot.views) > 1 else "the view from the side"
     if shot.settings.method != "paper":
         taken = "the smoke's width"
@@ -100,6 +97,6 @@ def _distribution(shot: Shot) -> str:
 
 
 def _unseen(shot: Shot) -> bool:
-    """Whether there is a side that no camera is near to."""
+    """Whether there is a side without a camera near it."""
     cameras = [view.working.camera for view in shot.views]
     return unseen_sides(Turntable.before(cameras[0], shot.optics.domain), cameras)

@@ -1,8 +1,8 @@
 """The sentences of remarks and estimates by their kinds: the only place of their words.
 
-A sentence fills in the figures of its remark, as `str.format` does, and for an estimate ``what``, ``value``,
-``tolerance`` and ``spread``. Beside the usual formats a noun counts, and "place" says a depth in words; numbers are
-joined by commas, lengths whose format ends with " x" and whole numbers by that; models of scattering have names.
+A sentence fills in the figures of its remark, as `str.format` does; for an estimate also ``what``, ``value``,
+``tolerance`` and ``spread``. There are formats of its own: a noun is counted, and "place" says a depth in words. Tuples
+are joined by " x " if they are whole numbers or their format ends with " x", else by commas.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MODELS: Mapping[object, str] = {
 """Models of scattering in words."""
 
 MIN_DEPTH = 0.005
-"""Smallest distance from the middle of the box that is said, in metres: less would look exact."""
+"""Smallest distance (m) from the middle of the box that is said: less would look exact."""
 
 SENTENCES: Mapping[str, str] = {
     # how the clips are read
@@ -274,7 +274,7 @@ SENTENCES: Mapping[str, str] = {
         "any more. Give it more room than {room:g}, or move the camera or lamp in its way."
     ),
 }
-"""All sentences."""
+"""Sentences by the kinds of remarks."""
 
 
 def sentence(remark: Remark) -> str:
@@ -285,7 +285,7 @@ def sentence(remark: Remark) -> str:
 
 
 def all_figures(remark: Remark) -> dict[str, Any]:
-    """Return what the sentence of a remark or an estimate fills in."""
+    """Return the figures that a sentence fills in."""
     own = {}
     if isinstance(remark, Estimate):
         own = {"value": remark.value, "tolerance": remark.tolerance, "spread": remark.spread}
@@ -294,10 +294,10 @@ def all_figures(remark: Remark) -> dict[str, Any]:
 
 
 class _Words(Formatter):
-    """Fills figures in."""
+    """Fills figures in, by the formats of the sentences."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Return one of them in words."""
+        """Return a figure in words."""
         if isinstance(value, tuple):
             lengths = format_spec.endswith(" x") or all(isinstance(one, int) for one in value)
             return (" x " if lengths else ", ").join(format(one, format_spec.removesuffix(" x")) for one in value)
@@ -309,7 +309,7 @@ class _Words(Formatter):
 
 
 def _place(depth: float) -> str:
-    """Say how far behind the middle of the box something is, in metres."""
+    """Where a depth (m) behind the middle of the box is, in words."""
     if abs(depth) < MIN_DEPTH:
         return "in the middle of the box"
     return f"{abs(depth):.2g} m {'behind' if depth > 0 else 'before'} the middle of the box"

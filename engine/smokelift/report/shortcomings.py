@@ -10,11 +10,11 @@ import numpy as np
 from smokelift.checks import Doubt
 
 UNEXPLAINED_SHARE = 0.7
-"""Root mean square of what a fit leaves, as a share of what the smoke changes: at 0.7 half of the change's energy."""
+"""Root mean square of what a fit leaves, as a share of what the smoke changes: half of the change's energy."""
 
 DOUBTFUL_SHARE = 0.3
-"""Share left from which not all of the change may be smoke: good results leave less, those in which labels, leaves, a
-head or the light are taken for smoke more (docs/clips.md)."""
+"""Share left above which some of the change may be no smoke. Good results leave less; those that take labels, leaves, a
+head or the light for smoke leave more (docs/clips.md)."""
 
 
 def count_empty(figures: Sequence[Mapping[str, Any]]) -> int:
@@ -23,7 +23,7 @@ def count_empty(figures: Sequence[Mapping[str, Any]]) -> int:
 
 
 def shortcomings(figures: Sequence[Mapping[str, Any]], *, burns: bool = False) -> list[Doubt]:
-    """Return what the figures of the frames of a finished run, in which fire ``burns`` or not, say against it."""
+    """Return doubts about a finished run by its frames' figures; ``burns`` if there is fire."""
     doubts = []
     empty = count_empty(figures)
     if empty:

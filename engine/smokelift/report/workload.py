@@ -1,4 +1,4 @@
-"""What of a shot decides what a run of it takes: above all how many voxels of its box may hold smoke."""
+"""What decides how much a run takes: above all, how many voxels of the box may hold smoke."""
 
 from __future__ import annotations
 
@@ -11,27 +11,23 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
 MAX_SIDE_VOXELS = 96
-"""Voxels along the longest side of the grid on which the smoke is found, at most: it takes a rim of one of them
-with it, which makes shares up to two fifths too large (docs/experiments/memory-and-time.md)."""
+"""Largest number of voxels along a side of the grid that smoke is measured on. A rim of one voxel counts with it, which
+makes shares up to two fifths too large (docs/experiments/memory-and-time.md)."""
 
 LOOKED_AT = 4
-"""Frames with smoke that are measured, from the one with the most on."""
+"""Largest number of frames with smoke that are measured, from the one with the most on."""
 
 
 @dataclass(frozen=True)
 class Workload:
-    """What decides what a run takes, besides the resolution.
+    """What decides how much a run takes, besides the resolution.
 
     Attributes
     ----------
     settings
-        As they are given: a velocity's grid that is chosen is coarse, and takes no memory to speak of.
-    frames
-        How many.
-    views
-        Cameras.
-    pixels
-        Of all their pictures of one moment.
+        The given ones: a velocity's grid that is chosen is coarse, and hardly takes memory.
+    frames, views, pixels
+        Numbers: of frames, of cameras, and of pixels in all cameras' pictures of one moment.
     largest, mean
         Shares of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all frames.
     """
@@ -45,7 +41,7 @@ class Workload:
 
     @staticmethod
     def of(shot: Shot, settings: Settings) -> Workload:
-        """Measure the smoke of some frames of a shot that was prepared with settings, on a coarse grid."""
+        """Measure a shot that was prepared with settings."""
         shares = _shares(shot, settings)
         smoky = len(shot.smoky) / len(shot.spread(SAMPLE_FRAMES))
         return Workload(
@@ -59,7 +55,7 @@ class Workload:
 
 
 def _shares(shot: Shot, settings: Settings) -> list[float]:
-    """Shares of the voxels that may hold smoke, in some of the frames that show smoke."""
+    """Shares of the voxels that may hold smoke, in some of the frames with smoke, on a coarse grid."""
     if settings.method == "paper":  # its densities are anywhere in the box
         return [1.0]
     optics = replace(shot.optics, domain=shot.optics.domain.with_at_most(MAX_SIDE_VOXELS))
