@@ -33,19 +33,19 @@ _TRANSIENT = {
 """Errors of a storage that pass: it is full, or its server is away."""
 
 MAX_THREADS = 1024
-"""Largest number of threads: no processor has more."""
+"""Largest number of threads: more than any processor has."""
 
 _HINT = " Finished frames stay; --resume goes on from them."
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong with a word without obeying the control characters in it."""
+    """Says what is wrong with a word, its control characters spelt out."""
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message))
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse, and refuse what is left over; a shell makes many words of ``frame_*.png``."""
+        """Parse, and refuse words that are left over, as many pictures are where a shell expands ``frame_*.png``."""
         options, rest = self.parse_known_args(args, namespace)
         if rest and all(Path(word).suffix.lower() in READABLE for word in rest):
             self.error(
@@ -60,7 +60,7 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return the exit status."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a letter that the terminal's encoding lacks is no reason to stop
+        if isinstance(stream, io.TextIOWrapper):  # the terminal's encoding may lack a letter
             stream.reconfigure(errors="backslashreplace")
     hint = ""
     try:
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             except OSError as error:
                 raise OutputError(error) from error
     except OutputError as error:
-        # what is left in the buffer would fail again when the interpreter ends
+        # the rest of the buffer would fail again when the interpreter ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"{error}{hint}", file=sys.stderr)
         return CANCELLED if error.closed else BAD_INPUT
@@ -88,7 +88,7 @@ def _run(options: argparse.Namespace, hint: str) -> int:
             with say:
                 options.run(options, say)
         except Exception as error:
-            if Termination.came:  # a library turned the interrupt into an error of its own
+            if Termination.came:  # a library made another error of the interrupt
                 raise KeyboardInterrupt from error
             raise
     except KeyboardInterrupt:
@@ -115,7 +115,7 @@ def _run(options: argparse.Namespace, hint: str) -> int:
 
 
 def _sentence(error: Exception) -> str:
-    """What an error says, without the number that the system gives it."""
+    """What an error says, without the system's number."""
     if not isinstance(error, OSError) or error.filename is None or not error.strerror:
         return str(error)
     reason = "cannot be written: the disk is full" if error.errno in DISK_FULL else error.strerror
@@ -123,7 +123,7 @@ def _sentence(error: Exception) -> str:
 
 
 def _is_transient(error: BaseException | None) -> bool:
-    """Return whether a failure passes by itself: one of the storage, or another run in the same directory."""
+    """Return whether a failure passes by itself: the storage's, or another run in the same directory."""
     while error is not None:
         if isinstance(error, DirectoryBusyError) or getattr(error, "errno", None) in _TRANSIENT:
             return True

@@ -1,4 +1,4 @@
-"""Options that several commands share, and what they mean."""
+"""Options that several commands share, and what they say."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from smokelift.setup.settings import METHODS, QUALITIES, Settings
 
 
 def named_path(text: str) -> Path:
-    """Return the path that a word on the command line names, which the libraries need as text."""
+    """Return the path that a word names; it has to be UTF-8, as the libraries need it."""
     try:
         text.encode("utf-8")
     except UnicodeEncodeError:
@@ -30,7 +30,7 @@ def named_path(text: str) -> Path:
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """Add the clip or scene file, and all that decides how it is reconstructed."""
+    """Add the clip or scene file, and how it is reconstructed."""
     parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
     parser.add_argument(
         "--quality",
@@ -94,7 +94,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_directed_options(parser: argparse.ArgumentParser) -> None:
-    """Add a sequence, and where what becomes of it is written to."""
+    """Add a sequence, and the output for a new one."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument("--out", type=named_path, required=True, help="directory for the new sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
@@ -102,12 +102,9 @@ def add_directed_options(parser: argparse.ArgumentParser) -> None:
 
 
 def require_new(options: argparse.Namespace) -> None:
-    """Check, before anything is spent, that the output of `add_directed_options` can be written to.
+    """Check the output of `add_directed_options` before anything is spent.
 
-    Raises
-    ------
-    ValueError
-        If it cannot, or is the sequence itself.
+    It is a ValueError if it cannot be written, or is the sequence itself.
     """
     if options.out.resolve() == options.directory.resolve():
         raise ValueError(f"{options.out}: is the sequence itself; choose another directory for --out.")
@@ -116,7 +113,7 @@ def require_new(options: argparse.Namespace) -> None:
 
 
 def finite_number(text: str) -> float:
-    """Return the number that a word says."""
+    """Return a number from a word."""
     try:
         number = float(text)
     except ValueError:
@@ -127,20 +124,14 @@ def finite_number(text: str) -> float:
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
-    """Return the settings that the options of `add_run_options` say."""
+    """Return the settings from the options of `add_run_options`."""
     preset = Settings.preset(options.quality, options.method, options.resolution)
     detail = preset.detail if options.detail is None else options.detail
     return replace(preset, scattering=options.scattering, distance=options.distance, detail=detail, seed=options.seed)
 
 
 def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:
-    """Return the scene that the options of `add_run_options` say, and its clip.
-
-    Raises
-    ------
-    ValueError
-        If the scene file cannot be read or has no clip.
-    """
+    """Return the scene from the options of `add_run_options`, and its clip; ValueError if it has none."""
     path: Path = options.input
     scene = Scene.load(path) if path.suffix.lower() == ".toml" else Scene(clip=ClipSource(path))
     if options.frames is not None and scene.clip is not None:
@@ -155,10 +146,7 @@ def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:
 def require_folder(path: Path | None) -> None:
     """Check, before anything is spent, that a file can be written.
 
-    Raises
-    ------
-    ValueError
-        If its folder does not exist or cannot be written to, or the path is that of a folder.
+    It is a ValueError if its folder is missing or read-only, or if the path is a folder itself.
     """
     if path is None:
         return
@@ -181,7 +169,7 @@ def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
 
 
 def frame_range(text: str) -> tuple[int, int]:
-    """Return the first and the last frame that a word says."""
+    """Return the first and the last frame from a word A:B."""
     try:
         first, last = (int(part) for part in text.split(":"))
     except ValueError:

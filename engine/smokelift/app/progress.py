@@ -23,7 +23,7 @@ Style = Literal["text", "json"]
 
 
 class OutputError(OSError):
-    """Standard output takes nothing more; ``closed`` if whoever read it has gone."""
+    """Standard output takes nothing more; ``closed`` if its reader has gone."""
 
     def __init__(self, error: OSError) -> None:
         super().__init__(f"Standard output cannot be written: {error.strerror}.")
@@ -31,12 +31,12 @@ class OutputError(OSError):
 
 
 def printable_lines(text: str) -> str:
-    """Return a text whose control characters but line breaks, which a terminal would obey, are spelt out."""
+    """Return a text with its control characters, which a terminal would obey, spelt out; line breaks stay."""
     return "\n".join(map(printable, text.split("\n")))
 
 
 class _Console(Console):
-    """Tells of a closed pipe where Rich would leave with status 1."""
+    """Raises the error of a closed pipe, where Rich would leave with status 1."""
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
@@ -60,14 +60,14 @@ class Reporter(Protocol):
         self.stop()
 
     def stop(self) -> None:
-        """Nothing more is shown of the frames."""
+        """The frames' bar ends."""
         return
 
     def note(self, said: Remark | str) -> None:
         """Something that was assumed or noticed."""
 
     def start(self, total: int, done: int) -> None:
-        """So many frames in all, so many there already."""
+        """Frames begin: ``total`` of them, ``done`` already."""
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         """One more frame is finished."""
@@ -76,7 +76,7 @@ class Reporter(Protocol):
         """The job is done."""
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
-        """The job ended otherwise; ``retryable`` if the same command may succeed later."""
+        """The job failed; ``retryable`` if the same command may succeed later."""
 
 
 def reporter(style: Style) -> Reporter:
@@ -94,9 +94,9 @@ def say_sequence(
     total: int,
     **figures: float,
 ) -> None:
-    """Say every frame of a sequence while it is written, from number ``start`` on, by its figures; and how it ends.
+    """Say every frame of a sequence while it is written, the first number being ``start``; and how it ends.
 
-    The last sentence is a remark of a kind, with more figures of its own.
+    The last sentence is a remark of ``kind`` with ``figures`` of its own.
     """
     began, started = time.monotonic(), False
     for number, of_frame in written:
@@ -110,7 +110,7 @@ def say_sequence(
 
 
 def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
-    """Return the median of ``psnr`` over the figures of frames; None if none has any."""
+    """Return the median ``psnr`` (dB) of frames; None if none has one."""
     decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
     return median(decibels) if decibels else None
 
@@ -120,7 +120,7 @@ def _words(said: Remark | str) -> str:
 
 
 def _fields(said: Remark | str) -> dict[str, Any]:
-    """The text of an event, and the kind and figures from which other programs make their own."""
+    """The text of an event, with the kind and figures from which programs make their own."""
     known = {} if isinstance(said, str) else {"kind": said.kind, "figures": all_figures(said)}
     return {"text": _words(said), **known}
 
@@ -143,7 +143,7 @@ class _Text(Reporter):
 
     def stop(self) -> None:
         with _output():
-            if self._bar.live.is_started:  # a bar that never started would leave an empty line
+            if self._bar.live.is_started:  # else the bar would leave an empty line
                 self._bar.stop()
 
     def note(self, said: Remark | str) -> None:
@@ -158,7 +158,7 @@ class _Text(Reporter):
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         fit = figures.get("origin", "no smoke")
-        if "psnr" in figures:  # the last one stays, and stands for the run
+        if "psnr" in figures:  # the last fit stays on the screen, so it is the run's
             self._shown.append(figures)
             fit = f"fit {median_psnr(self._shown):.1f} dB"
         with _output():
@@ -174,10 +174,9 @@ class _Text(Reporter):
 
 
 class _Json(Reporter):
-    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, each with its fields, one a line.
+    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, one a line.
 
-    What is said has its ``text``, and where `smokelift.report.sentences` has the words its ``kind`` and ``figures``.
-    A note says whether it is a ``doubt``.
+    What is said has its ``text``; a remark has its ``kind`` and ``figures`` too. A note says if it is a ``doubt``.
     """
 
     def __init__(self) -> None:

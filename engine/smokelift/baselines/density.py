@@ -2,11 +2,11 @@
 
     rho <- max(0, rho - rate * densityGrad),   densityGrad = sum_views sum_pixels 2 (L - I) gradRec
 
-Picture and record are the paper's own too (`smokelift.baselines.paper_renderer`). Two slips of the listing are mended
-(the sign of the difference, which ascends as printed, and the missing rho >= 0); the fixed rate, the start from thin
-fog and the imposed side view, where no other is given, are the paper's. Its derivative is none voxel by voxel, so in
-thick smoke the loss falls at first and then rises without bound, at any rate; hence one thing that the listing has
-not: the best density seen is kept.
+Picture and record are the paper's own too (`smokelift.baselines.paper_renderer`). So are the fixed rate, the start from
+thin fog, and the imposed side view where no other is given. Two slips of the listing are mended: the sign of the
+difference, which ascends as printed, and the missing rho >= 0. One thing is added: the best density seen is kept. The
+paper's derivative is none voxel by voxel, so in thick smoke the loss falls at first and then rises without bound, at
+any rate.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ if TYPE_CHECKING:
     from smokelift.baselines.paper_renderer import PaperRenderer
 
 FOG_DEPTH = 0.1
-"""Optical depth of the fog across the domain that the fit starts from: thin, because dense media have local minima."""
+"""Optical depth across the domain of the fog that the fit starts from: thin, since dense media have local minima."""
 
 
 @dataclass(frozen=True)
 class OrthogonalCopy:
-    """The paper's depth prior: thin fog to start from, and the only picture imposed again as if from 90 degrees."""
+    """The paper's depth prior: thin fog, and a single picture imposed again as if from 90 degrees."""
 
     def of_clip(self, clip: ObservedClip) -> OrthogonalCopy:
         """Itself: it does not read the clip."""
         return self
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
-        """Fog, and the side view where there is no true one."""
+        """Fog everywhere, and the imposed side view if there is only one view."""
         domain = views.optics.domain
         thin = FOG_DEPTH / (views.optics.medium.extinction * (domain.max[0] - domain.min[0]))
         fog = np.full(domain.resolution, thin, np.float32)
@@ -62,22 +62,17 @@ class OrthogonalCopy:
 
 @dataclass(frozen=True)
 class FixedRateDescent:
-    """The paper's density fit.
+    """The paper's density fit; DeviceError if Taichi, which its renderer runs on, is not installed.
 
     Attributes
     ----------
     rate
-        Change of density that one step makes in the steepest voxel of the prior's fog. The paper gives no figure
+        Change of density by one step in the steepest voxel of the prior's fog. The paper gives no figure
         (docs/experiments/paper-baseline.md).
     iterations
-        At most so many.
+        Largest number of steps.
     least_loss
-        Mean squared difference, in units of the pictures' mean square, at which to stop.
-
-    Raises
-    ------
-    DeviceError
-        If Taichi is not installed, which the paper's renderer runs on.
+        Mean squared difference, over the pictures' mean square, at which to stop.
     """
 
     rate: float = 0.03
@@ -85,7 +80,7 @@ class FixedRateDescent:
     least_loss: float = 1e-4
 
     def __post_init__(self) -> None:
-        """Say what is missing before anything is done."""
+        """Check for Taichi before anything is done."""
         if not device.has_taichi():
             raise DeviceError(f"The paper's method cannot run, as {device.NO_TAICHI}.")
 
@@ -115,7 +110,7 @@ class FixedRateDescent:
     def _descend(
         self, renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume, thin: Volume
     ) -> tuple[Volume, list[Image], int]:
-        """The best density seen, what is left of the pictures, and the number of steps."""
+        """The best density seen, its residuals, and the number of steps."""
         _, slope = _residuals_and_gradient(renderers, pictures, thin)
         factor = np.float32(self.rate / (float(np.abs(slope).max()) or 1.0))
         enough = self.least_loss * _squares(pictures)
@@ -134,7 +129,7 @@ class FixedRateDescent:
 
 @dataclass(frozen=True)
 class AllCarried:
-    """The paper's temporal prior: the fit starts from the carried density as it is."""
+    """The paper's temporal prior: each fit starts from the carried density as it is."""
 
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
         """The carried density; see `smokelift.density.TemporalPrior`."""

@@ -1,11 +1,11 @@
 # mypy: ignore-errors
-# Taichi compiles what stands here; its annotations are no Python types.
-"""The paper's light volume, algorithm 2 with its record, and algorithm 3's accumulation; `paper` has the formulas.
+# Taichi compiles this module: its annotations are no Python types.
+"""The paper's light volume, algorithm 2 with its record, and algorithm 3; `paper_renderer` has the formulas.
 
-Extinction is [x + 1, y + 1, z + 1, 0] with a border of one voxel, as the light sweeps read it; in-scattered radiance
+Extinction is [x + 1, y + 1, z + 1, 0] with a border of one voxel, as the light sweeps read it. In-scattered radiance
 is [x, y, z, value]: J of every channel, then J x way of the light of every channel. Positions are in voxels, voxel
-centres at integers. Volumes are read trilinearly, and beyond the outermost centres as the nearest voxel, so that the
-weights of a sample always add up to one.
+centres at integers. Volumes are read trilinearly, and beyond the outermost centres as the nearest voxel, so that a
+sample's weights always add up to one.
 """
 
 import taichi as ti
@@ -28,14 +28,14 @@ samples_type = ti.types.ndarray(dtype=ti.i32, ndim=3)
 
 @ti.kernel
 def pack(density: ndarray3, extinction: ndarray4, per_density: ti.f32):
-    """Extinction of every voxel."""
+    """Write the extinction (1/m) of every voxel; ``per_density`` is that at density 1."""
     for index in ti.grouped(ti.ndrange(*density.shape)):
         extinction[index[0] + 1, index[1] + 1, index[2] + 1, 0] = per_density * density[index]
 
 
 @ti.func
 def _way(index, size, travel, voxel_size):
-    """Length of the way in the box of light that arrives at a voxel, m."""
+    """Length (m) of light's way in the box to a voxel."""
     shortest = 1e30
     for a in ti.static(range(3)):
         behind = index[a] + 0.5 if travel[a] > 0 else size[a] - 0.5 - index[a]
@@ -73,7 +73,7 @@ def shade_parallel(
     channels: ti.template(),
     add: ti.i32,
 ):
-    """J = albedo p E V and J x way of a parallel light, from its sweep; instead of or added to what is there."""
+    """Write, or ``add``, J = albedo p E V and J x way of a parallel light from its sweep."""
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
         lit = phase(index, to_eye, direction, anisotropy, albedo)
@@ -99,7 +99,7 @@ def shade_point(
     channels: ti.template(),
     add: ti.i32,
 ):
-    """Sweep the light of a point light, for the voxels seen through one face."""
+    """Write, or ``add``, the same of a point light, for the voxels that its light reaches through one face."""
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
         if faces_voxel(axis, travel, position, index):
@@ -111,7 +111,7 @@ def shade_point(
 
 @ti.func
 def _cell(position, size):
-    """The voxels below and above a position, and how far it lies between them."""
+    """The voxels below and above a position, and the fraction of the way between them."""
     low, high = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     fraction = ti.Vector([0.0, 0.0, 0.0])
     for a in ti.static(range(3)):
@@ -155,8 +155,8 @@ def march(
 ):
     """Algorithm 2: the picture of every ray, and the terms of eq. 9 in its part of the record.
 
-    ``samples[row, column]`` holds where the ray's part begins, and how many samples it has; they go away from the
-    camera.
+    ``samples[row, column]`` holds where the ray's part begins and its number of samples, the nearest to the camera
+    first.
     """
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for row, column in ti.ndrange(samples.shape[0], samples.shape[1]):
@@ -204,7 +204,7 @@ def accumulate(
 ):
     """Algorithm 3, lines 5 to 13: densityGrad from the record, weighted with dloss / dL of each ray.
 
-    ``of_every_sample[row, column]`` is what eq. 7 gives every sample of the ray alike.
+    ``of_every_sample[row, column]`` is what eq. 7 gives to every sample of a ray.
     """
     size = ti.Vector([gradient.shape[0], gradient.shape[1], gradient.shape[2]])
     for row, column in ti.ndrange(samples.shape[0], samples.shape[1]):

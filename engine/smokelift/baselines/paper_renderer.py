@@ -1,12 +1,12 @@
-"""The paper's own renderer and derivative (its eq. 1-10, algorithm 2), kept as the baseline beside the exact one.
+"""The paper's own renderer and derivative (its eq. 1-10, algorithm 2), the baseline beside the exact one.
 
 Picture, eq. 1-5: the Riemann sum over samples s from the camera on, a step d apart,
 
     L   = sum_s tau_s kappa_s J_s d + tau B,    tau_s = exp(-sum_{r<s} kappa_r d),   kappa = sigma_t rho
     J_s = albedo sum_l p_g(w, w_l) E_l V_l      V_l: transmittance to light l; tau: of the whole ray
 
-Derivative, eq. 6-10, to the letter. There is one "derivative with respect to density", kappa' = sigma_t, the same at
-every voxel: each quantity is differentiated as if the density rose by the same amount everywhere in the box.
+Derivative, eq. 6-10, to the letter. There is one "derivative with respect to density", kappa' = sigma_t: each quantity
+is differentiated as if the density rose by the same amount everywhere in the box.
 
     eq. 8         tau_s' = -tau_s sigma_t D_s     D_s: length of the way in the box from the sample to the camera
     eq. 7         L_ri'  = -tau B sigma_t d       each sample's part of the sum over the path
@@ -14,20 +14,20 @@ every voxel: each quantity is differentiated as if the density rose by the same 
     eq. 9         L_ss'  = (tau_s' kappa_s + tau_s sigma_t) J_s d + tau_s kappa_s J_s' d    each sample's part
 
 So eq. 10 does hold the shadow along the light's path; it costs a known length and no sweep. Algorithm 2 credits every
-term to the sample where it is evaluated (the record gradRec of positions and terms), algorithm 3 adds the record up
+term to the sample where it is evaluated (the record gradRec of positions and terms). Algorithm 3 adds the record up
 in the voxels around. It follows that
 
-- the voxels' sum is the derivative for density added alike everywhere, for every pixel and any density: exact to
-  rounding, but for P_l, a length where the sweep that makes V_l fades over the last half voxel at the box's sides;
+- the voxels' sum is the derivative for density added alike everywhere, for every pixel and any density. It is exact to
+  rounding but for P_l: that is a length, while the sweep for V_l fades over the last half voxel at the box's sides;
 - absorption alone (eq. 7) is exact voxel by voxel, and so is everything in the limit of thin smoke;
-- else a voxel's number is not its partial derivative: what it does to the samples behind it and in its shadow is
+- else a voxel's number is not its partial derivative. What it does to the samples behind it and in its shadow is
   booked there, and what the voxels before it do to its own light is booked to it. Where kappa (D + P) > 1 the sign
   turns: a voxel in thick smoke seems to darken the picture whatever it does.
 
 Slips of the listing that are mended: line 10 lacks d; line 12 lacks d and has tau(x_a, x_u) where eq. 7 has
-tau(x_a, x). Left open by the text and chosen here: d is a voxel's edge, samples lie in the middle of their steps, the
-light's transmittance is a volume made once a picture (by the exact renderer's sweeps), volumes are read trilinearly
-and the record is spread with the same weights.
+tau(x_a, x). The text leaves open what is chosen here: d is a voxel's edge, and samples lie in the middle of their
+steps; the light's transmittance is a volume made once a picture, by the exact renderer's sweeps; volumes are read
+trilinearly, and the record is spread with the same weights.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from smokelift.render import device
 from smokelift.render.gpu import taichi_runtime as taichi
 
 # isort: split
-# only now what imports Taichi too: the runtime holds its greeting back
+# what imports Taichi comes after the runtime, which suppresses its greeting
 from smokelift.baselines import kernels as kernels
 from smokelift.render.gpu import light_kernels
 from smokelift.render.light_sweeps import ParallelSweep
@@ -55,22 +55,8 @@ from smokelift.scene.projection import ray_through_pixels
 class PaperRenderer:
     """The paper's differentiable renderer for one camera and one grid, in Taichi on the device of this process.
 
-    Parameters
-    ----------
-    camera, domain, medium
-        What is seen, from where.
-    lights
-        Directional and point lights; none leave absorption only.
-    background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke.
-    scattering
-        ``"single"``, ``"unshadowed"`` or ``"absorption"``, as in `Renderer`; ``"multiple"`` is ``"single"``, since the
-        paper's renderer stops there.
-
-    Raises
-    ------
-    ValueError
-        If a point light stands inside the domain.
+    Without lights there is absorption only; a point light inside the domain is a ValueError. ``background`` is linear
+    radiance, (rows, columns, 3) or (3,). ``"multiple"`` scattering is ``"single"``: the paper stops there.
     """
 
     def __init__(
@@ -88,7 +74,7 @@ class PaperRenderer:
         setup = plan_render(camera, domain, medium, lights, scattering, None)
         self._shadows = setup.shadows
         self._lights = setup.lighting.lights
-        # black light where there is none: kernels want a channel
+        # without lights a black one: kernels want a channel
         self._colour = setup.lighting.colour if self._lights else np.zeros((1, 3))
         self._channels = len(self._colour)
         x, y, z = domain.resolution
@@ -102,7 +88,7 @@ class PaperRenderer:
         self._first, self._step = taichi.upload(first), taichi.upload(step)
         begin = np.cumsum(count).reshape(count.shape) - count
         self._samples = taichi.upload(np.stack([begin, count], -1))
-        # gradRec: the stacks of all rays in one array, one behind the other
+        # gradRec: the stacks of all rays, one behind the other
         total = max(int(count.sum()), 1)
         self._position = taichi.zeros((total, 3))
         self._grad = taichi.zeros((total, self._channels))
@@ -110,7 +96,7 @@ class PaperRenderer:
         self._depth = taichi.zeros(count.shape)
 
     def image(self, density: Volume) -> Image:
-        """Render a density (nx, ny, nz) and record its derivatives; linear radiance (rows, columns, 3)."""
+        """Render a density (nx, ny, nz) in linear radiance (rows, columns, 3), and record its derivatives."""
         kernels.pack(taichi.upload(density), self._extinction, self.medium.extinction)
         if self._shadows:
             self._shade()
@@ -139,7 +125,7 @@ class PaperRenderer:
         return np.asarray(np.exp(-taichi.download(self._depth)))
 
     def _shade(self) -> None:
-        """The volume of in-scattered radiance: the sweeps are the exact renderer's."""
+        """Make the volume of in-scattered radiance, by the exact renderer's sweeps."""
         h, medium = self.domain.voxel_size, self.medium
         for number, light in enumerate(self._lights):
             energy = taichi.vector(np.resize(light.energy, 3))
@@ -168,9 +154,9 @@ class PaperRenderer:
 
 
 def _samples(camera: Camera, domain: Domain) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    """Nearest sample and step (rows, columns, 3) of every ray in voxels, and the number of its samples.
+    """Nearest sample and step (rows, columns, 3) in voxels, and number of samples, of every ray.
 
-    The ray is cut with the box (Hit of algorithm 2); steps are a voxel's edge long, from the back of the box on.
+    Rays are cut with the box (Hit of algorithm 2). Steps are a voxel's edge long and begin at the back of the box.
     """
     origin, direction = ray_through_pixels(camera)
     h = domain.voxel_size
@@ -180,7 +166,7 @@ def _samples(camera: Camera, domain: Domain) -> tuple[NDArray[np.float32], NDArr
     far = np.maximum(at_low, at_high).min(-1)
     if camera.type == "perspective":
         near = np.maximum(near, 0)
-    # rounding must not add a step to a box that is a whole number of steps thick
+    # rounding must not add a step where the box is a whole number of steps thick
     count = np.maximum(np.floor((far - near) / h + 0.5 - 1e-6), 0).astype(np.int64)
     nearest = origin + (far - (count - 0.5) * h)[..., None] * direction
     first = (nearest - np.array(domain.min)) / h - 0.5

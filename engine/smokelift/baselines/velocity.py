@@ -24,20 +24,17 @@ from smokelift.velocity.solver import PrimalDual, Solver
 
 @dataclass(frozen=True)
 class PaperVelocity:
-    """The paper's estimator (a `VelocityEstimator`). Weights have no unit.
+    """The paper's estimator (a `VelocityEstimator`), by the paper's splitting.
 
     Attributes
     ----------
-    smoothness
-        Weight of the differences of velocity.
-    kinetic
-        Weight of the squared velocity. It only holds what nothing else does.
+    smoothness, kinetic
+        Weights, without unit, of the squared differences of velocity and of the squared velocity. The latter only
+        decides what nothing else does.
     blur
         Standard deviation in voxels of the Gaussian that smooths the densities.
     smoke_threshold
         Fraction of the largest density from which a voxel counts as smoke.
-    solver
-        The paper's splitting.
     """
 
     smoothness: float = 0.03
@@ -47,7 +44,7 @@ class PaperVelocity:
     solver: Solver = field(default_factory=PrimalDual)
 
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
-        """See `smokelift.velocity.estimate_velocity`. The paper's estimate knows of no prediction."""
+        """Estimate as by `smokelift.velocity.estimate_velocity`; a prediction is not used."""
         first, second = checked(pair, prediction)
         (first, second, _), _ = without_noise(first, second, ((self.blur, np.inf),), self.smoke_threshold)
         rest = StaggeredGrid.zero(first.shape, 1.0, pair.closed)

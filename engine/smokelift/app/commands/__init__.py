@@ -1,6 +1,6 @@
 """The commands of the command line, a module each.
 
-A module has the command's help, ``add_options`` for its parser, and ``run``, which is given the options and says what
+A module has ``HELP``, ``add_options`` for the command's parser, and ``run``, which gets the options and says what
 happens.
 """
 
@@ -35,4 +35,4 @@ COMMANDS = {
     "proxy": proxy,
     "doctor": doctor,
 }
-"""The modules by the names of their commands."""
+"""Modules by their commands' names."""

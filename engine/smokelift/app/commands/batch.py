@@ -35,7 +35,7 @@ from smokelift.checks import counted
 from smokelift.report.cost import memory_free
 
 MEMORY_SHARE = 0.9
-"""Part of the free memory that the shots may take together; what is foretold is right to a tenth or two."""
+"""Part of the free memory that shots may take together: forecasts are right to a tenth or two."""
 
 HELP = "reconstruct a list of shots, as many at a time as memory allows"
 
@@ -53,13 +53,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Run the shots that are not finished.
-
-    Raises
-    ------
-    ValueError
-        If the list cannot be used, or a shot did not come to its end; the others did.
-    """
+    """Run the shots that are not finished; ValueError if the list is wrong, or, at the end, if a shot failed."""
     shots = read_shots(options.list, _check_arguments)
     states = {shot.name: read_state(shot) for shot in shots}
     stop = threading.Event()
@@ -93,13 +87,13 @@ def _run_remaining(
     workers: int,
     stop: threading.Event,
 ) -> None:
-    """Run what is left, and keep the report up to date."""
+    """Run what is left and keep the report up to date; ValueError, at the end, if a shot failed."""
     shots = [(each.shot, states[each.shot.name].record) for each in left]
     with closing(_run_shots(options.scheduler, shots, workers, stop, say)) as ended:
         for shot, record in ended:
             states[shot.name] = read_state(shot)._replace(record=record)
             say.note(f"{shot.name}: {record.status}. {record.sentence}")
-            with suppress(OSError):  # the storage may be full for a while; the next shot brings the page up to date
+            with suppress(OSError):  # the storage may be full for a while; the next shot updates the page
                 write_report(shot.folder, options.list.stem, list(states.values()))
     final = list(states.values())
     page = write_report(final[0].shot.folder, options.list.stem, final)
@@ -119,7 +113,7 @@ def _run_remaining(
 def _look_at_shots(
     scheduler: str | None, unknown: Sequence[tuple[BatchShot, Record]], stop: threading.Event, say: Reporter
 ) -> Generator[tuple[BatchShot, Record], None, None]:
-    """Inspect shots, one after the other or on a cluster, and yield each with its forecast."""
+    """Inspect shots one by one, or on a cluster, and yield each with its forecast."""
     if scheduler is not None:
         yield from run_on_cluster(unknown, look_at_shot, scheduler, say.note)
     else:
@@ -133,7 +127,7 @@ def _run_shots(
     stop: threading.Event,
     say: Reporter,
 ) -> Generator[tuple[BatchShot, Record], None, None]:
-    """Run shots, here or on a cluster, and yield each when it has ended."""
+    """Run shots, here or on a cluster, and yield each at its end."""
     if scheduler is not None:
         yield from run_on_cluster(shots, finish_shot, scheduler, say.note)
         return
@@ -162,7 +156,7 @@ def _run_shots(
 
 
 def _forecast_lines(left: Sequence[Remaining], workers: int) -> Iterator[str]:
-    """What is left, a line a shot and a line for each number of workers worth having."""
+    """Lines on what is left: one for each shot, and one for each useful number of workers."""
     for each in left:
         memory = f"{_gib(each.memory)} of memory"
         yield f"{each.shot.name}: {counted(each.frames, 'frame')}, {_time(each.seconds)}, {memory} ({each.basis})"
@@ -210,14 +204,14 @@ def _gib(size: float) -> str:
 
 
 class _RaisingParser(argparse.ArgumentParser):
-    """Says what is wrong with a shot's options as an exception."""
+    """Raises what is wrong with a shot's options, instead of leaving."""
 
     def error(self, message: str) -> NoReturn:
         raise ValueError(message)
 
 
 def _check_arguments(arguments: Sequence[str]) -> None:
-    """Raise ValueError if ``smokelift reconstruct`` does not take the arguments."""
+    """Raise ValueError unless ``smokelift reconstruct`` takes the arguments."""
     parser = _RaisingParser()
     parser.add_argument("--device", choices=("auto", "cpu", "gpu"))
     reconstruct.add_options(parser)

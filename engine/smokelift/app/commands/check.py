@@ -19,13 +19,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Check every file.
-
-    Raises
-    ------
-    ValueError
-        If frames are missing or damaged, or no frame shows smoke.
-    """
+    """Check every file; ValueError if frames are missing or damaged, or none shows smoke."""
     sequence = Sequence.open(options.directory)
     if not sequence.complete:
         there = counted(len(sequence.frames), "finished frame")

@@ -1,4 +1,4 @@
-"""``smokelift continue``: a sequence goes on after its clip, or differently from a frame of it on."""
+"""``smokelift continue``: a sequence goes on after its clip, or differently from one of its frames."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from smokelift.report.cost import affordable_room
 from smokelift.scene import SIDES
 
 NOTICED = 1e-3
-"""Share of the smoke that has to dissolve in a frame before its box's end to be worth a sentence."""
+"""Share of a frame's smoke that dissolves before its box's end, above which it is said."""
 
 HELP = "make what the smoke does after its clip, or in wind and around obstacles"
 
@@ -98,7 +98,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[str, ...], what: str) -> None:
-    """Add an option of some numbers that may be given again."""
+    """Add an option of some numbers, which may be given again."""
     parser.add_argument(
         option,
         type=finite_number,
@@ -125,7 +125,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _room(options: argparse.Namespace, sequence: Sequence, say: Reporter) -> float:
-    """The room that is asked for, as far as memory allows; a run that goes on keeps its own."""
+    """The room that is asked for, as far as memory allows; a resumed run keeps its own."""
     room: float = options.room
     if options.resume and (options.out / INDEX).is_file():
         return min(room, float(Index.read(options.out).settings.get("direct", {}).get("room", room)))
@@ -140,7 +140,7 @@ def _room(options: argparse.Namespace, sequence: Sequence, say: Reporter) -> flo
 
 
 def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterator[Written]:
-    """The frames, with one sentence when smoke first dissolves because its box cannot grow."""
+    """The frames, with one note when smoke first dissolves because its box cannot grow."""
     said = False
     for number, figures in written:
         yield number, figures
@@ -150,7 +150,7 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
 
 
 def _continuation(options: argparse.Namespace) -> Continuation:
-    """What the options say."""
+    """The continuation that the options say; ValueError for wrong values."""
     if options.frames < 1:
         raise ValueError(f"--frames {options.frames}: expected 1 or more.")
     if not 0 <= options.fade <= options.frames:

@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Say line by line what is there."""
+    """Say what is there, line by line."""
     for line in _report():
         say.note(line)
 

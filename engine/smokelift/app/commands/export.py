@@ -1,4 +1,4 @@
-"""``smokelift export``: small OpenVDB files, a proxy and a USD file of a sequence, for other programs and people."""
+"""``smokelift export``: small OpenVDB files, a proxy and a USD file of a sequence, for other programs."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Say the size, and export unless that is all that was asked for."""
+    """Say the size, and export unless only that was asked for."""
     began = time.monotonic()
     settings = ExportSettings(options.precision, not options.no_velocity, options.proxy, options.host)
     sequence = Sequence.open(options.directory)

@@ -1,4 +1,4 @@
-"""``smokelift inspect``: what would be assumed, chosen and spent, before it is spent."""
+"""``smokelift inspect``: what a run would assume, choose and spend."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Prepare the shot and say what it takes."""
+    """Prepare the shot; say what is known of it and what a run takes."""
     passed, worked = time.perf_counter(), time.process_time()
     settings = settings_of(options)
     for path in (*options.page, options.write):
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _qualities(shot: Shot, work: Workload, prepared: Spent) -> dict[str, dict[str, Any]]:
-    """What each quality takes of this clip, and what it loses of it."""
+    """Grid and cost of each quality, as JSON holds them."""
     return {
         quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
         for quality, grid in shot.qualities.items()
@@ -104,16 +104,11 @@ def _qualities(shot: Shot, work: Workload, prepared: Spent) -> dict[str, dict[st
 
 
 def _write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, ...]:
-    """Write all that was found into a scene file, with what is known of it as comments; return the files.
+    """Write all that was found into a scene file, with the facts as comments; return the files.
 
-    A background of one colour that was estimated becomes a colour of the file. Any other is left to be found again: a
-    picture does not say which of its parts are unknown, and by how much they may be wrong. It is written beside the
-    file for those who want to mend it.
-
-    Raises
-    ------
-    ValueError
-        If a file is there already.
+    An estimated background of one colour becomes a colour of the file. Any other is left to be found again, because a
+    picture does not say which of its parts are unknown or how wrong they may be. It is written beside the file for
+    those who want to mend it. A file that is there already is a ValueError.
     """
     scene, plate = Scene(**vars(shot.scene)), shot.estimated_background
     picture = path.with_name(f"{path.stem}_background.exr")

@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Write the copies of all frames."""
+    """Write a copy of every frame."""
     sequence = Sequence.open(options.directory)
     say.start(len(sequence.frames), 0)
     before = time.monotonic()

@@ -46,20 +46,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Reconstruct, and say what was assumed and every frame.
-
-    Raises
-    ------
-    ValueError
-        If no frame shows any smoke; the empty frames are written.
-    """
+    """Reconstruct; say what was assumed, and every frame. ValueError, with empty frames written, if none has smoke."""
     began = time.monotonic()
     settings = settings_of(options)
     _check_outputs(options)
     scene, source = scene_of(options)
     device.start(options.device)
     with Clip.open(source) as clip:
-        written_kinds(options.npz)  # before the clip is inspected, which takes minutes
+        written_kinds(options.npz)  # before the set-up, which takes minutes
         reconstruction = reconstruct(clip, scene, settings)
         shot = reconstruction.shot
         require_memory(
@@ -86,7 +80,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _report(shot: Shot, thumbnail: Path | None, say: Reporter) -> Callable[[Frame], None]:
-    """What happens with each frame once it is written."""
+    """Return what is called with each written frame."""
     started = False
 
     def report(frame: Frame) -> None:
@@ -113,9 +107,9 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:
-    """Write the part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
+    """Write a PNG of the part of a frame that is fitted, beside its reconstruction, or above it if it is wide."""
     observations = shot.observe(frame.number - 1)
-    if not observations:  # nothing of the domain is in this frame's picture: the picture of the last one stays
+    if not observations:  # the frame shows nothing of the domain: the last picture stays
         return
     seen = observations[0]
     found = shot.optics.renderer(seen.camera, seen.plate.image).image(frame.density)

@@ -15,7 +15,7 @@ from smokelift.render import device
 from smokelift.scene import Camera, CompleteScene, Scene, orbit
 
 SIDE_YAW = 90.0
-"""Degrees about the vertical from the scene's camera to the view from the side."""
+"""Degrees about the vertical from the scene's camera to the side view."""
 
 HELP = "make an image or video of a sequence"
 
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _camera(name: str, scene: CompleteScene) -> Camera:
-    """The camera that a word, two angles or a camera file say."""
+    """The camera that a word, two angles or a file says; ValueError if it is none of them."""
     if name == "front":
         return scene.camera
     if name == "side":

@@ -9,7 +9,7 @@ from smokelift.app.progress import Reporter, say_sequence
 from smokelift.direct import open_source, playback, retime_sequence
 
 SPEEDS = 0.01, 100.0
-"""Slowest and fastest: beyond them nothing moves, or nothing is left."""
+"""Slowest and fastest speed: beyond them nothing moves, or nothing is left."""
 
 HELP = "make slow motion, fast motion and ramps of a sequence"
 
