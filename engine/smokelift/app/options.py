@@ -131,7 +131,7 @@ def settings_of(options: argparse.Namespace) -> Settings:
 
 
 def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:
-    """Return the scene from the options of `add_run_options`, and its clip; ValueError if it has none."""
+    """Return the scene from the options of `add_run_options`, and its clip; ValueError if one is missing or wrong."""
     path: Path = options.input
     scene = Scene.load(path) if path.suffix.lower() == ".toml" else Scene(clip=ClipSource(path))
     if options.frames is not None and scene.clip is not None:

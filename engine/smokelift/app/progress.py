@@ -158,7 +158,7 @@ class _Text(Reporter):
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         fit = figures.get("origin", "no smoke")
-        if "psnr" in figures:  # the last fit stays on the screen, so it is the run's
+        if "psnr" in figures:  # the last fit stays on the screen, so it is the median of the run
             self._shown.append(figures)
             fit = f"fit {median_psnr(self._shown):.1f} dB"
         with _output():

@@ -99,7 +99,7 @@ def shade_point(
     channels: ti.template(),
     add: ti.i32,
 ):
-    """Write, or ``add``, the same of a point light, for the voxels that its light reaches through one face."""
+    """Write, or ``add``, the same of a point light, for the voxels of one face's sweep."""
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
         if faces_voxel(axis, travel, position, index):
@@ -155,8 +155,7 @@ def march(
 ):
     """Algorithm 2: the picture of every ray, and the terms of eq. 9 in its part of the record.
 
-    ``samples[row, column]`` holds where the ray's part begins and its number of samples, the nearest to the camera
-    first.
+    ``samples[row, column]`` holds where the ray's part begins and its number of samples, from the camera on.
     """
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for row, column in ti.ndrange(samples.shape[0], samples.shape[1]):

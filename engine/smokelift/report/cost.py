@@ -104,7 +104,7 @@ class Cost:
 class Spent:
     """What preparing a shot took: seconds that passed, and processor seconds of all cores together.
 
-    ``memory`` is in bytes at the peak, None if unknown. A large clip on a small grid takes as much as the run.
+    ``memory`` is in bytes at the peak, None if unknown. For a large clip on a small grid it is as much as the run's.
     """
 
     seconds: float
@@ -213,7 +213,7 @@ def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
 
 @cache
 def _seconds_a_voxel() -> float:
-    """Return the seconds of a Poisson solve on this machine, for each voxel.
+    """Return the seconds that a Poisson solve takes on this machine for each voxel; timed once.
 
     The fastest of some solves is one that no other work held up.
     """

@@ -25,7 +25,7 @@ class Provenance:
     ----------
     origin
         ``"measured"``: the pictures show it. ``"estimated"``: it follows from what they show. The pictures leave the
-        others undetermined: ``"assumed"`` is one answer for all clips, ``"made up"`` one of many answers.
+        others undetermined: ``"assumed"`` is one answer for all clips, ``"made up"`` one of many for this one.
     how
         The remark whose sentence explains it.
     settings

@@ -13,16 +13,16 @@ BLACK = 0.001
 """Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
 
 MOSTLY = 0.5
-"""Share that is a majority: of the smoke's pixels without a known background, or of smoke between bars in a frame."""
+"""Share that is a majority: of the smoke's pixels, those whose background is unknown; of what bars enclose, the smoke
+of a frame."""
 
 BETWEEN_BARS = 0.95
-"""Share between two bars that is covered at some time, from which the picture itself was taken for smoke: real smoke
-has no two straight edges. A generated clip with bars has .98; fog and mist have .70 and .75 over all of their rows
-(docs/clips.md). Each frame has to cover most of it too, since a passing puff fills a strip in the course of time."""
+"""Share of what two bars enclose, covered at some time, from which it is the picture and no smoke: smoke that crosses a
+picture has no two straight edges. A generated clip with bars has .98; fog and mist have .70 and .75 over all of their
+rows (docs/clips.md). Most of it has to be covered in a frame too, since a passing puff fills a strip in time."""
 
 MIN_SAME_FRAMES = 4
-"""Smallest number of frames in which smoke hardly looks the same by chance: half of its pairs of successive samples
-do."""
+"""Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
 
 COARSE_QUANTISER = 42.0
 """Quantiser from which faint smoke is taken for background, if that has more than one colour. Before a brick wall crf
@@ -41,7 +41,7 @@ def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
 
 
 def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
-    """Return how a background was found, and how much stands before it if it has one colour."""
+    """Return how a background was found, and what stands before it if it has one colour."""
     clip, plates = found.clip, found.plates
     if found.source == "alpha":
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)

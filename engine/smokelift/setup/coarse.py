@@ -2,8 +2,8 @@
 
 A wrong light can reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
 shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels and judged on the other. What they
-let through of the background is subtracted there; the rest is light that the smoke scatters. The lights' strength is
-its least-squares factor, zero at least.
+let through of the background is subtracted there; the rest is light that the smoke scatters. How strong the lights have
+to be for it is the least-squares factor, zero at least.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def coarse_frames(views: Sequence[ShotView], numbers: Sequence[int], scene: Comp
 def coarse_frame(views: Sequence[ShotView], number: int, scene: CompleteScene, times: int = 1) -> CoarseFrame | None:
     """Make a frame coarse; None if a camera does not see the domain.
 
-    The grid has `COARSE_SIDE` voxels, so many ``times``, along its longest side at most. The first view is the input.
+    The grid has at most ``times`` `COARSE_SIDE` voxels along its longest side. The first view is the input.
     """
     try:
         pixels = voxel_width(views[0].camera.at(number), scene.domain)
@@ -133,7 +133,7 @@ class HeldOut:
     Attributes
     ----------
     error
-        Root mean square difference, as a share of what the smoke changes there; over all cameras alike.
+        Root mean square difference, as a share of what the smoke changes there; of several cameras that of theirs.
     colours : (cameras, 3)
         Strength of the light, in multiples of the scene's, that fits best with the same densities, by camera and
         channel: more than 1 where they are too dark. 1 without scattered light.

@@ -42,7 +42,7 @@ class SmokeSamples:
     smoky
         Numbers of the frames with smoke, those with the most first.
     gains
-        How many times as bright as its background's a sample's exposure is, (3,), by frame number; it is evened out.
+        Exposure (3,) of each sample over its background's, by frame number; the samples are divided by it.
     textures
         Sums of `seen_texture` for each sample with smoke.
     amounts

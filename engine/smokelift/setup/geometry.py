@@ -35,8 +35,7 @@ BOX_MARGIN = 0.06
 that is fainter than the mask shows."""
 
 NARROWEST = 0.25
-"""Smallest width over height of an estimated box, and the reverse: eight voxels of the coarsest grid, which a side has
-at least."""
+"""Smallest width over height of an estimated box, and the reverse: no side of the coarsest grid is below 8 voxels."""
 
 MIN_SIDE_VOXELS = 32
 """Smallest number of voxels along the longest side: fewer save nothing more
@@ -221,7 +220,7 @@ def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
 
 
 def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
-    """The box of so many voxels (m) about the middle of its floor."""
+    """The box of voxels with this edge (m) about the middle of its floor (3,)."""
     size = np.array(resolution) * voxel
     low = floor - size * (0.5, 0.5, 0)
     high = low + size

@@ -2,8 +2,8 @@
 
 A pixel shows T behind + (1 - T) source, where the source radiance is the light times the smoke's colour. So the source
 lies on the line from the background through the smoke, beyond the thickest smoke that is seen. Before black that line
-has one colour, else many. Light may be white, as cameras balance it, or have the colour of the background, which stands
-in it too. Smoke has a colour of its own if no source on the line has either. Figures: docs/experiments/smoke-colour.md.
+has one colour, else many. Smoke has a colour of its own if no source on the line has one that light may have: white, as
+cameras balance it, or the background's, which stands in the same light. Figures: docs/experiments/smoke-colour.md.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ OPTICAL_DEPTH_AT_ONE = 5.0
 since a picture shows density times extinction only."""
 
 SOURCE_EXCESS = 0.1
-"""Share by which the source radiance exceeds the smoke's 99th percentile, whose optical depth is then about 2.4, not
-infinite."""
+"""Share by which the source exceeds the smoke's 99th percentile: its optical depth is then about 2.4, not infinite."""
 
 COLOURED = 12.0
 """Degrees between two colours, as vectors of linear light, from which white balance does not explain their difference.

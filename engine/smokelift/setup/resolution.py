@@ -44,7 +44,7 @@ class DetailSpectrum:
     pixels: float
 
     def lost(self, longest: float, finest: float | None = None) -> float:
-        """Share of the clip's contrast (root of the energy) that a grid of ``longest`` voxels along a side loses.
+        """Share of the clip's contrast (root of the energy) that a grid with ``longest`` voxels in a row loses.
 
         With ``finest``, only what a grid of so many voxels shows counts as lost.
         """

@@ -34,8 +34,7 @@ CONFIDENCE = 0.5
 """Smallest confidence of the background: what was hardly ever free of smoke holds some of it."""
 
 ERROR = 0.15
-"""Largest relative standard deviation of a measured source radiance: half of the 30 % within which it has to be
-right."""
+"""Largest relative standard deviation of a measured source radiance: half of the 30 % that it may be off."""
 
 FRAMES = 3
 """Smallest number of frames that a deviation is estimated from: two are left without one of them."""

@@ -1,4 +1,4 @@
-"""``smokelift evaluate``: whether a sequence looks like smoke from all around, and how near it is to the truth."""
+"""``smokelift evaluate``: whether a sequence looks like smoke from all around, and how near it is to what is known."""
 
 from __future__ import annotations
 
