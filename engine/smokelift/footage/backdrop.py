@@ -1,9 +1,9 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
-In this order: what an alpha channel says; what the scene gives; one colour, if that is the likeliest by the whole file
-(`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show next to nothing. One
-colour is the same wherever a camera looks, before a picture it has to stand still (`camera_motion`). The clip's noise
-is measured on what cannot be smoke, before all else (`noise`).
+The first of these that applies: what an alpha channel says; what the scene gives; one colour, if the whole file makes
+it the likeliest (`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show
+next to nothing. Before a picture the camera must stand still (`camera_motion`); one colour is the same wherever it
+points. The clip's noise is measured first, on what cannot be smoke (`noise`).
 """
 
 from __future__ import annotations
@@ -37,32 +37,30 @@ from smokelift.footage.video import median_quantiser
 from smokelift.scene import Background, Camera
 
 NOISE_FRAMES = 16
-"""Frames whose pixels tell the white noise."""
+"""Frames that white noise is measured on."""
 
 MOSTLY = 0.5
-"""Share of the picture that shows one colour, on the mean, from which on it is no texture that
-passes by."""
+"""Mean share of the picture in one colour from which on that colour is no texture that passes by."""
 
 MIN_KNOWN = 0.1
-"""Share of a picture that is ever seen clear, below which it tells nothing: of public clips before something it is .2
-and more (docs/clips.md)."""
+"""Smallest share of a picture seen clear that tells a background: public clips have .2 and more (docs/clips.md)."""
 
 SEEN_OFTEN = 0.15
-"""Share of the blocks of all frames that shows one colour, from which on it is none of a texture that passes by: .2 and
-more of public clips, .05 and .12 of two walls before which a camera moves (docs/experiments/turning-camera.md)."""
+"""Share of the blocks of all frames in one colour from which on that colour is no texture that passes by. Public clips
+have .2 and more, two walls before a moving camera .05 and .12 (docs/experiments/turning-camera.md)."""
 
 TEXTURE = np.float32(6 / 255)
-"""White noise in sRGB values from which on it is texture that a moving camera sees."""
+"""White noise, in sRGB values, above which it is texture that a moving camera sees."""
 
 NO_ERRORS = np.zeros((3, 3), np.float32)
-"""Covariance of the errors of what is known."""
+"""Covariance of the colour errors of a known background."""
 
 MOVING_CAMERA = (
     "The camera moves, so what is behind the smoke cannot be found from the clip. Stabilize the clip (Blender's Movie "
     "Clip Editor does), or track it and give a clean plate with a picture for every frame (a video or plate_####.png) "
     "as background. If the camera stood still, give one clean plate, or a color."
 )
-"""What a clip is refused with."""
+"""Message that refuses a clip."""
 
 Source = Literal["alpha", "given", "colour", "colour around one frame", "black for want of a picture", "picture"]
 
@@ -74,17 +72,17 @@ class Backdrop:
     Attributes
     ----------
     source
-        Where it is from, and so what it is.
+        Where it comes from.
     clip
-        Without the brightness that noise adds to it, and its background where a mask hides it.
+        The footage without the light that noise adds, with the background in place of what a mask hides.
     plates
-        Of the full pictures.
+        Backgrounds at full size.
     background
-        As a scene would give it; None where it was estimated, unless the camera is known to move.
+        The background as a scene gives it; None where it was estimated, unless the camera is known to move.
     frames
-        Number of the file's frames that decided on it: those up to the next cut.
+        Number of the file's frames, up to the next cut, that it was estimated from.
     quantiser
-        Of the file, if it says it and the background is not of one colour.
+        The file's median quantiser, if known; only for an estimated picture.
     cut
         Frames of the file before and after a cut within the clip, if there is one.
     """
@@ -99,23 +97,10 @@ class Backdrop:
 
 
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
-    """Find what stands behind the smoke.
+    """Find what stands behind the smoke of a clip, given what the scene says of it.
 
-    Parameters
-    ----------
-    clip
-        The footage.
-    camera
-        If it is known; one that moves allows no estimate but that of one colour.
-    background
-        What the scene says.
-
-    Raises
-    ------
-    ClipError
-        If a frame cannot be read.
-    ValueError
-        If a camera moves before a background of more than one colour that is not given.
+    ClipError is raised if a frame cannot be read, ValueError if the camera moves and the background is neither given
+    nor of one colour.
     """
     grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
     behind = grey or background
@@ -125,7 +110,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     else:
         quiet = without_noise_light(clip, plates.noise)
         if quiet is not clip:
-            # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
+            # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             again: Any = given_plates(behind, camera, quiet)
             plates = replace(again, noise=plates.noise)
         found = Backdrop("alpha" if grey else "given", quiet, plates, behind)
@@ -134,7 +119,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
 
 
 def _estimated(clip: Clip, moves: bool) -> Backdrop:
-    """The background of a clip of which nothing is given."""
+    """The background of a clip when none is given."""
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
     proxy = Proxy.of(clip)
@@ -153,7 +138,7 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
         behind = Background(color=(red, green, blue))
         return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut)
-    # black, and a colour that is often seen, is the same wherever the camera looks; else texture may pass by
+    # black, or a colour seen often, is the same wherever the camera points; any other may be texture that passes by
     plain = found.colour is not None and (found.clear > SEEN_OFTEN or not found.colour.any())
     if not plain and camera_motion.moves(proxy.between(*proxy.clip).pictures):
         raise ValueError(MOVING_CAMERA)
@@ -163,13 +148,13 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
         plate = _picture(clip, part, white)
         if plate.confidence.mean() >= MIN_KNOWN:
             return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
-        # fog that drifts over all of the file: it is shown as it was made, before black
+        # fog drifts over all of the file: treat it as filmed before black
         colour, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
     return made(source, plates=_of_one_colour(clip, part, even, gains, colour, objects, white))
 
 
 def _picture(clip: Clip, part: Proxy, white: Picture) -> Plate:
-    """The plate of the picture that the clear frames show."""
+    """The plate that the clear frames show."""
     even, gains = part.evened
     noise = _noise(even, median_of_seen(even.pictures), white)
     picture = clear_picture(even, noise.averaged(even.scale**2), DETAIL / even.scale)
@@ -187,7 +172,7 @@ def _of_one_colour(
     """The plate of one colour with the objects before it."""
     image = np.tile(colour, (*objects.shape, 1))
     deviations = _deviations(even, image)
-    # smoke draws one colour to one side, so that to the other there is noise alone
+    # smoke moves a colour to one side: deviations to the other side are noise alone
     sides = (np.where(beyond, np.float32(np.nan), deviations) for beyond in (deviations > 0, deviations < 0))
     noise = noise_of(white, np.minimum(*map(spread_about, sides)), even.scale**2)
     whole = np.tile(colour, (*clip.size[::-1], 1))
@@ -204,7 +189,7 @@ def _of_one_colour(
 
 
 def _white_noise(proxy: Proxy) -> Picture:
-    """The white noise (3,) of a clip's pixels, at one exposure."""
+    """The white noise (3,) of the clip's pixels, measured at one exposure."""
     own = np.flatnonzero([number in proxy.blocks for number in proxy.numbers])
     part = proxy.only(own[np.unique(np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int))])
     _, gains = part.evened
@@ -217,12 +202,12 @@ def _white_noise(proxy: Proxy) -> Picture:
 
 
 def _noise(proxy: Proxy, background: Picture, white: Picture) -> Noise:
-    """The noise of the file's pixels before a linear background (rows, columns, 3)."""
+    """The noise of the file's pixels about a linear background (rows, columns, 3)."""
     return noise_of(white, spread_about(_deviations(proxy, background)), proxy.scale**2)
 
 
 def _deviations(proxy: Proxy, background: Picture) -> Picture:
-    """How pictures (frames, rows, columns, 3) differ from a linear background, in sRGB values."""
+    """Differences (frames, rows, columns, 3) from a linear background, in sRGB values; NaN where a mask hides."""
     deviations = proxy.encoded - linear_to_srgb(background)
     deviations[~proxy.seen] = np.nan
     return deviations

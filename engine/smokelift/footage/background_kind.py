@@ -1,13 +1,13 @@
 """Whether a clip stands before one colour or a picture: one cost ranks them.
 
-A block of the picture is in one of two states: clear, when it shows its background within the noise, and smoke, when it
-shows anything. Smoke goes on as it was, or jumps to any other value. So each background explains the blocks at a cost,
-the negative logarithm of their probability with the likeliest states (Viterbi, "Error bounds for convolutional codes",
-1967). One colour is behind all blocks, but for a few objects before it. A picture has a colour for each block. All
-colours are taken to be equally likely there, as they are after a jump, so each block's costs as much as a jump.
+A block of the picture is clear, and shows its background within the noise, or it is smoke, and shows anything. Smoke
+goes on as it was, or jumps to any value. The cost of a background is the negative logarithm of the blocks' probability
+in their likeliest states (Viterbi, "Error bounds for convolutional codes", 1967). One colour stands behind all blocks
+but a few objects. A picture has its own colour in each block, which costs as much as a jump: all colours are equally
+likely in either.
 
-A frame that is black everywhere says nothing against a picture, for clips fade. What is black, or another colour, at
-some time of the file counts for all of its frames up to the next cut, whatever part of it is used.
+A frame that is black everywhere says nothing against a picture, since clips fade. All frames of the file up to the next
+cut count, whatever part of it is used.
 """
 
 from __future__ import annotations
@@ -31,63 +31,57 @@ from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, median_of_seen,
 from smokelift.footage.proxy import Proxy
 
 BLOCKS = 64
-"""Blocks along the longer side: means over some pixels, of which white noise is gone."""
+"""Blocks along the longer side: means over so many pixels that white noise is gone."""
 
 MAX_DEVIATION = 3.0
-"""Standard deviations of noise up to which a block is as its background."""
+"""Standard deviations of noise up to which a block shows its background."""
 
 MAX_LASTING_NOISE = np.float32(2 / 255)
-"""Noise of such means that is not white, in sRGB values, at most: of H.264 at crf 45 it is less than half of that
+"""Largest lasting noise of blocks, in sRGB values: H.264 at crf 45 has less than half of it
 (docs/experiments/background.md)."""
 
 STAY_PROBABILITY, SWITCH_PROBABILITY = 0.98, 0.03
-"""Probability that smoke stays as it is from one frame to the next of those that are examined, and that a block
-becomes clear or smoke. What ranks the backgrounds are jumps; these only break ties."""
+"""Probabilities, from one examined frame to the next, that smoke stays as it is, and that a block becomes clear or
+smoke. Jumps rank the backgrounds; these only break ties."""
 
 OBJECT = 0.1
-"""Probability of a block to be an object before one colour, a nozzle, a floor or a logo, and share of all blocks that
-are at most. Of public clips those on one colour have up to .02 (docs/clips.md)."""
+"""Probability that a block is an object before one colour (a nozzle, a floor, a logo), and largest share of such
+blocks. Public clips before one colour have up to .02 (docs/clips.md)."""
 
 MIN_SHOWN_SHARE = 0.25
-"""Share of the blocks that show the one colour at some time, at least."""
+"""Smallest share of the blocks that show the one colour at some time."""
 
 MIN_STILL_SHARE = 0.9
-"""Share of the frames in which an object is as it mostly is, within half of the limit: smoke wavers more."""
+"""Smallest share of the frames in which an object is within half of the limit of its median: smoke wavers more."""
 
 MIN_SEEN_SHARE = 0.99
-"""Share of a block that is seen, at least."""
+"""Smallest share of a block that no mask hides."""
 
 CANDIDATES = 4
-"""Colours that are tried: those that most of all blocks have."""
+"""Number of the commonest colours that are tried."""
 
 MIN_BLACK_SHARE = 0.98
-"""Share of the blocks that are black in a frame that is black everywhere."""
+"""Share of black blocks from which on a frame counts as black everywhere."""
 
 CLEAR_FRAMES = 8
-"""Frames of which the clearest view of each pixel is taken."""
+"""Frames that the clearest view of each pixel is taken from."""
 
 DETAIL_QUANTILE, MAX_MIST_DETAIL = 0.99, np.float32(15 / 255)
-"""Quantile of the detail of what stands still before black, in sRGB values, and how much of it mist has at most: 1 to
-13 of 255 in 26 clips of smoke; walls and stages in the dark have 17 to 40 (docs/experiments/background.md)."""
+"""Quantile of the detail before black, and the most that mist has there, in sRGB values. 26 clips of smoke have 1 to 13
+of 255, walls and stages in the dark 17 to 40 (docs/experiments/background.md)."""
 
 MAX_SIDE_DIFFERENCE, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
-"""Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
-its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
-others but for stages in the dark (docs/experiments/background.md)."""
+"""Difference in sRGB values up to which a block has the colour around a single picture, and share of such blocks needed
+along each of three sides. 18 frames of public clips before one colour have 0.56 to 1, others 0.2 at most, but for
+stages in the dark (docs/experiments/background.md)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """What the frames of a clip say of its background.
+    """The likeliest background: one linear colour (3,), or a picture if ``colour`` is None.
 
-    Attributes
-    ----------
-    colour : (3,), optional
-        Linear, if it has one; None of a picture.
-    objects : (rows, columns) bool
-        Pixels of the proxy that show something else before the colour all the time.
-    clear
-        Share of all blocks and frames that show the colour.
+    ``objects`` (rows, columns) are the proxy's pixels where something hides the colour all the time. ``clear`` is the
+    share of all blocks and frames that show the colour.
     """
 
     colour: Picture | None
@@ -96,7 +90,7 @@ class Ranking:
 
 
 def rank(proxy: Proxy, white: Picture) -> Ranking:
-    """Rank the kinds of background that frames of one exposure may have, whose pixels have white noise (3,)."""
+    """Rank the backgrounds that frames of one exposure may have; ``white`` (3,) is their pixels' noise."""
     every, shape = _blocks(proxy)
     visible = _visible(proxy, shape)
     values = every[:, visible]
@@ -125,7 +119,7 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
         if candidate.max() <= EIGHT_BIT_STEP and not _sharp(proxy, white):
             stands[:] = False
         cost = np.where(stands, np.minimum(own - np.log(OBJECT), cost), cost)
-        # smoke of one brightness draws a colour to one side only
+        # smoke of one brightness moves a colour to one side only
         brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
@@ -137,10 +131,10 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
 
 
 def colour_around(picture: Picture) -> tuple[float, float, float] | None:
-    """Return the linear colour along the sides of a single picture (rows, columns, 3), or None if they have more.
+    """Return the linear colour along the sides of a single picture (rows, columns, 3), or None if they have several.
 
-    One picture does not tell what never changes, so that smoke may be all that has another colour. It may come in from
-    one side, and cover more of the picture than its background does.
+    One picture does not show what never changes, so all that has another colour may be smoke. Smoke may enter from one
+    side, and cover more of the picture than its background does.
     """
     linear = block_means(picture[None])[0]
     blocks = linear_to_srgb(linear)
@@ -154,9 +148,9 @@ def colour_around(picture: Picture) -> tuple[float, float, float] | None:
 
 
 def _goes_on(values: Picture, limit: Picture, jump: float) -> Picture:
-    """What it costs smoke to go on from one frame to the next (frames - 1, blocks), at most a jump.
+    """The cost of smoke going on from one frame to the next (frames - 1, blocks), at most that of a jump.
 
-    It stays as it is within the noise, or changes as often by so much as smoke of the clip does: exponentially.
+    Smoke stays within the noise, or its change is exponentially distributed with the clip's own mean.
     """
     changes = np.diff(values, axis=0)
     alike = within(changes, np.float32(np.sqrt(2)) * limit)
@@ -167,7 +161,7 @@ def _goes_on(values: Picture, limit: Picture, jump: float) -> Picture:
 
 
 def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
-    """What blocks (n,) cost that may be clear in some frames (frames, n), with the likeliest states."""
+    """The cost of blocks (n,) in their likeliest states, where ``clear`` (frames, n) says which may be clear."""
     switch, leave = -np.log(SWITCH_PROBABILITY), -np.log(1 - SWITCH_PROBABILITY)
     is_clear, is_smoke = np.where(clear[0], 0, np.inf), np.full(clear.shape[1], jump)
     for now, going in zip(clear[1:], goes_on, strict=True):
@@ -178,7 +172,7 @@ def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
 
 
 def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
-    """The colours of blocks (frames, blocks, 3), in sRGB values, and how many rows and columns of them there are."""
+    """The colours of blocks (frames, blocks, 3), in sRGB values, and the numbers of rows and columns of blocks."""
     rows, columns = proxy.seen.shape[1:]
     wide, high = reduced_size(columns, rows, BLOCKS)
     values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
@@ -186,7 +180,7 @@ def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
 
 
 def _limit(values: Picture, white: Picture) -> Picture:
-    """Deviation (3,) up to which blocks show the background that most frames of each agree on."""
+    """Largest deviation (3,) at which a block still shows the value that most of its frames agree on."""
     limit = np.asarray(MAX_DEVIATION * np.hypot(white, EIGHT_BIT_STEP), np.float32)
     most, usual = np.zeros(values.shape[1]), values[0].copy()
     for value in values:
@@ -200,7 +194,7 @@ def _limit(values: Picture, white: Picture) -> Picture:
 
 
 def _candidates(values: Picture, limit: Picture) -> list[Picture]:
-    """The colours that most of all blocks have, and black."""
+    """Black, and the commonest colours of all blocks."""
     left = values.reshape(-1, 3)
     found = [np.zeros(3, np.float32)]
     while len(left) and len(found) <= CANDIDATES:
@@ -216,7 +210,7 @@ def _candidates(values: Picture, limit: Picture) -> list[Picture]:
 
 
 def _sharp(proxy: Proxy, white: Picture) -> bool:
-    """Whether the clearest view of a picture has edges, as what stands before black has, and mist has not."""
+    """Whether the clearest view of the picture has edges: objects before black do, mist does not."""
     # smoke brightens black; one frame may be astray
     some = proxy.pictures[:: -(-len(proxy.pictures) // CLEAR_FRAMES)]
     clearest = np.sort([channel_mean(linear_to_srgb(picture)) for picture in some], axis=0)[min(1, len(some) - 1)]
@@ -233,7 +227,7 @@ def within(deviations: Picture, limit: Picture) -> Mask:
 
 
 def _at_pixels(blocks: Mask, proxy: Proxy) -> Mask:
-    """What holds in blocks (rows, columns) at the pixels of a proxy."""
+    """Values of blocks (rows, columns), repeated at the pixels of a proxy."""
     rows, columns = (
         np.minimum(np.arange(pixels) * count // pixels, count - 1)
         for pixels, count in zip(proxy.seen.shape[1:], blocks.shape, strict=True)
@@ -242,7 +236,7 @@ def _at_pixels(blocks: Mask, proxy: Proxy) -> Mask:
 
 
 def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:
-    """Which blocks (n,) no mask hides in any frame; of masks that hide all at some time, in some frame."""
+    """Blocks (n,) that no mask hides in any frame; if there are none, those that one frame at least shows."""
     if proxy.seen.all():
         return np.ones(shape[0] * shape[1], np.bool_)
     rows, columns = shape

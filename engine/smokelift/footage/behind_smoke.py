@@ -9,23 +9,23 @@ from smokelift.checks.array_types import Mask
 from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
 
 DETAIL = 4.0
-"""Standard deviation in pixels of the Gaussian above which a background's detail is finer than that of smoke."""
+"""Standard deviation, in pixels, of the Gaussian that keeps smoke and removes the finer detail of a background."""
 
 ISLAND = 0.01
-"""Share of the picture up to which what seems clear is taken for an accident."""
+"""Share of the picture up to which a clear patch is taken for an accident."""
 
 SPECK = 7
-"""Pixels along the square whose median a pixel is taken to be."""
+"""Pixels along the square whose majority decides for its middle pixel."""
 
 SHIFTS = (-1 / 2, -1 / 3, -1 / 6, 1 / 6, 1 / 3, 1 / 2)
-"""Where the outline of the unknown is laid on what is known, to the right, in widths of the picture."""
+"""Shifts to the right, in picture widths, that lay the outline of the unknown on the known."""
 
 
 def push_pull(image: Picture, confidence: Picture) -> Picture:
     """Blend pixels of low confidence with the smooth continuation of their surroundings.
 
-    The push-pull algorithm (Gortler et al., "The lumigraph", 1996): averages weighted by confidence over ever larger
-    blocks; each level keeps what it knows and takes the rest from the next coarser one.
+    The push-pull algorithm (Gortler et al., "The lumigraph", 1996) averages over ever larger blocks, weighted by
+    confidence; each level keeps what it knows and takes the rest from the next coarser one.
     """
     height, width = confidence.shape
     weight: Picture = confidence[..., None]
@@ -34,7 +34,7 @@ def push_pull(image: Picture, confidence: Picture) -> Picture:
     small_size = ((width + 1) // 2, (height + 1) // 2)
     total = area_average(weight, *small_size)
     mean = area_average(image * weight, *small_size) / np.maximum(total, 1e-6)
-    # A block of which a quarter is known is known: its mean is as good as any.
+    # a block counts as known if a quarter of it is: its mean is good enough
     coarse = push_pull(mean, np.minimum(4.0 * total[..., 0], 1.0))
     blend: Picture = image * weight + area_average(coarse, width, height) * (np.float32(1.0) - weight)
     return blend
@@ -43,9 +43,9 @@ def push_pull(image: Picture, confidence: Picture) -> Picture:
 def continuation_errors(image: Picture, known: Mask) -> Picture:
     """Return the covariance (3, 3) of the colours' errors where a linear picture is continued from what is known.
 
-    The outline of the unknown is laid on what is known, which is continued there as if it were unknown. The mean error
-    is not taken off: it says nothing of that behind the smoke (docs/experiments/disturbed-clips.md). 0 where nothing is
-    unknown, or so much that nothing can be left out.
+    They are measured on known pixels, which the shifted outline of the unknown leaves out. The mean error is not
+    subtracted: it says nothing of that behind the smoke (docs/experiments/disturbed-clips.md). Zero if nothing is
+    unknown, or too much to leave anything out.
     """
     if known.all():
         return np.zeros((3, 3), np.float32)
@@ -65,8 +65,7 @@ def continuation_errors(image: Picture, known: Mask) -> Picture:
 
 
 def in_one_piece(known: Mask) -> Mask:
-    """Without specks: a clear island amid smoke, or an unknown one amid the clear, is an accident of the samples."""
-    # the median of a square: what most of its pixels are
+    """Remove specks, known ones and unknown ones: they are accidents of the samples."""
     down = ndimage.correlate1d(known.astype(np.uint8), np.ones(SPECK), 0)
     smooth = ndimage.correlate1d(down, np.ones(SPECK), 1) > SPECK**2 // 2
     islands, count = ndimage.label(smooth)
@@ -76,7 +75,7 @@ def in_one_piece(known: Mask) -> Mask:
 
 
 def mostly_beside(grown: Mask, known: Mask) -> Mask:
-    """Without patches that were added to what is known but border on less of it than of what stays unknown."""
+    """Remove the patches that ``grown`` adds to what is known if more of their border is unknown than known."""
     patches, count = ndimage.label(grown & ~known, structure=np.ones((3, 3)))
     beside = np.zeros(count + 1)
     for along, across in ((patches, grown), (patches.T, grown.T)):
@@ -88,7 +87,7 @@ def mostly_beside(grown: Mask, known: Mask) -> Mask:
 
 
 def _moved(mask: Mask, right: int) -> Mask:
-    """A mask (rows, columns) moved to the right, with nothing where it comes from."""
+    """A mask (rows, columns) shifted to the right, False where nothing was."""
     moved = np.zeros_like(mask)
     if right >= 0:
         moved[:, right:] = mask[:, : mask.shape[1] - right]

@@ -1,9 +1,8 @@
-"""Whether the camera of a clip moves, by where in its frames the texture of the middle one is found again.
+"""Whether the camera of a clip moves: where its frames show the texture of the middle one again.
 
-The two pictures are cut into cells, band-passed and of one contrast everywhere, which are correlated. Before a camera
-that stands still the cells are in place but for the few that smoke covers; before one that shakes, pans, zooms or
-travels nearly all are found again elsewhere. No motion is estimated: what stands behind the smoke of a camera that
-moves has to be given (docs/experiments/turning-camera.md).
+Both pictures are band-passed, brought to one contrast, cut into cells and correlated. If the camera stands still, all
+cells are in place but the few that smoke covers; if it shakes, pans, zooms or travels, nearly all are found elsewhere.
+No motion is estimated: the background of a camera that moves has to be given (docs/experiments/turning-camera.md).
 """
 
 from __future__ import annotations
@@ -14,37 +13,36 @@ from scipy import fft
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb
 
 FINE_SIGMA, COARSE_SIGMA, CONTRAST_SIGMA = 0.8, 3.0, 6.0
-"""Standard deviations in pixels of the two Gaussians whose difference is compared, and of that over which its contrast
-is measured."""
+"""Standard deviations, in pixels, of the band-pass's two Gaussians, and of the one that measures its contrast."""
 
 MIN_CONTRAST = 4 / 255
 """Contrast in sRGB values below which there is more noise or fog than texture (docs/experiments/turning-camera.md)."""
 
 CELLS = 6
-"""Cells along the picture's longer side, which others between them overlap by half."""
+"""Cells along the picture's longer side; more of them between these overlap by half."""
 
 HALF = 0.5
-"""Share of a cell's variance that is texture, and that is the same in another picture in which it is found again; share
-of the frames in which `MIN_MOVED` of the cells are elsewhere, from which on the camera moves."""
+"""Share of a cell's variance that must be texture; correlation at which it is found again; and share of the frames in
+which `MIN_MOVED` of the cells are elsewhere, above which the camera moves."""
 
 MIN_MOVED = 0.9
-"""Share of the cells that are elsewhere if the camera moves: 1 of four clips, .6 where smoke alone has texture
+"""Share of the cells that are elsewhere if the camera moves. Four clips have 1; where smoke alone has texture it is .6
 (docs/experiments/turning-camera.md)."""
 
 MIN_TEXTURED, MIN_REFOUND = 1 / 3, 0.8
-"""Share of the cells with texture, since less may be smoke alone before something smooth, and share of those that are
-found again: .9 to 1 before cameras that move, less of smoke (docs/experiments/turning-camera.md)."""
+"""Smallest share of cells with texture (less may be smoke alone before something smooth), and of these found again:
+cameras that move have .9 to 1, smoke has less (docs/experiments/turning-camera.md)."""
 
 
 def moves(pictures: Picture) -> bool:
-    """Return whether the camera of linear pictures (frames, rows, columns, 3), small as a proxy's, moves.
+    """Return whether the camera of a proxy's linear pictures (frames, rows, columns, 3) moves.
 
-    It does if nearly all that has texture is half a pixel or more from where it is in the middle one, in most of those
-    in which it is found again.
+    It does if nearly all texture is half a pixel or more away from its place in the middle picture, in most of the
+    pictures that show it again.
     """
     shape, middle = pictures.shape[1:3], len(pictures) // 2
     side = min(round(max(shape) / CELLS), *shape)
-    if side < 4 * CONTRAST_SIGMA:  # it has to hold all over which contrast is measured
+    if side < 4 * CONTRAST_SIGMA:  # a cell must hold the area that contrast is measured over
         return False
     window = np.outer(*[np.hanning(side + 2)[1:-1].astype(np.float32)] * 2)
     places = np.ix_(*(np.arange(0, n - side + 1, side // 2) for n in shape))
@@ -69,7 +67,7 @@ def moves(pictures: Picture) -> bool:
 
 
 def _detail(picture: Picture) -> Picture:
-    """A linear picture (rows, columns, 3) in grey, band-passed, in units of the contrast around each pixel."""
+    """The band-passed grey of a linear picture (rows, columns, 3), in units of the contrast around each pixel."""
     grey = channel_mean(linear_to_srgb(picture))
     detail = blurred(grey, FINE_SIGMA) - blurred(grey, COARSE_SIGMA)
     return np.asarray(detail / np.sqrt(blurred(detail**2, CONTRAST_SIGMA) + MIN_CONTRAST**2), np.float32)

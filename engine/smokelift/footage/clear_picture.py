@@ -1,20 +1,19 @@
-"""The picture behind smoke that moves: which frames show each of its pixels clear, and what is there where none does.
+"""The picture behind moving smoke: which frames show each pixel clear, and what is there where none does.
 
-A pixel is a mixture of two states: clear, when it has one value within the noise, and smoke, when it has any. Two facts
-tell them apart:
+A pixel is clear, and has one value within the noise, or it is smoke, and has any. Two facts tell them apart:
 
-- A clear pixel stays; smoke goes on. Of two successive frames of smoke, some share is alike by chance, and it is
-  measured on the pixel. A value at which a pixel stays for so many pairs of successive frames that smoke does so once
-  in `FALSE_ALARM` only is its background, or smoke as steady as a background.
-- Smoke draws every background towards its own brightness. So of several such values, the background is the one that is
-  farthest from the smoke's.
+- A clear pixel stays; smoke goes on. How often two successive frames of smoke are alike by chance is measured on the
+  pixel. A value that it keeps for so many pairs of frames that smoke would with a probability below `FALSE_ALARM` only
+  is its background, or smoke as steady as one.
+- Smoke moves every background towards its own brightness. So of several such values, the one farthest from the smoke's
+  is the background.
 
-A pixel that only drifts is clear as well if it looks like its surroundings, or so unlike them that smoke would change
-more. What else no frame shows clear is continued smoothly from around it. Its detail is that of the frames' mean, with
-the contrast that the smoke takes from it given back. How wrong that is, is measured where the background is known.
+A pixel that only drifts is clear as well if it is like its surroundings, or so unlike them that smoke would change it
+more. All else is continued smoothly from around it; its detail is that of the frames' mean, with the contrast that
+smoke takes restored. How wrong that is, is measured where the background is known.
 
-Which pixels are clear, and when, is as smooth in the picture as smoke is, so that a proxy tells it. `whole_plate` takes
-the background's detail from whole frames.
+Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
+whole frames.
 """
 
 from __future__ import annotations
@@ -35,76 +34,66 @@ from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_see
 from smokelift.footage.proxy import Proxy
 
 WINDOW = 6.0
-"""Width of the window of a pixel's clear values in units of noise: plus and minus three standard deviations."""
+"""Width of the window of a pixel's clear values, in standard deviations of noise: three to either side."""
 
 MIN_WINDOW = np.float32(3 / 255)
-"""Width of that window at least, in sRGB values: rounding to eight bits, and a codec's shift by a step either way."""
+"""Smallest width of that window, in sRGB values: rounding to eight bits, and a codec's shift by a step either way."""
 
 STRIDE = 4
-"""Pixels from one row or column to the next where it is measured what the smoke is like."""
+"""Pixels from one row or column to the next of those that the smoke's properties are measured on."""
 
 BAND = 2**14
-"""Pixels whose values are compared at a time: they fit the cache."""
+"""Pixels that are compared at a time: they fit the cache."""
 
 MIN_ALIKE_SHARE = 0.8
-"""Share of a pixel's values that are alike which are then its background for certain."""
+"""Share of like values of a pixel above which they are its background for certain."""
 
 MIN_SEEN_SHARE = 1 / 8
-"""Share of the frames that have to show a pixel of which all values are alike, for that to be its background. While a
-camera turns, others show it for a moment only."""
+"""Smallest share of the frames that show a pixel if its like values are to be its background: a camera that turns shows
+some for a moment only."""
 
 ONE_SIDED = 0.9
-"""Share of the changes by smoke to one side from which on it only brightens, or darkens, and the rest is noise."""
+"""Share of the changes to one side from which on smoke only brightens, or only darkens; the rest is noise."""
 
 FALSE_ALARM = 1e-3
-"""Share of the pixels always under smoke that pass for clear at times."""
+"""Share of the pixels always under smoke that are taken for clear at times."""
 
 PRIOR_PAIRS = 4.0
-"""Pairs of frames that the clip's share of like pairs counts for beside a pixel's own."""
+"""Pairs of frames that the clip's share of like pairs counts as, added to a pixel's own."""
 
 DRIFT = 8 / 255
-"""Change in sRGB values by a codec or by the light, at most."""
+"""Largest change by a codec or by the light, in sRGB values."""
 
 LIKE_SURROUNDINGS = 3 * DRIFT
-"""Difference in sRGB values from what the surroundings let expect, of a background (docs/experiments/background.md)."""
+"""Largest difference of a background from its surroundings, in sRGB values (docs/experiments/background.md)."""
 
 MIN_CHANGE_SHARE = 1 / 4
-"""Range of smoke over time, as a share of its difference from the background, at least: what is steadier is a chair or
-a jacket."""
+"""Smallest range of smoke over time, over its difference from the background: a chair or a jacket is steadier."""
 
 DETAIL_QUANTILE = 0.95
-"""Quantile of the known background's detail that bounds that of the unknown; what is beyond it is smoke's."""
+"""Quantile of the known background's detail that limits the unknown's; any more is the smoke's."""
 
 MIN_TRANSMITTANCE = 0.2
-"""Light let through by the smoke from which the detail behind it can be distinguished from noise."""
+"""Smallest transmittance of smoke at which the detail behind it exceeds noise."""
 
 MIN_CONTRAST = 0.02
-"""Difference of the background from the smoke's brightness, in sRGB values, from which the mean tells how much of it
-the smoke lets through: noise and codecs change a mean by a code or two."""
+"""Smallest difference of the background from the smoke's brightness, in sRGB values, at which a mean tells how much of
+it passes: noise and codecs change a mean by a code or two."""
 
 STEP = 2
-"""Every so manieth frame is read whole: half of those that are examined."""
+"""One in so many examined frames is read at full size."""
 
 DETAIL_MARGIN = 16
-"""Pixels of the proxy around what is unknown whose detail bounds that of the unknown."""
+"""Pixels of the proxy around the unknown whose detail limits the unknown's."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClearPicture:
-    """The background of pictures of one exposure.
+    """The linear background (rows, columns, 3) of pictures of one exposure.
 
-    Attributes
-    ----------
-    image : (rows, columns, 3)
-        Linear.
-    known : (rows, columns) bool
-        Pixels that some of the pictures show without smoke.
-    clear : (frames, rows, columns) bool
-        Where each of them shows the background that is known.
-    contrast : (rows, columns)
-        By what the detail of the pictures' mean is multiplied to be that of the background; 0 where smoke hides it.
-    errors : (3, 3)
-        As of `smokelift.footage.plate.Plate`.
+    ``known`` (rows, columns) are the pixels that some pictures show without smoke, ``clear`` (frames, rows, columns)
+    says where each picture does. ``contrast`` (rows, columns) is the factor that makes the detail of the pictures' mean
+    the background's, 0 where smoke hides it. ``errors`` (3, 3) are those of `smokelift.footage.plate.Plate`.
     """
 
     image: Picture
@@ -116,7 +105,7 @@ class ClearPicture:
 
 @dataclass(frozen=True, eq=False)
 class _Smoke:
-    """What the smoke of a clip is like, in sRGB values: see `_smoke_of`."""
+    """Properties of a clip's smoke, in sRGB values: see `_smoke_of`."""
 
     similarity: float
     brightness: float
@@ -124,16 +113,9 @@ class _Smoke:
 
 
 def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
-    """Return the background of pictures.
+    """Return the background of pictures of one exposure.
 
-    Parameters
-    ----------
-    proxy
-        The pictures, of one exposure.
-    noise
-        Of them.
-    detail
-        Standard deviation of the Gaussian as of `DETAIL`, in pixels.
+    ``detail`` is `DETAIL` at their size: the standard deviation of that Gaussian in their pixels.
     """
     width = smoothing(noise)
     pictures, seen = proxy.pictures, proxy.seen
@@ -156,9 +138,9 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         )
     known = in_one_piece(known)
     if not known.all():
-        # what only drifts is the background if it is so unlike its surroundings that smoke would change more
+        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
         known = in_one_piece(known | (calm & (MIN_CHANGE_SHARE * _unlike(image, known) >= window + DRIFT)))
-        # or if it is like them: smoke hardly changes what has its colour
+        # or if it is like them: smoke hardly changes a background of its own colour
         known = mostly_beside(in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
@@ -172,16 +154,16 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:
-    """Difference (rows, columns) of a linear picture from what is known around, in grey sRGB values."""
+    """Difference (rows, columns) of a linear picture from the known continued there, in grey sRGB values."""
     encoded = linear_to_srgb(image)
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
 
 def _smoke_of(grey: Picture, window: float) -> _Smoke:
-    """What the smoke in grey pictures (frames, rows, columns) is like.
+    """Measure the smoke in grey pictures (frames, rows, columns).
 
     Its similarity is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
-    the value that it draws every background towards; it brightens the pixels whose background is darker than that.
+    the value that it moves every background towards; it brightens pixels of a darker background.
     """
     shape = grey.shape[1:]
     values = grey.reshape(len(grey), -1)
@@ -194,17 +176,17 @@ def _smoke_of(grey: Picture, window: float) -> _Smoke:
     smoky = np.abs(away) > window
     pairs = smoky[1:] & smoky[:-1]
     similarity = float((np.abs(np.diff(values, axis=0)) <= window)[pairs].mean()) if pairs.any() else 0.5
-    # what most frames agree on is the background for certain
+    # a value that most frames agree on is the background for certain
     number = count_of_seen(values)
     certain = (counts.max(0) > MIN_ALIKE_SHARE * number) & (number >= MIN_SEEN_SHARE * len(values))
     behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
-    # there, what a codec's drift may be says nothing of smoke
+    # at certain pixels, a change as small as a codec's drift says nothing of smoke
     beyond = 0.5 * window + DRIFT
     change = np.where((np.abs(away) > beyond) & certain, away, 0.0)
     turn = _turn(background, change)
     if (change != 0).any(0).mean() < ISLAND:
-        # Smoke that never leaves its place shows beside it by accident only, and in its place all the time. If that is
-        # no one-sided change, other things move, too, and say nothing of smoke.
+        # Smoke that never leaves its place shows there all the time, and beside it by accident only. If it does not
+        # change its place to one side, other things move as well and tell nothing of smoke.
         in_place = values - behind
         in_place = np.where(np.abs(in_place) > beyond, in_place, 0.0)
         if in_place.any() and np.isinf(side := _turn(behind, in_place)):
@@ -216,7 +198,7 @@ def _smoke_of(grey: Picture, window: float) -> _Smoke:
 
 
 def _turn(background: Picture, change: Picture) -> float:
-    """The grey value below which changes (frames, n) brighten backgrounds (n,) and above which they darken them."""
+    """The grey value below which changes (frames, n) brighten backgrounds (n,), and above which they darken them."""
     brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
     one_sided = ONE_SIDED * float((brighter + darker).sum())
     if brighter.sum() >= one_sided:
@@ -224,7 +206,7 @@ def _turn(background: Picture, change: Picture) -> float:
     if darker.sum() >= one_sided:
         return -np.inf
     order = np.argsort(background)
-    # the value that explains the most of the changes
+    # the value that leaves the least change unexplained
     wrong = np.cumsum(darker[order]) + np.cumsum(brighter[order][::-1])[::-1]
     return float(background[order][wrong.argmin()])
 
@@ -232,16 +214,16 @@ def _turn(background: Picture, change: Picture) -> float:
 def _clear_values(
     pictures: Picture, away: Picture, window: float, similarity: float
 ) -> tuple[Picture, Mask, Mask, Mask]:
-    """The background of each pixel, linear; whether it is certain; whether it drifts only; the frames that show it.
+    """The linear background of each pixel; whether it is certain; whether it only drifts; the frames that show it.
 
-    Where it is not certain it is the least smoky value. That of a pixel that drifts is its middle one. ``away`` is the
-    grey value of the pictures, with its sign turned where smoke darkens: the less, the clearer.
+    An uncertain background is the least smoky value, that of a pixel that drifts the median. ``away`` is the pictures'
+    grey value, negated where smoke darkens: the lower, the clearer.
     """
     unseen, number = np.isnan(away), count_of_seen(away)
     alike = (np.abs(np.diff(away, axis=0)) <= window).sum(0)
     pairs = (~unseen[1:] & ~unseen[:-1]).sum(0)
     ordered, last = np.sort(away, axis=0), np.maximum(number - 1, 0)
-    # one value may be astray
+    # one value may be an outlier
     lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
     calm = highest - lowest <= window + DRIFT
     often = number >= MIN_SEEN_SHARE * len(away)
@@ -258,7 +240,7 @@ def _clear_values(
     known = np.isfinite(best)
     centre = np.where(known, best, lowest) + np.float32(0.5 * window)
     centre = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), centre)
-    for _ in range(3):  # the window starts at a value; mean shift settles it around the mean of its values
+    for _ in range(3):  # mean shift settles the window around the mean of its values
         inside = np.abs(away - centre) <= 0.5 * window * 1.001
         within = np.maximum(inside.sum(0), 1)
         centre = np.where(inside, away, 0).sum(axis=0) / within
@@ -274,11 +256,11 @@ def _completed(
     brightens: Mask,
     finer_than: float,
 ) -> tuple[Picture, Picture]:
-    """Return a linear plate with what is unknown filled in, and the ``contrast`` of `ClearPicture`.
+    """Return a linear plate with the unknown filled in, and the ``contrast`` of `ClearPicture`.
 
-    ``mean`` is that of the samples in sRGB values. Smoke of transmittance T and brightness J shows J + T (B - J) of a
-    background B. The mean over time has T from its coarse part and that of the surroundings, and so what of its detail
-    is the background's.
+    ``mean`` (rows, columns, 3) is that over time, in sRGB values. Smoke of transmittance T and brightness J makes
+    J + T (B - J) of a background B. The mean's coarse part, compared with the continued surroundings, gives T; its
+    detail divided by T is the background's.
     """
     if known.all():
         return image, np.ones(known.shape, np.float32)
@@ -291,7 +273,7 @@ def _completed(
     passed = np.clip(seen, MIN_TRANSMITTANCE, 1)
     detail = np.clip(detail / passed[..., None], -most, most)
     filled = smooth + np.where(seen > MIN_TRANSMITTANCE, 1, 0)[..., None] * detail
-    # smoke has drawn the pixel towards its own brightness, never away from it
+    # smoke moves a pixel towards its own brightness, never away from it
     beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
     beyond -= np.clip(beyond, -DRIFT, DRIFT)
     filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
@@ -301,10 +283,9 @@ def _completed(
 
 
 def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -> Picture:
-    """Return a linear background (rows, columns, 3) of full size.
+    """Return the linear background (rows, columns, 3) at full size, made of the frames of the clip's proxy.
 
-    It is made of the frames of the clip's proxy, as they are exposed; each is brighter by its gain (3,) than the
-    background that was found of the proxy.
+    Each frame is brighter by its gain (3,) than the background ``found`` on the proxy.
     """
     if found.image.shape[1::-1] == clip.size:
         return found.image
@@ -333,13 +314,13 @@ def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -
 
 
 def spread_out(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """Return values (rows, columns) of small pixels at those of a picture of a width and a height."""
+    """Return values (rows, columns) repeated at the pixels of a picture of a ``size``, width and height."""
     rows, columns = (np.diff(_edges(*sizes)) for sizes in zip(values.shape, size[::-1], strict=True))
     return np.repeat(np.repeat(values, rows, axis=0), columns, axis=1)
 
 
 def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[np.bool_]) -> Picture:
-    """The linear mean of whole frames of a file over the times at which they are ``shown``, of pixels of the proxy."""
+    """The linear mean of a file's full frames where they are ``shown`` (frames, rows, columns of the proxy)."""
     file, width, height = clip.whole(), *clip.size
     down, across = (_edges(*each) for each in zip(shown.shape[1:], (height, width), strict=True))
     total = np.zeros((height, width, 3), np.float32)
@@ -350,5 +331,5 @@ def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[n
 
 
 def _edges(count: int, pixels: int) -> Edges:
-    """Where each of so many parts of a line of pixels begins, and the end of the last."""
+    """The beginnings of ``count`` parts of a line of pixels, and the end of the last."""
     return np.asarray(-(-np.arange(count + 1) * pixels // count), np.int32)

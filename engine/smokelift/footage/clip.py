@@ -23,8 +23,8 @@ from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
 
 STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
-"""Memory for the frames of a file that are kept as they are stored, twenty of 1080p at 8 bits, for what reads the same
-ones spread over a clip; and for the linear frames of a clip that are kept: two of 1080p."""
+"""Memory for kept frames: as stored, twenty of 1080p at 8 bits, since the same ones spread over a clip are read again;
+linear, two of 1080p."""
 
 Read = Callable[[int], StoredPicture]
 Kept = OrderedDict[int, StoredPicture]
@@ -246,14 +246,14 @@ class Clip:
         self.close()
 
     def _with(self, frames: tuple[int, int] | None = None, **attributes: Any) -> Clip:
-        """A clip of the same open file with other frames, or other attributes."""
+        """A clip of the same open file with other frames or attributes."""
         clip = copy(self)
         vars(clip).update(attributes)
         clip._use(frames or (self.first, self._last))
         return clip
 
     def _use(self, frames: tuple[int, int]) -> None:
-        """Use the file's frames from one to another, as they are read."""
+        """Use the file's frames from one number to another, both included."""
         self.first, self._last = frames
         if not 0 <= self.first <= self._last < self._count:
             raise ClipError(
@@ -269,7 +269,7 @@ class Clip:
         return self._with(_read=read, mask=mask, _count=count)
 
     def _sound(self, n: int) -> StoredPicture:
-        """Frame ``n``, or what stands in for it: the last sound one lasts on, as when one drops."""
+        """Frame ``n``, or what stands in for a damaged one: the last sound frame before it, else the next after it."""
         if not isinstance(n, int | np.integer) or not 0 <= n < len(self):
             raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {len(self) - 1}")
         try:
@@ -284,7 +284,7 @@ class Clip:
 
 
 def _kept(pictures: Kept, most: int, read: Read, n: int) -> StoredPicture:
-    """A picture, read-only from now on: one of the last ones in so many bytes, or read and put beside them."""
+    """A picture, read-only from now on, of those kept or else read; the last ones are kept, up to ``most`` bytes."""
     image = pictures.pop(n) if n in pictures else read(n)
     image.values.flags.writeable = False
     pictures[n] = image

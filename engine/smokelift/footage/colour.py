@@ -1,7 +1,7 @@
-"""How files encode light, by the code points of ITU-T H.273 that FFmpeg shows, and the way to linear BT.709.
+"""How files encode light, by the code points of ITU-T H.273 that FFmpeg gives, and its conversion to linear BT.709.
 
-Linear light has diffuse white at 1, as an sRGB picture has: BT.2408 puts it at 75 % of the signal in HLG and at 203
-cd/m2 in PQ. Highlights exceed 1.
+Diffuse white is 1, as in an sRGB picture: BT.2408 puts it at 75 % of the signal in HLG and at 203 cd/m2 in PQ.
+Highlights exceed 1.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from smokelift.checks.array_types import Array
 Encoding = Literal["srgb", "linear", "hlg", "pq"]
 
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
-"""Encodings by transfer characteristics; all others are read as sRGB, as screens show them."""
+"""Encodings by transfer characteristics; all others are read as sRGB, as screens do."""
 
 _D65 = (0.3127, 0.3290)
 _BT709 = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))
@@ -28,7 +28,7 @@ _PRIMARIES = {
     9: ("BT.2020", ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046))),
     12: ("Display P3", ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060))),
 }
-"""Name, and chromaticities of red, green and blue, of what has a D65 white and is not BT.709."""
+"""Names of primaries other than BT.709, all with a D65 white, and chromaticities of red, green and blue."""
 
 _HLG = (0.17883277, 0.28466892, 0.55991073)
 _PQ = (2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32)
@@ -56,12 +56,12 @@ def pq_to_linear(signal: npt.ArrayLike) -> Array:
 
 
 def primaries_name(primaries: int) -> str | None:
-    """Return the name of primaries that are converted, None of those that are taken for BT.709."""
+    """Return the name of primaries that are converted, or None of those taken for BT.709."""
     return _PRIMARIES[primaries][0] if primaries in _PRIMARIES else None
 
 
 def to_bt709(linear: Array, primaries: int) -> Array:
-    """Bring linear colours [row, column, rgb] to BT.709; what it cannot show is clipped at 0."""
+    """Convert linear colours [row, column, rgb] to BT.709; colours outside it are clipped at 0."""
     if primaries not in _PRIMARIES:
         return linear
     matrix = np.linalg.solve(_to_xyz(_BT709), _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)

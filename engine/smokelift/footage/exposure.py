@@ -1,8 +1,8 @@
-"""The exposure of a frame against its background: a gain a channel, measured on what does not move.
+"""The exposure of a frame against its background: one gain for each channel.
 
-Smoke spreads the ratio of a frame to its background; what shows no smoke has one ratio, the gain. So the gain is the
-middle of the shortest interval of ratios that holds a third of the picture (the shorth: Andrews et al., "Robust
-estimates of location", 1972).
+Where there is no smoke, the ratio of a frame to its background is the gain; smoke spreads it. So the gain is the middle
+of the shortest interval that holds a third of the ratios (the shorth: Andrews et al., "Robust estimates of location",
+1972).
 """
 
 from __future__ import annotations
@@ -14,31 +14,31 @@ from smokelift.footage.images import Picture, area_average, reduced_size
 from smokelift.footage.noise import median_of_seen
 
 COMPARED_SIDE = 160
-"""Pixels along the longer side of the pictures that are compared: noise is averaged out, and there are thousands."""
+"""Pixels along the longer side of compared pictures: few enough to average out noise, and still thousands."""
 
 USABLE = (0.005, 0.9)
-"""Linear values between which a ratio says anything: below is noise, above is clipped."""
+"""Linear values between which a ratio is usable: below there is noise, above clipping."""
 
 MIN_USABLE_SHARE = 0.01
-"""Share of the picture that has to be usable, at least."""
+"""Smallest usable share of a picture."""
 
 AGREEING = 1 / 3
-"""Share of the usable pixels that has to show one gain."""
+"""Share of the usable pixels that must show one gain."""
 
 UNCHANGED = 0.1
-"""Share of the usable pixels that proves, by a ratio of one, that the exposure has not changed."""
+"""Share of the usable pixels with a ratio of one that proves an unchanged exposure."""
 
 SAME = 0.02
-"""Relative difference of gains that no picture shows: it is less than a step of 8 bit video."""
+"""Relative difference of gains that is invisible: less than a step of 8 bit video."""
 
 SPREAD = 0.06
-"""Most spread of the ratios of pixels that show one gain."""
+"""Largest spread of the log ratios of pixels that show one gain."""
 
 
 def gain_of(picture: Picture, background: Picture) -> Picture:
-    """Return how much brighter a picture is than its background, (3,); ones where that cannot be measured or seen.
+    """Return how many times brighter a picture is than its background, (3,); ones if that is not measurable or visible.
 
-    Both are linear (rows, columns, 3), `small` enough that their noise does not count.
+    Both are linear (rows, columns, 3) and `small`, so that their noise does not count.
     """
     gains = np.ones(3, np.float32)
     usable = _usable(background) & _usable(picture)
@@ -54,26 +54,23 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
 
 
 def shows_exposure(background: Picture) -> bool:
-    """Return whether a linear background (rows, columns, 3) is bright enough somewhere, and not too bright, to tell."""
+    """Return whether enough of a linear background (rows, columns, 3) is usable to measure gains against it."""
     return bool(_usable(background).mean() >= MIN_USABLE_SHARE)
 
 
 def small(picture: Picture) -> Picture:
-    """Return a picture at the size at which gains are measured."""
+    """Return a picture at the size that gains are measured at."""
     rows, columns = picture.shape[:2]
     return area_average(picture, *reduced_size(columns, rows, COMPARED_SIDE))
 
 
 def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:
-    """Return the gains (frames, 3) of small linear pictures (frames, rows, columns, 3) against their median.
-
-    What a picture does not show is not a number.
-    """
+    """Return gains (frames, 3) of small linear pictures (frames, rows, columns, 3) to their median; NaN is unseen."""
     gains = np.ones((len(samples), 3), np.float32)
-    for _ in range(3):  # the median of unsteady frames is less certain than that of steady ones
+    for _ in range(3):  # frames of one exposure have a more certain median than those of several
         reference = median_of_seen(samples / gains[:, None, None])
         before, gains = gains, np.stack([gain_of(sample, reference) for sample in samples])
-        if (gains == before).all():  # as they would stay
+        if (gains == before).all():  # converged
             break
     return gains
 
@@ -83,13 +80,13 @@ def _usable(picture: Picture) -> npt.NDArray[np.bool_]:
 
 
 def _all_three(holds: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Where something holds in all channels (..., 3); NumPy's ``all`` takes much longer along so short an axis."""
+    """Whether all three channels (..., 3) hold; NumPy's ``all`` takes much longer along so short an axis."""
     red, green, blue = np.moveaxis(holds, -1, 0)
     return np.asarray(red & green & blue)
 
 
 def _shorth(values: npt.NDArray[np.float32]) -> tuple[float, float]:
-    """Middle and width of the shortest interval that holds the share `AGREEING` of some values."""
+    """Middle and width of the shortest interval that holds the share `AGREEING` of the values."""
     ordered = np.sort(values)
     count = max(1, int(AGREEING * len(ordered)))
     widths = ordered[count - 1 :] - ordered[: len(ordered) - count + 1]

@@ -1,10 +1,9 @@
-"""Fire in smoke: pixels that shine by themselves, and a clip in which smoke stands in their place.
+"""Fire in smoke: pixels that shine by themselves, and a clip with smoke in their place.
 
-Fire is what no light explains. Smoke gives back no more of the light than white does, and what gives back less of a
-color is darker than that: so what has the colors of glowing soot shines by itself if it is as bright as white, or far
-brighter than smoke of other colors, which stands in the same light. Without emission a flame is
-read as the densest smoke of all, and its light as what lights the rest. What a flame hides is unknown: the smoke beside
-it is continued there. Figures: docs/experiments/fire.md.
+Fire is brighter than light explains. Smoke reflects no more than white does, and coloured smoke less. So a pixel with
+the colours of glowing soot shines by itself if it is as bright as white, or far brighter than smoke of other colours in
+the same light. Without emission, a flame would be read as the densest smoke of all, and its light as what lights the
+rest. What a flame hides is unknown: the smoke beside it is continued there. Figures: docs/experiments/fire.md.
 """
 
 from __future__ import annotations
@@ -20,47 +19,47 @@ from smokelift.footage.plate import Plate, Plates
 from smokelift.scene.checks import Vector
 
 MIN_FLAME_RED = 0.5
-"""Linear red that fire adds to what is behind it, at least: exposed for its surroundings it is clipped or nearly so."""
+"""Smallest linear red that fire adds to its background: exposed for its surroundings, fire is clipped or nearly so."""
 
 WARM = 0.75
-"""Green over red, and blue over green, of fire at most; a black body of 2700 K has 0.5 and 0.3 in linear BT.709."""
+"""Largest green over red, and blue over green, of fire; a black body of 2700 K has 0.5 and 0.3 in linear BT.709."""
 
 WHITE_RED = 0.9
-"""Linear red of white, which reflects nine tenths, in an exposure that just shows it."""
+"""Linear red of a white surface, which reflects nine tenths, in an exposure that just holds it."""
 
 MIN_BRIGHTNESS_RATIO = 3.0
-"""What fire adds to the background over what smoke of other colours adds, at least: fire lights the smoke near it."""
+"""Smallest ratio of what fire adds to the background to what other smoke adds: fire lights the smoke near it."""
 
 MIN_FIRE_SHARE, MIN_SMOKE_SHARE = 0.0005, 0.1
-"""Shares of the smoke's pixels that are fire, and that have another colour, at least."""
+"""Smallest shares of smoke pixels that are fire, and that have another colour."""
 
 MIN_BRIGHT_SHARE = 0.25
-"""Share of the fire that is so bright, at least: .4 to .7 of six public clips with fire, none of red smoke and red ink
+"""Smallest share of the fire that is so bright: six public clips of fire have .4 to .7, red smoke and red ink none
 (docs/experiments/fire.md)."""
 
 MIN_COLOURED_VALUE = 0.01
-"""Linear value of the largest channel of a pixel whose color counts: 8 bits show no color in darker ones."""
+"""Linear value of a pixel's largest channel from which on its colour counts: 8 bits show none in darker ones."""
 
 GLOW = 0.01
 """Width of the edge that still glows, as a share of the picture's longer side."""
 
 CLIPPED_VALUE = 0.95
-"""Linear value from which on a channel may have been larger."""
+"""Linear value from which on a channel may be clipped."""
 
 COLOUR_FRAMES = 8
-"""Frames from which the colour of fire is taken, at most."""
+"""Largest number of frames that the colour of fire is taken from."""
 
 
 def fire_share(colours: Picture, behind: Picture) -> float:
-    """Return the share of fire among smoke pixels; 0 where none of it is brighter than light explains.
+    """Return the share of fire among smoke pixels; 0 if none is brighter than light explains.
 
-    ``colours`` and ``behind`` are the linear radiance (n, 3) of the pixels, and of the background there.
+    ``colours`` and ``behind`` are the linear radiance (n, 3) of the pixels and of their background.
     """
     fire, brightest = _hot(colours, behind), brightest_channel(colours)
     if fire.sum() <= MIN_FIRE_SHARE * len(colours):
         return 0.0
     added = brightest_channel(colours - behind)
-    # a core that is clipped to yellow or white does not show its color
+    # a core clipped to yellow or white does not show its colour
     other = ~_warm(colours) & (brightest > MIN_COLOURED_VALUE) & (brightest < CLIPPED_VALUE)
     bright = colours[..., 0] > WHITE_RED
     if other.mean() >= MIN_SMOKE_SHARE:
@@ -69,20 +68,20 @@ def fire_share(colours: Picture, behind: Picture) -> float:
 
 
 def without_fire(clip: Clip, plates: Plates) -> Clip:
-    """Return a clip, exposed as its backgrounds are, in whose frames the smoke beside fire is continued over it."""
+    """Return a clip with the smoke beside fire continued over it; the clip must be exposed as its backgrounds are."""
     return clip.changed(lambda number, picture: _doused(picture, plates.at(number)))
 
 
 def firelight(clip: Clip, doused: Clip) -> Clip:
-    """Return a clip of the light that fire adds to one `without_fire`; a clipped pixel shows less than that."""
+    """Return a clip of the light that fire adds to one `without_fire`; clipped pixels show less than fire adds."""
     return clip.changed(lambda number, picture: np.maximum(picture - doused.frame(number), 0))
 
 
 def fire_colour(clip: Clip, light: Clip) -> Vector:
-    """Return the colour of the light of fire in a clip, the largest of red, green and blue 1.
+    """Return the colour of a clip's `firelight`, the largest of red, green and blue 1; the light must not be all zero.
 
-    That of the light in pixels that are not clipped (where there are none, in all), weighted by its brightness: what of
-    the smoke is mistaken for fire is as bright everywhere. ``light`` is the clip's `firelight`, not zero everywhere.
+    It is the mean over pixels that are not clipped (over all if all are), weighted by the light's brightness: smoke
+    mistaken for fire is evenly bright.
     """
     whole, certain = np.zeros(3), np.zeros(3)
     for number in clip.spread(COLOUR_FRAMES):
@@ -96,7 +95,7 @@ def fire_colour(clip: Clip, light: Clip) -> Vector:
 
 
 def _doused(picture: Picture, plate: Plate) -> Picture:
-    """A picture with the smoke beside fire continued over it; itself without any."""
+    """A picture with the smoke beside fire continued over it, or itself if it shows no fire."""
     smoke = matte(picture, plate).mask
     fire = _fire(picture, plate.image, smoke)
     if not fire.any():
@@ -109,7 +108,7 @@ def _doused(picture: Picture, plate: Plate) -> Picture:
 
 
 def _hot(colours: Picture, behind: Picture) -> Mask:
-    """Where light of a fire's colour and strength is added."""
+    """Whether light of a fire's colour and strength is added."""
     return _warm(colours) & (colours[..., 0] - behind[..., 0] > MIN_FLAME_RED)
 
 
@@ -119,7 +118,7 @@ def _warm(colours: Picture) -> Mask:
 
 
 def _fire(picture: Picture, behind: Picture, smoke: Mask) -> Mask:
-    """Fire with its glow, and with its core, which is clipped to yellow and white."""
+    """Fire with its glow and its core, which is clipped to yellow and white."""
     joined = smoke & (_warm(picture) | (picture[..., 0] - behind[..., 0] > MIN_FLAME_RED))
     fire = ndimage.binary_propagation(_hot(picture, behind) & smoke, mask=joined)
     width = max(1, round(GLOW * max(picture.shape[:2])))

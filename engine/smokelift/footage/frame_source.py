@@ -1,4 +1,4 @@
-"""What a clip format implements, and the frames that it gives: as they are stored, and read in linear light."""
+"""What a clip format implements, and its frames: kept as they are stored, read in linear light."""
 
 from __future__ import annotations
 
@@ -17,21 +17,20 @@ from smokelift.checks import Remark
 from smokelift.footage.images import Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
-"""Frames a second where neither the file nor the user gives any: the rate of film."""
+"""Frames a second if neither the file nor the user gives a rate: that of film."""
 
 FOCAL_LENGTHS = (4.0, 2000.0)
-"""Focal lengths in millimetres on 35 mm film, from a fisheye's to a telescope's; others, 0 above all, say that it is
-unknown."""
+"""Focal lengths in millimetres on 35 mm film, from a fisheye to a telescope; others, often 0, mean it is unknown."""
 
 MIDDLE = 0.5
-"""sRGB value of smoke that is as far from black as from white."""
+"""sRGB value as far from black as from white."""
 
 OPAQUE = 0.999
-"""Alpha from which on nothing is behind a pixel: less than a step of 8 bits below 1."""
+"""Alpha from which on a pixel is opaque: less than a step of 8 bits below 1."""
 
 Edges = npt.NDArray[np.int32]
 Layer = tuple[Picture, Picture | None]
-"""A linear picture (rows, columns, 3) as it is before black, and its alpha (rows, columns), None of an opaque one."""
+"""A linear picture (rows, columns, 3) over black, and its alpha (rows, columns), None if it is opaque."""
 
 Sample = TypeVar("Sample")
 Value = TypeVar("Value", np.float32, np.uint16)
@@ -47,14 +46,10 @@ class DamagedFrameError(ClipError):
 
 @dataclass(frozen=True, eq=False)
 class StoredPicture:
-    """A picture whose values stand for linear light: integers take a quarter of the memory, at 8 bits.
+    """A picture as its file stores it: 8 bit codes take a quarter of the memory of linear values.
 
-    Attributes
-    ----------
-    values : (rows, columns, 3) float32, uint8 or uint16
-        Linear light, or codes; row 0 at the top.
-    table : (n,) float32, optional
-        Linear value of each code; None where the values are linear.
+    ``values`` (rows, columns, 3) are linear float32, or uint8 or uint16 codes, row 0 at the top. ``table`` (n,) float32
+    is the linear value of each code, None if the values are linear.
     """
 
     values: npt.NDArray[Any]
@@ -66,15 +61,15 @@ class StoredPicture:
         return self.values.shape[1], self.values.shape[0]
 
     def linear(self) -> Picture:
-        """Return the linear picture (rows, columns, 3), read-only if it is kept."""
+        """Return the linear picture (rows, columns, 3), which may be read-only."""
         return self.values if self.table is None else look_up(self.table, self.values)
 
     def cut(self, part: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> StoredPicture:
-        """Return some of the pixels, which a function takes whatever their values are."""
+        """Return the pixels that a function takes, whether they are codes or linear."""
         return StoredPicture(part(self.values), self.table)
 
     def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
-        """Return the picture with a function applied to every linear value by itself, to each code once."""
+        """Return the picture with a function applied to each linear value, computed once for each code."""
         return change(self.values) if self.table is None else look_up(change(self.table), self.values)
 
     def averaged(self, width: int, height: int) -> Picture:
@@ -84,15 +79,15 @@ class StoredPicture:
         return area_average(lines, width, height)
 
     def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
-        """Return sums (n, columns, 3) of the lines of the linear picture, each of weights (n, rows)."""
+        """Return sums (n, columns, 3) of the lines of the linear picture, by weights (n, rows)."""
         if self.table is None or self.values.dtype != np.uint8:
             return sum_lines(self.linear(), weights)
         return _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
 
     def chequered(self, width: int, height: int, first: int) -> tuple[Picture, Picture]:
-        """Return two `averaged` pictures, each of the pixels of one colour of a chequerboard.
+        """Return two `averaged` pictures, one of either colour's pixels of a chequerboard.
 
-        ``first`` is 0 if the pixel at the top left belongs to the first of the two, 1 if to the second.
+        ``first`` is 0 if the top left pixel belongs to the first picture, 1 if to the second.
         """
         columns, rows = self.size
         sums = []
@@ -114,7 +109,7 @@ class StoredPicture:
     def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
         """Add the linear picture, times weights (m, n, 3) of its parts, to sums (rows, columns, 3).
 
-        The edges (m + 1,) and (n + 1,) are the row, and the column, where each part begins, and where the last ends.
+        ``edges`` are the rows (m + 1,) and the columns (n + 1,) where parts begin, and where the last ends.
         """
         if self.table is None or self.values.dtype != np.uint8:
             rows, columns = (np.diff(each) for each in edges)
@@ -135,11 +130,11 @@ class FrameSource(Protocol):
     warning
         A remark on a defect, else None.
     files
-        The video, or a picture a frame.
+        The video, or one picture for each frame.
     lens
         Focal length in millimetres on 35 mm film (of its diagonal, as CIPA DCG-001 defines it), if the file says it.
     backdrop
-        Linear grey that is shown behind pictures with an alpha channel; None behind opaque ones.
+        Linear grey shown behind pictures with an alpha channel; None if they are opaque.
     """
 
     count: int
@@ -151,7 +146,7 @@ class FrameSource(Protocol):
 
     @property
     def notes(self) -> tuple[Remark, ...]:
-        """How the pictures are read where that is not the usual way."""
+        """How the pictures are read, where that is unusual."""
         ...
 
     def read(self, n: int) -> StoredPicture:
@@ -159,7 +154,7 @@ class FrameSource(Protocol):
         ...
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which frames from one to another, both included, raise `DamagedFrameError`."""
+        """Return the frames from one to another, both included, that raise `DamagedFrameError`."""
         ...
 
     def close(self) -> None:
@@ -168,7 +163,7 @@ class FrameSource(Protocol):
 
 
 def focal_length(value: object) -> float | None:
-    """Return a focal length in millimetres as a file says it; None where it says none."""
+    """Return the focal length in millimetres that a file's value says; None if it says none."""
     try:
         focal = float(str(value))
     except ValueError:
@@ -177,14 +172,14 @@ def focal_length(value: object) -> float | None:
 
 
 def sound_samples(count: int, read: Callable[[int], Sample]) -> Iterator[Sample]:
-    """Return what is read of some of so many frames, with smoke and without; damaged ones are left out."""
+    """Read a few frames spread over ``count``, with smoke and without; damaged ones are left out."""
     for n in sorted({0, count // 4, count // 2, count - 1}):
         with suppress(DamagedFrameError):
             yield read(n)
 
 
 def shown_before(layer: Layer, backdrop: float | None) -> Picture:
-    """Return a picture before a linear grey; before black if there is none."""
+    """Return a picture over a linear grey, or over black if that is None."""
     picture, alpha = layer
     if alpha is None or not backdrop:
         return picture
@@ -192,10 +187,10 @@ def shown_before(layer: Layer, backdrop: float | None) -> Picture:
 
 
 def backdrop_of(layers: Iterable[Layer]) -> float | None:
-    """Return the linear grey that pictures of a clip are shown before; None if they are opaque.
+    """Return the linear grey to show pictures of a clip over; None if they are opaque.
 
-    The alpha channel of pictures of smoke alone is the matte, whatever stands behind the smoke. They are shown before
-    one colour that is known for certain: white behind dark smoke, black behind bright smoke.
+    An alpha channel is the matte of the smoke, whatever stands behind it. Such pictures are shown over a colour that is
+    known for certain: white behind dark smoke, black behind bright smoke.
     """
     light, opacity, opaque = 0.0, 0.0, True
     for picture, alpha in layers:

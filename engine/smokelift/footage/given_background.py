@@ -1,4 +1,4 @@
-"""The background that a scene gives, read from disk: one colour, a clean plate, or one clean plate a frame."""
+"""The background that a scene gives: one colour, a clean plate, or one clean plate for each frame."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
 
 ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.8
-"""Difference in sRGB values up to which a pixel has a backdrop's colour, and share of the pixels that have to have it:
-the others are a nozzle, a floor, a logo."""
+"""Difference in sRGB values up to which a pixel has a backdrop's colour, and smallest share of such pixels: the others
+are a nozzle, a floor, a logo."""
 
 
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
-    """Open a clean plate as a clip if it changes from frame to frame, and return None if it does not.
+    """Open a clean plate that changes from frame to frame as a clip; None if it does not change.
 
-    Its frames are counted as those of the clip's file. Before a camera that moves a numbered picture stands for the
-    sequence that it begins, else for itself. ClipError is raised if it cannot be read.
+    Its frames are counted as those of the clip's file. If the camera moves, a numbered picture stands for the sequence
+    that it begins, else for itself. ClipError is raised if the plate cannot be read.
     """
     image = None if background is None else background.image
     moves = camera is not None and camera.moves
@@ -31,12 +31,7 @@ def open_plates(background: Background | None, camera: Camera | None) -> Clip | 
 def given_plates(background: Background | None, camera: Camera | None, clip: Clip) -> Plates | None:
     """Return the background of every frame of a clip as its scene gives it; None if it has to be estimated.
 
-    Raises
-    ------
-    ClipError, ImageError
-        If a picture or a frame cannot be read.
-    ValueError
-        If there are fewer plates than frames.
+    ClipError or ImageError is raised if a picture or a frame cannot be read, ValueError if plates are too few.
     """
     plates = open_plates(background, camera)
     if plates is not None:
@@ -49,20 +44,11 @@ def given_plates(background: Background | None, camera: Camera | None, clip: Cli
 
 
 def background_picture(scene: Scene | CompleteScene, camera: Camera | None = None) -> Picture:
-    """Return the background as a camera sees it.
+    """Return the linear background as a camera sees it: (rows, columns, 3), or (3,) if it is one colour.
 
-    Of a plate that changes from frame to frame, it is the clip's first frame; without any it is black. The camera is by
-    default the scene's own; `behind` says what another one sees of a clean plate.
-
-    Returns
-    -------
-    (rows, columns, 3) or (3,) float32
-        Linear radiance; (3,) where it is one colour.
-
-    Raises
-    ------
-    ImageError, ClipError
-        If the clean plate cannot be read.
+    A plate that changes is shown at the clip's first frame; without a background it is black. The camera is by default
+    the scene's own; `behind` says what another one sees of a clean plate. ImageError or ClipError is raised if the
+    plate cannot be read.
     """
     background = scene.background
     if background is not None and background.color is not None:
@@ -82,10 +68,10 @@ def background_picture(scene: Scene | CompleteScene, camera: Camera | None = Non
 
 
 def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
-    """Return what a camera sees of a clean plate (rows, columns, 3) that belongs to a camera of its own.
+    """Return what a camera sees of a clean plate (rows, columns, 3) that its ``own`` camera filmed.
 
-    A camera at the same place that shows a part of the plate's picture, at whatever resolution, sees that part,
-    (rows, columns, 3). Any other camera gets the plate's mean colour, (3,).
+    A camera at the same place whose picture is a part of the plate's, at any resolution, sees that part,
+    (rows, columns, 3). Any other sees the plate's mean colour, (3,).
     """
     part = shared_part(own, camera)
     if part is None:
@@ -94,7 +80,7 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
 
 
 def backdrop_colour(plate: Picture) -> Picture | None:
-    """Return the linear colour (3,) of a clean plate (rows, columns, 3) that has one, and None of others."""
+    """Return the linear colour (3,) of a clean plate (rows, columns, 3) of one colour; None of any other plate."""
     colour = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
     alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(colour)) <= ALIKE).all(-1)
     return colour if alike.mean() >= MIN_ALIKE_SHARE else None

@@ -1,4 +1,4 @@
-"""Clips that are numbered pictures."""
+"""Clips of numbered pictures."""
 
 from __future__ import annotations
 
@@ -27,16 +27,9 @@ _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
 
 
 class ImageSequence:
-    """Numbered pictures on disk, or a single one; a `FrameSource`.
+    """Numbered pictures on disk, or a single one, as `numbered_pictures` finds them; a `FrameSource`.
 
-    Parameters
-    ----------
-    path
-        What `numbered_pictures` takes.
-    transfer
-        As in `Clip.open`.
-    fps
-        What the user gives; without it there is a warning.
+    ``transfer`` is that of `Clip.open`. There is a warning if the user gives no ``fps``.
     """
 
     def __init__(self, path: Path, transfer: Transfer | None, fps: float | None) -> None:
@@ -53,13 +46,13 @@ class ImageSequence:
 
     @property
     def notes(self) -> tuple[Remark, ...]:
-        """That the pictures are reduced, if they are."""
+        """Remark that the pictures are reduced, if they are."""
         if self._size is None or self._size == (small := readable_size(*self._size)):
             return ()
         return (Remark("scaled pictures", {"size": self._size, "scaled": small}),)
 
     def read(self, n: int) -> StoredPicture:
-        """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
+        """Return a picture; raise ClipError if it is damaged or its size is not the first one's."""
         image = shown_before(self._layer(n), self.backdrop)
         height, width = image.shape[:2]
         self._size = self._size or (width, height)
@@ -70,7 +63,7 @@ class ImageSequence:
         return StoredPicture(area_average(image, *readable_size(width, height)))
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which pictures from one to another are missing or cannot be read."""
+        """Return the pictures from one to another that are missing or cannot be read."""
         damaged = []
         for n in range(first, last + 1):
             try:
@@ -80,7 +73,7 @@ class ImageSequence:
         return tuple(damaged)
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Do nothing: no file is held open."""
 
     def _layer(self, n: int) -> Layer:
         try:
@@ -90,28 +83,20 @@ class ImageSequence:
 
 
 def is_pattern(path: Path) -> bool:
-    """Return whether a path stands for numbered pictures: its last row of # for the number, unless it is a file."""
+    """Return whether a path stands for numbered pictures: it has a # in its name, and is no file."""
     return "#" in path.name and not path.is_file()
 
 
 def is_video(path: Path) -> bool:
-    """Return whether a path, to judge by its name, is that of a video, not of one or more pictures."""
+    """Return whether a path names a video, by its suffix, and not one or more pictures."""
     return not is_pattern(path) and path.suffix.lower() not in READABLE
 
 
 def numbered_pictures(path: Path) -> tuple[Path, ...]:
-    """Return the pictures of a sequence in order, with those that are missing in between.
+    """Return the pictures of a sequence in order, with those missing in between.
 
-    Parameters
-    ----------
-    path
-        A pattern ``frame_####.png`` (each # a digit at least), the first picture of a sequence, or one picture without
-        a number.
-
-    Raises
-    ------
-    ClipError
-        If there is no such picture, or more are missing than there are.
+    The path is a pattern ``frame_####.png`` (its last row of #, each a digit at least), the first picture of a
+    sequence, or one picture without a number. ClipError is raised if there is none, or more are missing than there are.
     """
     pattern = is_pattern(path)
     named = re.fullmatch(r"(.*?)(#+)([^#]*)" if pattern else r"(.*?)(\d+)(\.[^.]+)", path.name)
@@ -142,9 +127,9 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
 
 
 def _focal_length(path: Path) -> float | None:
-    """The focal length in the EXIF of a picture, in millimetres on 35 mm film; None if there is none."""
+    """The focal length in a picture's EXIF, in millimetres on 35 mm film; None if there is none."""
     try:
         with Image.open(path) as picture:
             return focal_length(picture.getexif().get_ifd(_EXIF).get(_FOCAL_LENGTH_IN_35MM_FILM))
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # no picture that has such tags
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # a picture without such tags
         return None

@@ -1,8 +1,8 @@
 """Single pictures as linear float32 arrays [row, column, rgb], row 0 at the top.
 
-Integer pictures (PNG, JPEG) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets three
-equal channels. Alpha is shown over black: EXR colours carry it already (premultiplied, by the format's rule),
-PNG colours are multiplied by it in linear light.
+Integer pictures (PNG, JPEG) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets three equal
+channels. Alpha is shown over black: EXR colours are premultiplied, by the format's rule; PNG colours are multiplied by
+it in linear light.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
 
 MAX_PIXELS = 2**28
-"""Pixels of a picture, at most."""
+"""Largest number of pixels of a picture."""
 
 MAX_PICTURE_SIDE = 4096
-"""Pixels along the longer side of a clip's pictures; larger ones are reduced while they are read. The finest grid has
-144 voxels along a side, so smoke on a twentieth of the picture still has more pixels than voxels."""
+"""Longest side of a clip's pictures, in pixels; larger ones are reduced when read. The finest grid has 144 voxels along
+a side, so smoke on a twentieth of the picture still has more pixels than voxels."""
 
 OPENING_BYTES = 2**25
-"""Bytes that FFmpeg opens a file with: the contexts of its decoders, and some frames to know them by."""
+"""Memory in bytes that FFmpeg needs to open a file: its decoders' contexts, and some frames to know them by."""
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
@@ -51,7 +51,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue (ITU-R BT.709)."""
 
 LOOK_UPS = 2**16
-"""Codes that are looked up at a time: their indices fit the cache."""
+"""Codes looked up at a time: their indices fit the cache."""
 
 
 class ImageError(ValueError):
@@ -59,9 +59,9 @@ class ImageError(ValueError):
 
 
 def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:
-    """Return the value of each code, in the shape of the codes.
+    """Return ``values[codes]``, in the codes' shape.
 
-    ``values[codes]`` takes three times as long, and ends the process (NumPy 1.26) where memory for its buffers lacks.
+    NumPy's indexing takes three times as long, and ends the process (NumPy 1.26) if it lacks memory for its buffers.
     """
     flat = codes.reshape(-1)
     found = np.empty(flat.shape, values.dtype)
@@ -72,7 +72,7 @@ def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArr
 
 
 def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
-    """Decode sRGB values (1 is white) to linear ones; the exact piecewise curve, continued above 1."""
+    """Decode sRGB values (1 is white) to linear ones by the exact piecewise curve, continued above 1."""
     e = np.asarray(encoded, np.float32)
     curve = ((np.maximum(e, np.float32(0.04)) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
     linear: Picture = np.where(e <= np.float32(0.04045), e / np.float32(12.92), curve)
@@ -80,7 +80,7 @@ def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
 
 
 def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
-    """Encode linear values as sRGB (1 is white); the exact piecewise curve, continued above 1."""
+    """Encode linear values as sRGB (1 is white) by the exact piecewise curve, continued above 1."""
     v = np.asarray(linear, np.float32)
     curve = np.float32(1.055) * np.maximum(v, np.float32(0.003)) ** np.float32(1 / 2.4) - np.float32(0.055)
     encoded: Picture = np.where(v <= np.float32(0.0031308), v * np.float32(12.92), curve)
@@ -100,10 +100,10 @@ def decode_integers(
     white: float = 1.0,
     premultiplied: bool = False,
 ) -> Picture:
-    """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB, alpha over black.
+    """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black.
 
-    The encoding is by default sRGB. ``white`` is the share of the largest value that stands for white, and for opaque.
-    Colours that are ``premultiplied`` are over black as they are stored.
+    The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque.
+    ``premultiplied`` colours are over black as they are stored.
     """
     linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
     alpha = decode_alpha(codes, white)
@@ -114,7 +114,7 @@ def decode_integers(
 
 @lru_cache
 def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) -> Picture:
-    """Return the linear values of all integers from 0 to one, read-only; the others are those of `decode_integers`."""
+    """Return the linear values of the codes 0 to ``top``, read-only; see `decode_integers`."""
     steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
     values = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
     values.flags.writeable = False
@@ -122,36 +122,23 @@ def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) 
 
 
 def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: float = 1.0) -> Picture | None:
-    """Return the alpha of integer pixels [row, column, rgb or rgba] from 0 to 1; None if they have none."""
+    """Return the alpha, from 0 to 1, of integer pixels [row, column, rgb or rgba]; None if they have none."""
     if codes.shape[-1] < 4:
         return None
     return np.minimum(codes[..., 3] / np.float32(np.iinfo(codes.dtype).max * white), np.float32(1.0))
 
 
 def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
-    """Read a PNG, JPEG, EXR or HDR file.
+    """Read a PNG, JPEG, EXR or HDR file, whose suffix says which, as a linear picture (height, width, 3).
 
-    Parameters
-    ----------
-    path
-        The file; its suffix says what it is.
-    transfer
-        ``"srgb"`` or ``"linear"``; None takes srgb for PNG and JPEG and linear for EXR and HDR.
-
-    Returns
-    -------
-    Linear float32 array of shape (height, width, 3). Of an EXR it is the display window.
-
-    Raises
-    ------
-    ImageError
-        With the path, if there is no such file or it is damaged or of another kind.
+    Without a ``transfer``, PNG and JPEG are sRGB, EXR and HDR linear. The picture is an EXR's display window.
+    ImageError, with the path, is raised if there is no such file, or it is damaged or of another kind.
     """
     return read_layer(path, transfer)[0]
 
 
 def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Picture, Picture | None]:
-    """Read a file as `read_image` does, and its alpha (height, width) from 0 to 1 if it has that channel."""
+    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in READABLE:
@@ -166,19 +153,19 @@ def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Pict
         return decode_integers(codes, transfer), decode_alpha(codes)
     except ImageError:
         raise
-    # Three libraries, each with its own exceptions; to the caller they all say the same.
+    # three libraries raise exceptions of their own that mean the same to the caller
     except (RuntimeError, ValueError, LookupError, SyntaxError, OSError, Image.DecompressionBombError) as error:
         raise ImageError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
 
 
 def readable_size(width: int | Fraction, height: int) -> tuple[int, int]:
-    """Return width and height in which a clip's pictures are read: whole parts of theirs, up to `MAX_PICTURE_SIDE`."""
+    """Return the width and height that a clip's pictures are read at: whole parts, up to `MAX_PICTURE_SIDE`."""
     divisor = -(-max(round(width), height) // MAX_PICTURE_SIDE)
     return max(1, round(width / divisor)), max(1, round(height / divisor))
 
 
 def size_refusal(width: int, height: int) -> str | None:
-    """Return why a picture of the size that its header says is refused, before memory is taken for it; else None."""
+    """Return why a picture of its header's size is refused, before memory is taken for it; None if it is not."""
     if 0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS:
         return None
     return (
@@ -188,27 +175,13 @@ def size_refusal(width: int, height: int) -> str | None:
 
 
 def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
-    """Open a file with FFmpeg, and whatever it refers to on this machine, but nothing on another.
+    """Open a file with FFmpeg, and what it refers to on this machine, but nothing on another.
 
-    FFmpeg takes a path that looks like a URL for one, and fetches it.
-
-    Parameters
-    ----------
-    path
-        The file, whatever characters are in its name.
-    form
-        FFmpeg's name of the format; None takes what the content shows.
-    options
-        Of that format.
-
-    Raises
-    ------
-    av.FFmpegError, ValueError
-        If it is of no format that FFmpeg knows, or damaged.
-    MemoryError
-        If there is hardly any memory left, where PyAV would end the process.
+    FFmpeg would take a path that looks like a URL for one, and fetch it. ``form`` is FFmpeg's name of the format, by
+    default what the content shows; ``options`` are that format's. av.FFmpegError or ValueError is raised if the file is
+    damaged or of no format that FFmpeg knows, MemoryError if hardly any memory is left: PyAV would end the process.
     """
-    bytes(OPENING_BYTES)  # given back at once, untouched: Python says that memory lacks, where PyAV would not
+    bytes(OPENING_BYTES)  # freed at once, untouched: Python raises an error if memory lacks, PyAV does not
     container: InputContainer = av.open(
         f"file:{path.absolute()}", format=form, options={"protocol_whitelist": "file", **options}
     )
@@ -216,7 +189,7 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
 
 
 def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
-    # with a pattern, "frame_%d.png" would mean other files
+    # as a pattern, "frame_%d.png" would mean other files
     with open_container(path, "image2", pattern_type="none") as container:
         stream = container.streams.video[0]
         _require_size(path, (stream.width, stream.height))
@@ -229,7 +202,7 @@ def _require_size(path: Path, size: tuple[int, int]) -> None:
 
 
 def _read_radiance(path: Path) -> npt.NDArray[Any]:
-    """Read a Radiance .hdr of the usual kind; FFmpeg would read the others upside down or in wrong colours."""
+    """Read a Radiance .hdr of the usual kind; FFmpeg reads the others upside down or in wrong colours."""
     with path.open("rb") as file:
         head = file.read(4096)
     if b"FORMAT=32-bit_rle_xyze" in head or re.search(rb"\n(\+Y|[+-]X) \d+ [+-][XY] \d+\n|\n-Y \d+ -X \d+\n", head):
@@ -250,7 +223,7 @@ def _read_integers(path: Path) -> npt.NDArray[Any]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep what OpenEXR prints, and writes to standard error by itself, from both: the error that follows says it."""
+    """Silence what OpenEXR writes to standard output and error: the exception that follows says it."""
     sys.stderr.flush()
     kept = os.dup(2)
     with Path(os.devnull).open("wb") as nowhere:
@@ -271,7 +244,7 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
             _require_size(path, _window(part, name)[1])
     with _silent():
         parts = OpenEXR.File(str(path), separate_channels=True).parts
-    if not parts:  # the library's way to say that it found damaged pixels
+    if not parts:  # the library says so that pixels are damaged
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
     part = parts[0]
     ((left, top), (width, height)), ((x0, y0), _) = (_window(part, name) for name in ("displayWindow", "dataWindow"))
@@ -288,7 +261,7 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
 
 
 def _window(part: Any, name: str) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The left and top of a window of an EXR, and its width and height."""
+    """The left and top, and the width and height, of an EXR's window."""
     (left, top), (right, bottom) = (map(int, corner) for corner in part.header[name])
     return (left, top), (right - left + 1, bottom - top + 1)
 
@@ -307,29 +280,15 @@ def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:
 
 
 def reduced_size(width: int, height: int, side: float) -> tuple[int, int]:
-    """Return width and height of a picture whose longer side is reduced to so many pixels at most."""
+    """Return the width and height of a picture whose longer side is reduced to ``side`` pixels at most."""
     scale = max(1.0, max(width, height) / side)
     return max(1, round(width / scale)), max(1, round(height / scale))
 
 
 def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
-    """Resize a picture so that every new pixel is the mean of the area that it covers.
+    """Resize a picture (rows, columns) or (rows, columns, channels): every new pixel is the mean of its area.
 
-    Parameters
-    ----------
-    image
-        Shape (rows, columns) or (rows, columns, channels).
-    width, height
-        The new size in pixels. An axis that grows is interpolated linearly instead.
-
-    Returns
-    -------
-    float32 array of shape (height, width) or (height, width, channels).
-
-    Raises
-    ------
-    ValueError
-        If a size is below 1.
+    An axis that grows is interpolated linearly. ValueError is raised if a size is below 1.
     """
     if min(width, height) < 1:
         raise ValueError(f"a picture needs at least one pixel, not {width} x {height}")
@@ -345,33 +304,33 @@ def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
 
 
 def brightest_channel(values: npt.NDArray[Number]) -> npt.NDArray[Number]:
-    """Return the largest of the three values along the last axis; NumPy's ``max`` takes five times as long there."""
+    """Return the largest of three values along the last axis; NumPy's ``max`` takes five times as long."""
     red, green, blue = np.moveaxis(values, -1, 0)
     return np.asarray(np.maximum(np.maximum(red, green), blue))
 
 
 def channel_mean(values: Picture) -> Picture:
-    """Return the mean of the three values along the last axis; NumPy's ``mean`` takes much longer there."""
+    """Return the mean of three values along the last axis; NumPy's ``mean`` takes much longer."""
     red, green, blue = np.moveaxis(values, -1, 0)
     return np.asarray((red + green + blue) / np.float32(3))
 
 
 def blurred(picture: Picture, deviation: float) -> Picture:
-    """Smooth a picture (rows, columns) or (rows, columns, channels) with a Gaussian of a standard deviation in pixels.
+    """Smooth a picture (rows, columns) or (rows, columns, channels) with a Gaussian; its deviation is in pixels.
 
-    It is SciPy's ``gaussian_filter`` of float32, in a third of the time.
+    This is SciPy's ``gaussian_filter`` of float32, in a third of the time.
     """
     return _core.blur_picture(picture, _gaussian(deviation))
 
 
 def sum_lines(values: Picture, weights: scipy.sparse.csr_array) -> Picture:
-    """Return sums (n, ...) of the lines of a picture (rows, ...), each of weights (n, rows)."""
+    """Return sums (n, ...) of the lines of a picture (rows, ...), by weights (n, rows)."""
     return np.asarray(weights @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
 @lru_cache
 def _gaussian(deviation: float) -> npt.NDArray[np.float64]:
-    """The weights of a pixel and of its neighbours on one side, up to four standard deviations away."""
+    """The weights of a pixel and of its neighbours to one side, up to four standard deviations."""
     away = np.arange(int(4.0 * deviation + 0.5) + 1)
     values = np.exp(-0.5 / deviation**2 * away**2)
     whole = np.concatenate([values[:0:-1], values])
@@ -380,7 +339,7 @@ def _gaussian(deviation: float) -> npt.NDArray[np.float64]:
 
 @lru_cache
 def area_weights(old: int, new: int) -> scipy.sparse.csr_array:
-    """Return the sparse (new, old) matrix whose rows are the weights of one new pixel."""
+    """Return the sparse (new, old) matrix whose rows weight the old pixels of each new one."""
     if new > old:
         position = np.clip((np.arange(new) + 0.5) * (old / new) - 0.5, 0.0, old - 1.0)
         low = np.minimum(position.astype(np.int64), max(old - 2, 0))
@@ -389,7 +348,7 @@ def area_weights(old: int, new: int) -> scipy.sparse.csr_array:
         columns = np.stack([low, np.minimum(low + 1, old - 1)], axis=1).ravel()
         values = np.stack([1.0 - share, share], axis=1).ravel()
     else:
-        # In units of 1 / (old new) of the picture all edges are whole numbers: the overlaps are exact.
+        # in units of 1 / (old new) of the picture all edges are whole numbers, so overlaps are exact
         reach = -(-old // new) + 1
         first = np.arange(new) * old // new
         columns = np.minimum(first[:, None] + np.arange(reach), old - 1)

@@ -1,11 +1,11 @@
 """Garbage mattes: pictures that are white where a clip may show smoke, and black where it shows none.
 
-What a mask hides is neither smoke nor anything to learn from: a head, a dog, leaves, a label. There every frame is
-continued from around it, so that what looks at whole pictures meets nothing that moves, and no edge that stays. What
-counts pixels leaves these out (`Clip.seen`). Once the background is known, it takes their place (`plate.cleared`).
+A mask hides what is neither smoke nor anything to learn from: a head, a dog, leaves, a label. Every frame is continued
+over it from around, so that whole pictures hold nothing that moves there, and no edge that stays. Counts of pixels
+leave it out (`Clip.seen`). Once the background is known, it stands there instead (`plate.cleared`).
 
-A pixel is hidden or it is not: the mask's value, as it is stored, counts as the nearer of black and white. A frame that
-shows a part of its smoke only would be taken for one of thinner smoke, so that soft edges have no meaning here.
+A pixel is hidden or not: the mask's stored value counts as black or white, whichever is nearer. Soft edges have no
+meaning: a frame that shows only a part of its smoke would be taken for one of less dense smoke.
 """
 
 from __future__ import annotations
@@ -27,45 +27,31 @@ HALF = 0.5
 """Value from which on a pixel of a mask is white."""
 
 CONTINUED_SIDE = 320
-"""Pixels along the longer side of the picture that is continued: as smooth as that is, it has no more detail."""
+"""Pixels along the longer side of the continued picture, which is too smooth to need more."""
 
 MIN_SQUARE = 10 / 320
-"""Side of a square that has to be white, over the longer side of the picture: blocks of it tell the clip's noise."""
+"""Side of a square that must be white, over the picture's longer side: the clip's noise is measured on its blocks."""
 
 MIN_WEIGHT = 0.01
-"""Weight of what is seen from which on a pixel is continued from around it, and not from all of the picture: there
+"""Weight of what is seen below which a pixel is continued from all of the picture, not from around it: at this weight
 single precision still has five digits."""
 
 KEPT_MASKS = 16
-"""Masks of a size that are kept: two megabytes each of 1080p."""
+"""Resized masks that are kept: two megabytes each at 1080p."""
 
 Seen = npt.NDArray[np.bool_]
 
 
 class Mask:
-    """A mask for all frames of a clip's file, or one for each.
+    """One mask for all frames of a clip's file, or one for each.
 
-    Parameters
-    ----------
-    path
-        A picture; or a video, or a pattern ``mask_####.png``, whose frame n belongs to the file's frame n. Of a picture
-        with an alpha channel it is what is seen of it before black.
-    needed
-        Frames of the file that need one.
-    size
-        Width and height of the clip's pictures.
+    The path is a picture, or a video or a pattern ``mask_####.png`` whose frame n belongs to the file's frame n. A
+    picture with an alpha channel is read over black. ``needed`` are the file's frames that need a mask, ``size`` is the
+    width and height of the clip. ClipError or ImageError is raised if the mask cannot be read, lacks a frame, has
+    another shape than the clip, or hides nearly all of it.
 
-    Attributes
-    ----------
-    files
-        What it is read from.
-    count
-        Frames of the file that have one; None if they all do.
-
-    Raises
-    ------
-    ClipError, ImageError
-        If it cannot be read, lacks a frame, has another shape than the clip, or leaves next to nothing of it.
+    ``files`` are what it is read from. ``count`` is the number of the file's frames that have a mask, None if one mask
+    serves all.
     """
 
     def __init__(self, path: Path, needed: range, size: tuple[int, int]) -> None:
@@ -83,7 +69,7 @@ class Mask:
             )
         self._kept = lru_cache(maxsize=KEPT_MASKS)(self._resized)
         (width, height), (rows, columns) = size, self._picture(needed[0]).shape[:2]
-        # either may be a resized copy: each side is right to a pixel
+        # either may be a resized copy, whose sides are right to a pixel
         if abs(columns * height - rows * width) > columns + rows + width + height:
             raise ClipError(
                 f"{path}: this mask is {columns} x {rows} pixels, another shape than the clip's {width} x {height}; "
@@ -97,11 +83,11 @@ class Mask:
             )
 
     def seen(self, n: int, width: int, height: int) -> Seen:
-        """Return which pixels of frame ``n`` of the file are not hidden, (height, width), for pictures of any size."""
+        """Return which pixels (height, width) of the file's frame ``n`` are not hidden, at any size."""
         return self._kept(n if self.count else 0, width, height)
 
     def applied(self, n: int, image: StoredPicture) -> StoredPicture:
-        """Return a picture of frame ``n`` of the file, continued where it is hidden."""
+        """Return the picture of the file's frame ``n``, continued where it is hidden."""
         seen = self.seen(n, *image.size)
         if seen.all():
             return image
@@ -122,13 +108,13 @@ class Mask:
 
 
 def continued(picture: Picture, seen: Seen) -> Picture:
-    """Return the pixels (n, 3) of a linear picture (rows, columns, 3) that are not seen, smoothly from around them."""
+    """Return the pixels (n, 3) of a linear picture (rows, columns, 3) that are not seen, continued from around them."""
     rows, columns = seen.shape
     size = reduced_size(columns, rows, CONTINUED_SIDE)
     share = area_average(seen, *size)
     mean = area_average(np.where(seen[..., None], picture, 0), *size) / np.maximum(share, 1e-6)[..., None]
     known = (share > 0).astype(np.float32)
-    # far from what is seen it fades to black, and so does white
+    # far from what is seen it fades to black; so does a white picture, which tells by how much
     fading = push_pull(np.ones_like(mean), known)
     usual = mean[share > 0].mean(0)
     smooth = np.where(fading > MIN_WEIGHT, push_pull(mean, known) / np.maximum(fading, MIN_WEIGHT), usual)

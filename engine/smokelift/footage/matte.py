@@ -1,8 +1,8 @@
 """Where a frame shows smoke: its deviation from the background, in units of the clip's noise.
 
-A patch that deviates is smoke if noise makes so large and so strong a one too rarely: `FALSE_ALARMS` are expected in a
-picture, whatever its size (Desolneux, Moisan and Morel, "Meaningful alignments", 2000). So a wide veil needs to be
-hardly above the noise, and a speck has to be far above it. Within a patch, a pixel is as certain as it deviates.
+A patch is smoke if noise makes so large and so strong a one too rarely: `FALSE_ALARMS` are expected in a picture of any
+size (Desolneux, Moisan and Morel, "Meaningful alignments", 2000). So a wide veil may be hardly above the noise, while a
+speck must be far above it. Within a patch, the more a pixel deviates, the more certain it is.
 Figures: docs/experiments/background.md, docs/experiments/faint-rim.md.
 """
 
@@ -19,39 +19,35 @@ from smokelift.footage.noise import Noise
 from smokelift.footage.plate import Plate
 
 FALSE_ALARMS = 0.01
-"""Number of patches of noise that are taken for smoke in a picture, on the mean."""
+"""Mean number of patches of noise in a picture that are taken for smoke."""
 
 PATCH_GROWTH = 4.06
-"""Factor by which the number of shapes of a patch grows with each sample of its area (lattice animals: Jensen and
-Guttmann, "Statistics of lattice animals", 2000)."""
+"""Growth of the number of shapes of a patch with each sample of its area (lattice animals: Jensen and Guttmann,
+"Statistics of lattice animals", 2000)."""
 
 MIN_DEVIATION, FULL_DEVIATION = 1.5, 3.0
-"""Deviations from which a pixel counts, and counts fully, in units of noise (docs/experiments/faint-rim.md)."""
+"""Deviations above which a pixel counts, and counts fully, in units of noise (docs/experiments/faint-rim.md)."""
 
 MEASURED_DEVIATION = 4.0
-"""Deviation from which on a pixel shows smoke that box, light and colour are measured on, in units of noise."""
+"""Deviation, in units of noise, above which smoke is used to measure the box, the light and the colour."""
 
 SMOOTHING = 1.5
-"""Standard deviation of the Gaussian that smooths the deviation, in pixels, at least."""
+"""Smallest standard deviation, in pixels, of the Gaussian that smooths deviations."""
 
 MAX_SMOOTHING = 4.0
-"""Standard deviation of that Gaussian in noise, in pixels, at most: more hides the smoke's own shape."""
+"""Largest standard deviation, in pixels, of that Gaussian in noise: more would hide the smoke's shape."""
 
 GLOBAL_DEVIATION = 2.0
-"""Units of noise. A median deviation of a frame up to this is treated as drift of exposure or of the codec, not as
-smoke that fills the picture."""
+"""Median deviation of a frame, in units of noise, up to which it is drift of the exposure or the codec, and not smoke
+that fills the picture."""
 
 
 @dataclass(frozen=True, eq=False)
 class Matte:
-    """Where a frame shows smoke.
+    """Where a frame shows smoke, (rows, columns).
 
-    Attributes
-    ----------
-    deviation : (rows, columns)
-        From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke.
-    share : (rows, columns)
-        How certain a pixel shows smoke, from 0 to 1.
+    ``deviation`` is that from the plate in units of noise, smoothed: about 1 or less without smoke. ``share`` is the
+    certainty, from 0 to 1, that a pixel shows smoke.
     """
 
     deviation: Picture
@@ -64,19 +60,9 @@ class Matte:
 
 
 def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
-    """Find the smoke in a frame.
+    """Find the smoke in a linear frame (rows, columns, 3) before a plate of the same size.
 
-    Parameters
-    ----------
-    frame : (rows, columns, 3)
-        Linear.
-    plate
-        The background of the same size.
-
-    Raises
-    ------
-    ValueError
-        If the sizes differ or the frame is not finite.
+    ValueError is raised if the sizes differ or the frame is not finite.
     """
     linear = np.asarray(frame, np.float32)
     if linear.shape != plate.image.shape:
@@ -84,11 +70,11 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     if not np.isfinite(linear).all():
         raise ValueError("the frame holds values that are not finite; clamp them first")
     width = smoothing(plate.noise)
-    # as far as white noise goes, a Gaussian is a mean over so many pixels
+    # a Gaussian lessens white noise as a mean over so many pixels does
     noise = plate.noise.averaged(4 * np.pi * width**2).total
     shown, behind = linear, plate.image
     if width > SMOOTHING:
-        # in much noise the sRGB value of light is too low on the mean; that of a mean of light is not
+        # much noise makes mean sRGB values too low; encoding a mean of light does not
         shown, behind = (blurred(light, SMOOTHING) for light in (shown, behind))
         width = float(np.sqrt(width**2 - SMOOTHING**2))
     difference = (linear_to_srgb(shown) - linear_to_srgb(behind)) / noise
@@ -103,12 +89,12 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
 def _meaningful(deviation: Picture, sample: float) -> npt.NDArray[np.bool_]:
     """Patches (rows, columns) of a deviation above `MIN_DEVIATION` that noise makes too rarely.
 
-    ``sample`` is the number of pixels that noise has in common, so that a patch of noise is as likely as the product of
-    its samples' probabilities, each to deviate as far.
+    ``sample`` is the number of pixels that share noise. So the probability of a patch of noise is the product of its
+    samples' probabilities to deviate as far.
     """
     patches, count = ndimage.label(deviation > MIN_DEVIATION, structure=np.ones((3, 3)))
     inside = patches > 0
-    # of a normal value to be as far from zero, to either side
+    # that a normal value is as far from zero, to either side
     probability = np.log(2 * PATCH_GROWTH) + special.log_ndtr(-deviation[inside])
     surprise = -np.bincount(patches[inside], probability, count + 1) / sample
     expected = np.log(max(deviation.size / sample, 1)) - surprise
@@ -118,6 +104,6 @@ def _meaningful(deviation: Picture, sample: float) -> npt.NDArray[np.bool_]:
 
 
 def smoothing(noise: Noise) -> float:
-    """Return the standard deviation in pixels of the Gaussian that leaves as much of white noise as lasts anyway."""
+    """Return the standard deviation, in pixels, of the Gaussian that lessens white noise to the lasting part."""
     even = float((noise.white / noise.lasting).max()) / np.sqrt(4 * np.pi)
     return float(np.clip(even, SMOOTHING, MAX_SMOOTHING))

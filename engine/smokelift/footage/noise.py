@@ -1,11 +1,11 @@
-"""The noise of a clip, measured in sRGB values, where that of cameras and codecs is about the same at every brightness.
+"""The noise of a clip, in sRGB values: there noise of cameras and codecs is about the same at every brightness.
 
-It has two parts: one that differs from pixel to pixel, of which a mean over n pixels keeps the n-th part of the
-variance, and one that lasts over many pixels, as a codec's does, of which a mean keeps all.
+White noise differs from pixel to pixel: a mean over n pixels keeps the n-th part of its variance. Lasting noise, like a
+codec's, is shared by many pixels: a mean keeps all of it.
 
-Neither comes from what moves, which may be smoke over all of the picture. The first is what differences of neighbouring
-pixels change by from frame to frame: smoke has hardly any detail so fine. The second is how far the samples that agree
-on a background spread about it.
+Neither is measured on what moves, since smoke may fill the picture. White noise is how differences of neighbouring
+pixels change from frame to frame: smoke has hardly any detail so fine. Lasting noise is how far samples that agree on a
+background spread about it.
 """
 
 from __future__ import annotations
@@ -20,82 +20,73 @@ import smokelift._core as _core
 from smokelift.footage.images import Picture, srgb_to_linear
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
-"""One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have, since codecs shift whole
-blocks by that."""
+"""One step of 8 bit video, in sRGB values: the smallest noise a clip is taken to have, since codecs shift whole blocks
+by it."""
 
 BLOCK = 5
-"""Pixels along the blocks in which neighbours are compared, and over whose means lasting noise is measured; they hold
-about as many as `matte` averages over."""
+"""Pixels along the blocks in which white noise is measured, and on whose means lasting noise is; `matte` averages over
+about as many pixels."""
 
 BLOCKS_APART = 3
-"""Blocks from one row or column of them to the next that tell the noise of pixels: a median of so many needs no more.
-"""
+"""Blocks from one row or column to the next of those that white noise is measured in: its median needs no more."""
 
 MEDIAN_OF_BLOCK = 0.955
-"""Median over mean of a block's sum of squared differences: 20 of neighbours in rows of five have as many degrees of
-freedom as 14.5 that are independent, k, and the median of chi-squared is 1 - 2 / (9 k) of its mean, cubed."""
+"""Median over mean of a block's sum of squared differences. 20 differences of neighbours in rows of five have k = 14.5
+degrees of freedom, and the median of chi-squared is (1 - 2 / (9 k))^3 of its mean."""
 
 LARGEST_LASTING = np.float32(4 / 255)
-"""Lasting noise at most, in sRGB values: a codec's changes are up to twice as large (`clear_picture.DRIFT`)."""
+"""Largest lasting noise, in sRGB values: a codec's changes are up to twice as large (`clear_picture.DRIFT`)."""
 
 SPREAD_SAMPLES, SPREAD_ROUNDS = 50_000, 25
-"""Deviations that tell a spread, at most, and rounds in which it settles to a hundredth."""
+"""Largest number of deviations that a spread is measured on, and rounds in which it settles to a hundredth."""
 
 MIN_SPREAD = EIGHT_BIT_STEP / 4
-"""Spread at least that is distinguished from none: rounding to 8 bits makes as much."""
+"""Smallest spread that is distinguished from none: rounding to 8 bits makes as much."""
 
 CLIPPED_MEAN = 1.1
-"""Mean of normal noise whose negative half is clipped, at most, in median differences of two of its values: it is 1.02
-of them, and rounding adds some."""
+"""Largest mean of normal noise whose negative half is clipped, over the median difference of two of its values: 1.02,
+and some for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Standard deviations of a static pixel, in sRGB values.
-
-    Attributes
-    ----------
-    white : (3,)
-        Of what differs from pixel to pixel.
-    lasting : (3,)
-        Of what neighbours share.
-    """
+    """Standard deviations (3,) of a static pixel, in sRGB values: of the white and of the lasting noise."""
 
     white: Picture
     lasting: Picture
 
     @property
     def total(self) -> Picture:
-        """Standard deviation of a pixel, shape (3,)."""
+        """Standard deviation (3,) of both together."""
         total: Picture = np.sqrt(self.white**2 + self.lasting**2)
         return total
 
     def averaged(self, pixels: float) -> Noise:
-        """Return the noise of means over so many pixels."""
+        """Return the noise of means over a number of pixels."""
         return Noise(self.white / np.float32(np.sqrt(max(pixels, 1.0))), self.lasting)
 
 
 def lasting_noise(deviation: npt.ArrayLike) -> Noise:
-    """Return noise that no mean lessens, of a standard deviation in sRGB values, one or one a channel."""
+    """Return lasting noise alone, of a standard deviation, or one for each channel, in sRGB values."""
     return Noise(np.zeros(3, np.float32), np.broadcast_to(np.asarray(deviation, np.float32), (3,)).copy())
 
 
 EIGHT_BIT_NOISE = lasting_noise(EIGHT_BIT_STEP)
-"""Noise of footage that is as clean as eight bits allow."""
+"""Noise of footage as clean as eight bits allow."""
 
 
 def block_means(pictures: Picture) -> Picture:
-    """Return the means over blocks of pictures (frames, rows, columns, 3); what fills no block is left out."""
+    """Return the means over blocks of pictures (frames, rows, columns, 3); edges that fill no block are left out."""
     size = min(BLOCK, *pictures.shape[1:3])
     frames, rows, columns = len(pictures), pictures.shape[1] // size, pictures.shape[2] // size
     whole = pictures[:, : rows * size, : columns * size]
-    lines = whole.reshape(frames, rows, size, columns * size * 3).sum(axis=2)  # along memory: several times faster
+    lines = whole.reshape(frames, rows, size, columns * size * 3).sum(axis=2)  # in memory order: several times faster
     means: Picture = lines.reshape(frames, rows, columns, size, 3).sum(axis=3) / np.float32(size**2)
     return means
 
 
 def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return a picture of some blocks of another, side by side, `BLOCKS_APART`; a small one as it is."""
+    """Return a picture's blocks, one every `BLOCKS_APART`, side by side; a small picture as it is."""
     step = BLOCKS_APART * BLOCK
     if min(picture.shape[:2]) < step:
         return picture
@@ -106,10 +97,10 @@ def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def white_noise(blocks: Picture) -> Picture:
-    """Return the standard deviation (3,) of noise that differs from pixel to pixel.
+    """Return the standard deviation (3,) of white noise.
 
-    It is that of `some_blocks` of pictures of one exposure, or of their deviations, (frames, rows, columns, 3), in sRGB
-    values. What a mask hides is not a number.
+    ``blocks`` (frames, rows, columns, 3) are `some_blocks` of pictures of one exposure, or of their deviations, in sRGB
+    values; NaN where a mask hides them.
     """
     frames, rows, columns = blocks.shape[:3]
     size = min(BLOCK, rows, columns)
@@ -117,24 +108,23 @@ def white_noise(blocks: Picture) -> Picture:
         return np.zeros(3, np.float32)
     whole = blocks[:, : rows // size * size, : columns // size * size]
     apart = np.diff(whole.reshape(frames, rows // size, size, columns // size, size, 3), axis=4)
-    # of four values, hence of four times the variance
+    # a difference of four values has four times their variance
     variances = np.square(np.diff(apart, axis=0)).mean((2, 4)) / 4
     median = np.nan_to_num(np.nanmedian(variances, axis=(0, 1, 2)))
     return np.asarray(np.sqrt(median / MEDIAN_OF_BLOCK), np.float32)
 
 
 def spread_about(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> Picture:
-    """Return the `peak_spread` (3,) of deviations (..., 3)."""
+    """Return the `peak_spread` (3,) of each channel of deviations (..., 3)."""
     return np.array([peak_spread(deviations[..., channel], largest) for channel in range(3)], np.float32)
 
 
 def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> float:
-    """Return the standard deviation, at most the largest, of those deviations from a background that are noise.
+    """Return the standard deviation, up to ``largest``, of those deviations from a background that are noise.
 
-    They are a mixture of noise, normal about zero, and of smoke, whose deviations are of all sizes, each as often as
-    its double. The likeliest mixture is found from little noise upwards, so that it is that of the peak at zero
-    (Dempster, Laird and Rubin, "Maximum likelihood from incomplete data via the EM algorithm", 1977). What is not a
-    number is left out.
+    Deviations are a mixture of noise, normal about zero, and smoke, with all sizes, each as often as its double. The
+    likeliest mixture is found from little noise upwards, which makes it that of the peak at zero (Dempster, Laird and
+    Rubin, "Maximum likelihood from incomplete data via the EM algorithm", 1977). NaNs are left out.
     """
     some = deviations.ravel()[:: max(1, deviations.size // SPREAD_SAMPLES)]
     size = np.abs(some[np.isfinite(some)])
@@ -151,26 +141,26 @@ def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> f
 
 
 def noise_about(deviations: Picture, blocks: Picture) -> Noise:
-    """Return the noise of pictures before a background that is known.
+    """Return the noise of pictures before a known background.
 
-    The deviations are `some_blocks` of how they differ from it, in sRGB values, the blocks `block_means` of all of
-    that, (frames, rows, columns, 3) both.
+    Both arguments (frames, rows, columns, 3) are made of the differences from it in sRGB values: ``deviations`` are
+    `some_blocks` of them, ``blocks`` their `block_means`.
     """
     return noise_of(white_noise(deviations), spread_about(blocks), BLOCK**2)
 
 
 def noise_of(white: Picture, spread: Picture, pixels: float) -> Noise:
-    """Return the noise that has a white part (3,), and that spreads means over so many pixels by so much (3,)."""
+    """Return the noise with a ``white`` part (3,) whose means over a number of pixels have a ``spread`` (3,)."""
     shared = np.sqrt(np.maximum(spread**2 - white**2 / np.float32(pixels), 0))
     return Noise(white, np.maximum(shared, EIGHT_BIT_STEP).astype(np.float32))
 
 
 def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
-    """Return how bright a noisy black is on the mean (3,), since noise below black is clipped, in sRGB values.
+    """Return how bright a noisy black is on the mean (3,), in sRGB values: noise below black is clipped.
 
-    It is the deviation of the darkest tenth of the blocks, each at its median over time, as far as noise explains it: a
-    background that is given wrong, or smoke that fills the picture, deviates more. 0 for what is less than a step of 8
-    bit video. What it takes is that of `noise_about`.
+    It is the deviation of the darkest tenth of the blocks, by their medians over time, as far as noise explains it; a
+    wrong background, or smoke that fills the picture, deviates more. Less than a step of 8 bit video counts as 0. The
+    arguments are those of `noise_about`.
     """
     apart = np.abs(deviations[:, :, 1:] - deviations[:, :, :-1])
     explained = CLIPPED_MEAN * np.nanmedian(apart, axis=(0, 1, 2)) if apart.size else 0
@@ -179,10 +169,10 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
 
 
 def linear_excess(encoded: Picture, deviation: npt.ArrayLike) -> Picture:
-    """Return by how much noise of a standard deviation makes linear light brighter on the mean, at sRGB values.
+    """Return how much linear light noise of a standard deviation adds on the mean, at sRGB values.
 
-    Light is a convex function of sRGB values, so that the mean of f(v + n) exceeds f(v) by half of the noise's variance
-    times the second derivative of f. At a noisy value the term has the same mean, up to the fourth order in the noise.
+    Linear light f is convex in sRGB values, so the mean of f(v + n) exceeds f(v) by half the variance of n times the
+    second derivative of f. Taken at noisy values, the term has the same mean, up to fourth order in the noise.
     """
     # the second derivative of the curve of `srgb_to_linear`
     curvature = 2.4 * 1.4 / 1.055**2 * ((np.maximum(encoded, 0.04) + 0.055) / 1.055) ** 0.4
@@ -191,26 +181,26 @@ def linear_excess(encoded: Picture, deviation: npt.ArrayLike) -> Picture:
 
 
 def linear_per_srgb(encoded: Picture) -> Picture:
-    """Return the derivative of linear light by the sRGB value, at sRGB values: what turns their noise into linear."""
+    """Return the derivative of linear light at sRGB values, which turns their noise into linear noise."""
     half = EIGHT_BIT_STEP / 2
     return (srgb_to_linear(encoded + half) - srgb_to_linear(encoded - half)) / EIGHT_BIT_STEP
 
 
 def median_of_seen(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Return the median along the first axis of what is seen; not a number where nothing is."""
+    """Return the median along the first axis of what is seen (not NaN); NaN where nothing is."""
     if not np.isnan(values).any():
         lower, upper = _core.at_ranks(values, ((len(values) - 1) // 2, len(values) // 2))
     else:
-        ordered, count = np.sort(values, axis=0), np.maximum(count_of_seen(values), 1)  # what is not seen comes last
+        ordered, count = np.sort(values, axis=0), np.maximum(count_of_seen(values), 1)  # NaNs come last
         lower, upper = at_rank(ordered, (count - 1) // 2), at_rank(ordered, count // 2)
     return np.asarray((lower + upper) / np.float32(2), np.float32)
 
 
 def count_of_seen(values: npt.NDArray[np.float32]) -> npt.NDArray[np.intp]:
-    """Return how many values along the first axis are seen."""
+    """Return how many values along the first axis are not NaN."""
     return np.asarray(np.count_nonzero(~np.isnan(values), axis=0))
 
 
 def at_rank(ordered: npt.NDArray[np.float32], rank: npt.NDArray[np.intp]) -> npt.NDArray[np.float32]:
-    """Return the value of a rank of each pixel, from 0, of values that are ordered along the first axis."""
+    """Return each pixel's value at its rank, counted from 0, of values ordered along the first axis."""
     return np.asarray(np.take_along_axis(ordered, rank[None], 0)[0])

@@ -1,6 +1,6 @@
 """What a camera sees without smoke: one picture for the whole clip, or one for each frame.
 
-Clips are brought to it here: to its exposure, and to the brightness of light without noise.
+Clips are matched to it here: to its exposure, and without the light that noise adds.
 """
 
 from __future__ import annotations
@@ -31,20 +31,19 @@ from smokelift.footage.noise import (
 )
 
 CLIPPED_LEVEL = np.float32(0.1)
-"""Lasting part of white noise that is clipped at black: so little is known of the mean that is left, since
-it depends on how the file rounds."""
+"""Lasting noise over white noise that is clipped at black, at least: its mean depends on how the file rounds."""
 
 NOISE_FRAMES = 32
-"""Frames on which the noise before a known background is measured: a median needs no more."""
+"""Frames that the noise before a known background is measured on: a median needs no more."""
 
 MIDDLE = np.full(3, 0.5, np.float32)
-"""sRGB values at which it is judged whether noise brightens a clip."""
+"""sRGB values at which the brightening by noise is judged."""
 
 UNCOVERED = 5
-"""Frames whose median is shown where a mask hides all of them."""
+"""Frames whose median is the background where a mask hides all of them."""
 
 NO_NOISE = lasting_noise(0.0)
-"""Noise of a plate before it is measured."""
+"""Noise of a plate until it is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +57,9 @@ class Plate:
     confidence : (rows, columns)
         From 0 (filled from neighbours) to 1 (seen clear in many frames).
     noise
-        Of the camera's pictures.
+        Noise of the clip's pictures.
     errors : (3, 3)
-        Covariance of the colours' errors where it is filled in, linear; 0 if nothing is known of them.
+        Covariance of the linear colour errors where it is filled in; 0 if they are unknown.
     """
 
     image: Picture
@@ -75,12 +74,7 @@ class Plate:
     def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> Plate:
         """Return the plate of a part of the picture, or of a smaller one.
 
-        Parameters
-        ----------
-        cut
-            Makes the part from a picture (rows, columns, ...).
-        pixels
-            Of which each new one is the mean.
+        ``cut`` makes that from a picture (rows, columns, ...); each new pixel is the mean of ``pixels`` old ones.
         """
         return Plate(cut(self.image), cut(self.confidence), self.noise.averaged(pixels), self.errors)
 
@@ -89,14 +83,8 @@ class Plate:
 class ChangingPlate:
     """A background that differs from frame to frame, behind a camera that moves or before a scene that does.
 
-    Attributes
-    ----------
-    of
-        Makes that of a frame of the footage, counted from 0, but for its noise; raises ClipError if it cannot.
-    noise
-        Of the footage.
-    files
-        What it is read from.
+    ``of`` makes a frame's plate, counted from 0, without its noise; it raises ClipError if it cannot. ``noise`` is that
+    of the footage; ``files`` are what the plates are read from.
     """
 
     of: Callable[[int], Plate]
@@ -127,23 +115,11 @@ class Plates(Protocol):
 
 
 def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
-    """Return the plate of a background that is known, with the clip's noise.
+    """Return the plate, with the clip's noise, of a known background.
 
-    Noise that is clipped at black makes a black background brighter on the mean: the plate is as bright.
-
-    Parameters
-    ----------
-    background
-        A linear colour, shape (3,), or a picture, shape (rows, columns, 3), resized to the clip if need be.
-    clip
-        For its size and its noise.
-
-    Raises
-    ------
-    ClipError
-        If a frame cannot be read.
-    ValueError
-        If the background is neither, or not finite.
+    The background is a linear colour (3,), or a picture (rows, columns, 3), resized to the clip if need be. Noise that
+    is clipped at black brightens it on the mean, and the plate with it. ClipError is raised if a frame cannot be read,
+    ValueError if the background is neither or not finite.
     """
     width, height = clip.size
     linear = np.asarray(background, np.float32)
@@ -163,21 +139,10 @@ def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
 
 
 def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
-    """Return the plates of a background that is known frame by frame, with the clip's noise.
+    """Return the plates, with the clip's noise, of a background that is known frame by frame.
 
-    Parameters
-    ----------
-    plates
-        With a frame for every one of the clip's file, resized to the clip if need be.
-    clip
-        Its noise is what differs from the plates.
-
-    Raises
-    ------
-    ValueError
-        If there are too few plates.
-    ClipError
-        If a frame cannot be read.
+    ``plates`` has a frame for each one of the clip's file, resized to the clip if need be. ValueError is raised if
+    there are too few, ClipError if a frame cannot be read.
     """
     last, (width, height) = clip.first + len(clip) - 1, clip.size
     if last >= len(plates):
@@ -195,9 +160,9 @@ def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
 
 
 def _noise_samples(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
-    """How a clip differs from backgrounds that are known, as `noise_about` takes it; NaN where a mask hides it."""
+    """Differences of a clip from known backgrounds, as `noise_about` takes them; NaN where a mask hides it."""
     single, blocks = [], []
-    encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # of a camera that stands still, once
+    encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # once if the plate is always the same
     for number in clip.spread(NOISE_FRAMES):
         plate, stored = plates.at(number), clip.stored(number)
         seen = clip.as_seen(number, stored.linear())
@@ -210,15 +175,15 @@ def _noise_samples(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
 
 
 def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
-    """Return the standard deviation of the noise of each pixel of a linear picture (rows, columns, 3), linear.
+    """Return the standard deviation, linear, of the noise of each value of a linear picture (rows, columns, 3).
 
-    The noise of the plate is even in sRGB values, so that it grows with brightness.
+    The plate's noise is even in sRGB values, so in linear light it grows with brightness.
     """
     return plate.noise.total * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))
 
 
 def evened(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
-    """Return a clip whose frames are all exposed as their backgrounds are; ``known`` are gains (3,) by frame."""
+    """Return a clip exposed as its backgrounds are; ``known`` are gains (3,) by frame that are not measured."""
     gains_of = exposures(plates)
 
     def gains(number: int, shown: Callable[[], Picture]) -> Picture:
@@ -233,8 +198,8 @@ def evened(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingPro
 def without_noise_light(clip: Clip, noise: Noise) -> Clip:
     """Return a clip without the light that its noise adds to means (`linear_excess`).
 
-    A clip that is brightened by less than rounding to 8 bits may do is returned as it is. Before black too little is
-    taken off: the noise is measured where there is no smoke, and there it is clipped.
+    A clip that noise brightens by less than rounding to 8 bits may is returned as it is. Before black too little is
+    taken off: noise is measured where there is no smoke, and there it is clipped.
     """
     if (linear_excess(MIDDLE, noise.total) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
         return clip
@@ -246,7 +211,7 @@ def without_noise_light(clip: Clip, noise: Noise) -> Clip:
 
 
 def cleared(clip: Clip, plates: Plates) -> Clip:
-    """Return a clip that shows its background, as it is exposed, wherever a mask hides a frame."""
+    """Return a clip that shows its background, at each frame's exposure, where a mask hides it."""
     if clip.mask is None:
         return clip
     gains_of = exposures(plates)
@@ -260,9 +225,9 @@ def cleared(clip: Clip, plates: Plates) -> Clip:
 
 
 def uncovered(plates: Plates, clip: Clip) -> Plates:
-    """Return backgrounds that show what a clip shows where a mask hides all of it, if nothing else tells what is there.
+    """Return backgrounds that show what the clip itself shows where a mask hides all frames, if nothing else tells.
 
-    It is no smoke, so it may stand behind the result.
+    That is no smoke, so it may stand behind the result.
     """
     if clip.mask is None or not isinstance(plates, Plate):
         return plates
@@ -282,7 +247,7 @@ def uncovered(plates: Plates, clip: Clip) -> Plates:
 
 
 def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:
-    """Return what tells by how much a frame, by number and `small` picture, is brighter than its background, (3,)."""
+    """Return a function of a frame's number and `small` picture: its gain (3,) against its background."""
 
     @lru_cache(maxsize=1)
     def still(plate: Plate) -> Picture:

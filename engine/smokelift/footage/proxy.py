@@ -1,7 +1,7 @@
-"""A clip in small: what every estimate of its background, its noise and its smoke reads.
+"""A small copy of a clip: every estimate of its background, its noise and its smoke reads it.
 
-The file is decoded once, at frames spread evenly over all of it and over the part that is used, and kept at one size.
-What happens in the rest of the file tells what is behind the smoke of a short part of it.
+The file is decoded once, at frames spread evenly over all of it and over the part in use, and kept at one size. The
+rest of the file may show what is behind the smoke of a short part.
 """
 
 from __future__ import annotations
@@ -23,39 +23,38 @@ from smokelift.footage.mask import Seen
 from smokelift.footage.noise import some_blocks
 
 PROXY_SIDE = 480
-"""Pixels along the longer side: the lengths in pixels of `clear_picture` hold at some hundred
-(docs/experiments/background.md)."""
+"""Pixels along the longer side: lengths in `clear_picture` hold at some hundred (docs/experiments/background.md)."""
 
 FRAMES = 32
-"""Frames of the file, and of the clip, at most: a half of them is enough for a median, a third for a false-alarm rate
-of 1e-3 where every second pair of smoke's samples is alike."""
+"""Largest number of frames of the file, and of the clip. A half is enough for a median, a third for a false-alarm rate
+of 1e-3 if every second pair of smoke's samples is alike."""
 
 MAX_STILL_CHANGE = np.float32(4 / 255)
-"""Change of a pixel, in sRGB values, up to which it has not changed."""
+"""Change in sRGB values up to which a pixel counts as unchanged."""
 
 SAME_SHOT, STEADY = 0.25, 0.5
-"""Share of the pixels that a cut leaves as they are, at most, and that stay so from one frame to the next beside it, at
-least: where a camera moves or smoke fills the picture fewer do, all the time."""
+"""Largest share of the pixels that stay unchanged at a cut, and smallest share from one frame to the next beside it: if
+the camera moves or smoke fills the picture, fewer do all the time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Proxy:
-    """Frames of a clip's file, small.
+    """Small frames of a clip's file.
 
     Attributes
     ----------
     numbers
-        Of the frames, in the file, ascending.
+        The frames' numbers in the file, ascending.
     clip
         First and last frame of the file that the clip uses.
     pictures : (frames, rows, columns, 3)
         Linear; what a mask hides is continued from around it.
     seen : (frames, rows, columns) bool
-        What no mask hides.
+        Pixels that no mask hides.
     blocks
-        Of each frame of the clip: some blocks of its full picture, and where no mask hides them (None without one).
+        For each frame of the clip, `some_blocks` of its full picture, and where no mask hides them (None without one).
     scale
-        Pixels of the file along one of them.
+        Pixels of the file along one pixel here.
     """
 
     numbers: tuple[int, ...]
@@ -67,7 +66,7 @@ class Proxy:
 
     @staticmethod
     def of(clip: Clip) -> Proxy:
-        """Read the frames of a clip's file; ClipError is raised if one of the clip's own cannot be read."""
+        """Read the frames; ClipError is raised if one that the clip uses cannot be read."""
         first, last = clip.first, clip.first + len(clip) - 1
         (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
         pictures, seen, blocks = {}, [], {}
@@ -93,7 +92,7 @@ class Proxy:
         return linear_to_srgb(self.pictures)
 
     def between(self, first: int, last: int) -> Proxy:
-        """Return the frames from one number of the file to another, both included, as even as `FRAMES` of them are."""
+        """Return up to `FRAMES` frames, evenly spread from one number of the file to another, both included."""
         inside = np.array([n for n, number in enumerate(self.numbers) if first <= number <= last])
         numbers = np.array(self.numbers)[inside]
         wanted = np.linspace(numbers[0], numbers[-1], min(FRAMES, len(numbers)))
@@ -101,15 +100,15 @@ class Proxy:
         return self.only(inside[chosen])
 
     def shot(self, clip: Clip) -> tuple[Proxy, tuple[int, int] | None]:
-        """Return the frames that belong to a clip's shot, and the frames of the file before and after a cut in it.
+        """Return the frames of a clip's shot, and the file's frames before and after a cut within the clip, if any.
 
-        At a cut most of the picture changes at once and for good, and little does before and after it.
+        At a cut most of the picture changes at once and for good, while little changes just before and after it.
         """
         tiny = [small(picture) for picture in self.pictures]
         shares = [_alike(one, other) for one, other in pairwise(tiny)]
         first, last, within = self.numbers[0], self.numbers[-1], None
         for n in range(len(shares)):
-            # its own neighbour at either end of the file is itself
+            # at either end of the file a change is its own neighbour
             least = max if n in (0, len(shares) - 1) else min
             beside = least(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
             if shares[n] >= SAME_SHOT or beside < STEADY:
@@ -126,13 +125,13 @@ class Proxy:
         return self.between(first, last), within
 
     def only(self, which: NDArray[np.intp]) -> Proxy:
-        """Return some of the frames, by their places here."""
+        """Return some of the frames, by their indices here."""
         numbers = tuple(self.numbers[n] for n in which)
         return replace(self, numbers=numbers, pictures=self.pictures[which], seen=self.seen[which])
 
     @cached_property
     def evened(self) -> tuple[Proxy, Picture]:
-        """The pictures at one exposure, with the gains (frames, 3) that they had against it."""
+        """The pictures at one exposure, and the gains (frames, 3) that they had."""
         hidden = np.where(self.seen[..., None], self.pictures, np.float32(np.nan))
         gains = sample_gains(np.stack([small(picture) for picture in hidden]))
         if (gains == 1).all():
@@ -141,7 +140,7 @@ class Proxy:
 
 
 def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> tuple[int, int]:
-    """The frames beside a cut between two frames of a clip's file, by bisection."""
+    """The frames on either side of a cut between two frames of a clip's file, by bisection."""
     rows, columns = before.shape[:2]
     whole = clip.whole()
     while first - last > 1:
@@ -155,7 +154,7 @@ def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> 
 
 
 def _alike(one: Picture, other: Picture) -> float:
-    """Share of the pixels that are alike in two pictures, at one exposure if that makes more of them so."""
+    """Share of the pixels that two pictures have alike, at one exposure if that is more."""
     encoded = linear_to_srgb(one)
 
     def share(picture: Picture) -> float:

@@ -1,12 +1,12 @@
 """Clips that are videos.
 
-The container is read once at the start, without decoding, for the times of all frames; after that any frame can be
-had, and frames in a row cost one decode each.
+The container is first read through, without decoding, for the times of all frames. Then any frame can be read, and
+frames in a row cost one decode each.
 
-What a file says about its pictures is honoured: matrix and range through FFmpeg's converter (an untagged video is read
-as BT.601, as FFmpeg writes one), transfer and primaries (`colour`), rotation and mirroring flags, the shape of pixels,
-interlacing (one field of each frame is used), alpha (`layer`). The converter is asked to round exactly: by default
-FFmpeg's is half an 8 bit step too dark.
+What a file says of its pictures is applied: matrix and range by FFmpeg's converter (an untagged video is read as
+BT.601, as FFmpeg writes one), transfer and primaries (`colour`), rotation and mirroring, the shape of pixels,
+interlacing (one field of each frame is used) and alpha. The converter is set to round exactly: by default it is half an
+8 bit step too dark.
 
 A video whose rate varies by more than 1 % is read at its mean rate: frame n is the picture on show at n / fps.
 """
@@ -58,25 +58,25 @@ _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpo
 _GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AREA) | _EXACT
 _FOCAL_LENGTH = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
-"""FFmpeg's own decoders of these leave the alpha channel out."""
+"""Decoders of codecs whose default decoder in FFmpeg leaves the alpha channel out."""
 
 BEYOND_ALPHA = 0.02
-"""Share of white by which colours may exceed alpha through rounding and compression."""
+"""Share of white by which rounding and compression may make colours exceed alpha."""
 
 SQUARE = 0.01
-"""Difference from 1 of the shape of pixels that is not worth another grid of pixels: half a pixel in fifty."""
+"""Largest difference of a pixel's shape from 1 that is ignored: half a pixel in fifty."""
 
 QUANTISED_FRAMES = 21
-"""Frames at the start of a file whose quantisers are read: their median needs no more."""
+"""Frames at a file's start whose quantisers are read: their median needs no more."""
 
 
 class Video:
-    """One video stream with an index of the times of its frames; a `FrameSource`.
+    """One video stream with an index of its frames' times; a `FrameSource`.
 
-    ``_times`` are the frames' presentation times in the stream's time base, in order; ``_keys`` those where
-    decoding can start; ``_shown`` maps a frame of the clip to one of them. Containers without presentation
-    times (raw streams, some AVI) have no keys: they are decoded once to count, which gives their times, and then only
-    forward.
+    ``_times`` are the frames' presentation times in the stream's time base, in order; ``_keys`` are those where
+    decoding can start; ``_shown`` maps a frame of the clip to an index into ``_times``. A container without such times
+    (raw streams, some AVI) has no keys: it is decoded once to count its frames, whose numbers are their times, and then
+    only forward.
     """
 
     def __init__(self, path: Path, transfer: Transfer | None) -> None:
@@ -90,8 +90,8 @@ class Video:
             raise ClipError(f"{path}: is a folder; for pictures give a pattern such as {path}/frame_####.png")
         if not path.is_file():
             raise ClipError(f"{path}: is a pipe or a device, which cannot be read twice; save it as a file")
-        self._failed = False  # whether decoding has
-        self._lost: set[int] = set()  # indices into _times of what is known to be damaged, lest it is tried again
+        self._failed = False  # whether any decoding has failed
+        self._lost: set[int] = set()  # indices into _times of damaged frames, not to be tried again
         self._keys: list[int] = []
         self._start()
         self._times, broken = self._index()
@@ -110,11 +110,11 @@ class Video:
 
     @property
     def notes(self) -> tuple[Remark, ...]:
-        """How the pictures are read, as far as they have been."""
+        """How the pictures are read, as far as they have been, where that is unusual."""
         return (*self._format, Remark("interlaced clip")) if self._interlaced else self._format
 
     def read(self, n: int) -> StoredPicture:
-        """Return a frame, or raise `DamagedFrameError`."""
+        """Return a frame; raise `DamagedFrameError` if it cannot be decoded."""
         frame = self._decode(self._shown[n])
         if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
             return StoredPicture(shown_before(self._layer(frame), self.backdrop))
@@ -123,9 +123,9 @@ class Video:
         return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded."""
+        """Return the frames from one to another, both included, that cannot be decoded."""
         if not self._keys:
-            return ()  # they were counted by decoding them
+            return ()  # only frames that decode were counted
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
         from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._seek(wanted[0])
@@ -153,14 +153,14 @@ class Video:
         except ClipError:
             self._container.close()
             raise
-        # A decoder of several frames at once takes sound ones along when one fails.
+        # a decoder of several frames at once loses sound ones with the one that fails
         self._stream.thread_type = "SLICE" if self._failed else "AUTO"
         decoder = _ALPHA_DECODERS.get(self._stream.codec_context.name)
         self._decoder: Any = self._stream.codec_context
         if decoder is not None and self._stream.metadata.get("alpha_mode") == "1":
             self._decoder = av.CodecContext.create(av.Codec(decoder, "r"), "r")
         self._decoded = self._frames()
-        self._next = 0  # index into _times of the frame that decoding on will give
+        self._next = 0  # index into _times of the frame that is decoded next
 
     def _usable_stream(self) -> VideoStream:
         if not self._container.streams.video:
@@ -175,7 +175,7 @@ class Video:
         return stream
 
     def _frames(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
-        """Decode on from where the container stands: times and frames, without what cannot be decoded."""
+        """Decode times and frames from where the container stands; what cannot be decoded is left out."""
         packets = self._container.demux(self._stream)
         count = 0
         while True:
@@ -193,7 +193,7 @@ class Video:
                 count += 1
 
     def _index(self) -> tuple[list[int], bool]:
-        """Return the times of all frames, and whether the file broke off; keep those of the key frames."""
+        """Return the times of all frames, and whether the file breaks off; keep the times of key frames."""
         times, keys, seen, broken = set(), [], 0, False
         try:
             for packet in self._container.demux(self._stream):
@@ -216,16 +216,16 @@ class Video:
         return sorted(times) if keys else list(range(len(times))), broken
 
     def _promised(self) -> int:
-        """Return how many frames the file says it holds; 0 if it does not say."""
+        """Return how many frames the file says it holds, 0 if it says nothing."""
         stream, length = self._stream, self._container.duration
         if stream.frames or stream.duration is not None or length is None or stream.average_rate is None:
             return stream.frames
-        # Matroska counts no frames, but knows how long the whole is, give or take one. Sound may last longer.
+        # Matroska gives no count, only the length of the whole, to a frame; sound may last longer
         alone = len(self._container.streams) == 1
         return int(length * stream.average_rate / av.time_base) - 1 if alone else 0
 
     def _counted(self) -> list[int]:
-        """Return made-up times, by decoding everything, for a container that has none."""
+        """Return the frames' numbers as times for a container without times; decode all to count them."""
         self._rewind()
         count = sum(1 for _ in self._decoded)
         self._rewind()
@@ -236,7 +236,7 @@ class Video:
         self._start()
 
     def _drop_undecodable_end(self) -> None:
-        """Cut the index after the last frame that decodes, reading the end only."""
+        """Cut the index after the last frame that decodes; only the end is read."""
         while self._times:
             try:
                 self._decode(len(self._times) - 1)
@@ -245,7 +245,7 @@ class Video:
                 self._times.pop()
 
     def _steady(self) -> tuple[float, list[int]]:
-        """Return the frame rate and, for each frame of the clip, the decoded frame that it shows."""
+        """Return the frame rate and, for each frame of the clip, the index into ``_times`` of what it shows."""
         count = len(self._times)
         base = self._stream.time_base
         rate = float(self._stream.average_rate or self._stream.guessed_rate or 0)
@@ -253,7 +253,7 @@ class Video:
             return rate or DEFAULT_FPS, list(range(count))
         gaps = np.diff(np.array(self._times, np.float64))
         mean = (self._times[-1] - self._times[0]) / (count - 1)
-        # Times are whole ticks: a gap may be off by one without the rate being another (Matroska: 1 ms).
+        # times are whole ticks (1 ms in Matroska): at a steady rate, gaps may still differ by one
         if np.abs(gaps - mean).max() <= max(0.01 * mean, 1.0):
             steady = 1.0 / (mean * float(base))
             return rate if abs(rate - steady) < 0.01 * steady else steady, list(range(count))
@@ -262,7 +262,7 @@ class Video:
         return float(Fraction(1) / (Fraction(mean) * base)), shown
 
     def _described(self) -> tuple[Remark, ...]:
-        """How the file's format is read."""
+        """Remarks on how the file's format is read."""
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
         notes = [Remark("varying frame rate", {"fps": self.fps})] * self._varies
@@ -275,7 +275,7 @@ class Video:
         return tuple(notes)
 
     def _decode(self, index: int) -> av.VideoFrame:
-        """Return the decoded frame at an index into ``_times``."""
+        """Return the frame at an index into ``_times``, decoded."""
         frame = None if index in self._lost else self._found(index)
         if frame is None:
             self._rewind()
@@ -287,20 +287,20 @@ class Video:
         return frame
 
     def _found(self, index: int) -> av.VideoFrame | None:
-        """The decoded frame, by the shortest way; None if it is damaged."""
+        """The decoded frame, by the shortest way, or None if it is damaged."""
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
         if reached is None or wanted < reached or any(reached < key <= wanted for key in self._keys):
             self._seek(wanted)
         frame = self._forward_to(wanted)
         if frame is None:
-            # A seek may land late (open groups of pictures); from the start nothing can be missed.
+            # a seek may land late (open groups of pictures); from the start nothing is missed
             self._rewind()
             frame = self._forward_to(wanted)
         return frame
 
     def _seek(self, wanted: int) -> None:
-        """Go to the last key frame at or before a time; to the start where there are none."""
+        """Go to the last key frame at or before a time, or to the start if there are no keys."""
         if not self._keys:
             self._rewind()
             return
@@ -314,7 +314,7 @@ class Video:
         return None
 
     def _good_times(self, last: int) -> set[int]:
-        """Times of the frames that can be decoded from where the container stands, up to one."""
+        """Times of the frames that can be decoded from where the container stands up to a last one."""
         good = set()
         for time, frame in self._decoded:
             if time is not None and not frame.is_corrupt:
@@ -324,7 +324,7 @@ class Video:
         return good
 
     def _matted(self) -> float | None:
-        """Find out how alpha is meant, and what is shown behind it; None if there is none."""
+        """Find out whether colours are premultiplied; return the grey to show them over, None without alpha."""
         frames = []
         for frame in sound_samples(self.count, lambda n: self._decode(self._shown[n])):
             if not _has_alpha(frame):
@@ -334,20 +334,20 @@ class Video:
         return backdrop_of(map(self._layer, frames))
 
     def _size(self) -> tuple[int, int]:
-        """Return width and height of the pictures that are read, as stored: pixels are square."""
+        """Return the width and height that pictures are read at, before they are turned: pixels are square."""
         shape = self._stream.sample_aspect_ratio or Fraction(1)
         square = abs(shape - 1) <= SQUARE
         return readable_size(self._stream.width * (1 if square else Fraction(shape)), self._stream.height)
 
     def _encoding(self) -> Encoding | None:
-        """How the codes stand for light; None is sRGB."""
+        """The encoding of the codes; None is sRGB."""
         return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
 
     def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
-        """RGB, and alpha if there is any, in codes, as stored."""
+        """RGB, and alpha if there is any, in codes, not yet turned upright."""
         wide = max(component.bits for component in frame.format.components) > 8
         alpha = _has_alpha(frame)
-        # FFmpeg writes planes three times as fast as it writes pixels, of the same codes
+        # FFmpeg writes planes three times as fast as pixels, with the same codes
         planes = not (wide or alpha or frame.format.is_rgb)
         layout = {False: ("rgb24", "rgba"), True: ("rgb48le", "rgba64le")}[wide][alpha]
         width, height = self._stream.width, self._stream.height
@@ -360,7 +360,7 @@ class Video:
         if frame.interlaced_frame:
             self._interlaced, shown = True, self._of_one_moment(frame)
         way = _SHRINKING if size[0] < width else _GROWING
-        # in this thread: after a fork of a process that has read a video, the converter waits for its own for ever
+        # in this thread: after a fork of a process that has read a video, the converter waits forever for its own
         converted = shown.reformat(*size, "gbrp" if planes else layout, interpolation=way, threads=1)
         if planes:
             green, blue, red = (_lines(plane) for plane in converted.planes)
@@ -376,7 +376,7 @@ class Video:
         return picture, None if alpha is None else _upright(alpha, frame)
 
     def _of_one_moment(self, frame: av.VideoFrame) -> av.VideoFrame:
-        """The even lines of an interlaced frame, with others between them."""
+        """The even lines of an interlaced frame, with the lines between interpolated."""
         graph = Graph()
         nodes = graph.add_buffer(self._stream), graph.add("estdif", "mode=frame:parity=tff"), graph.add("buffersink")
         graph.link_nodes(*nodes)
@@ -392,7 +392,7 @@ def _has_alpha(frame: av.VideoFrame) -> bool:
 
 
 def _is_premultiplied(frame: av.VideoFrame) -> bool:
-    """Whether colours are multiplied by alpha: none is brighter than white multiplied by it in linear light."""
+    """Whether colours are premultiplied: none is brighter than white times alpha in linear light."""
     pixels = frame.reformat(format="rgba", threads=1).to_ndarray() / np.float32(255)
     return bool((srgb_to_linear(pixels[..., :3]) <= pixels[..., 3:] + np.float32(BEYOND_ALPHA)).all())
 
@@ -404,24 +404,24 @@ def _lines(plane: VideoPlane) -> npt.NDArray[np.uint8]:
 
 
 def _white(frame: av.VideoFrame) -> float:
-    """Return what FFmpeg's converter makes of white, as a share of the largest value: it only shifts wide codes up."""
+    """Return FFmpeg's white as a share of the largest code: the converter only shifts wide codes up."""
     bits = max(component.bits for component in frame.format.components)
     if bits <= 8 or bits >= 16 or frame.format.is_rgb:
         return 1.0
-    grey = len(frame.format.components) < 3  # read as of full range, whatever it says
+    grey = len(frame.format.components) < 3  # always read as full range
     limited = frame.color_range != ColorRange.JPEG and not grey
     return 255 / 256 if limited else (2**bits - 1) * 2 ** (16 - bits) / 65535
 
 
 def _side_data(frame: av.VideoFrame, kind: SideData) -> Any:
-    sides: Any = frame.side_data  # PyAV's stub of it knows motion vectors only
+    sides: Any = frame.side_data  # PyAV's stub knows motion vectors only
     return sides.get(kind)
 
 
 def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]:
-    """Turn and mirror a picture as its display matrix says; angles other than quarter turns are ignored.
+    """Turn and mirror a picture as its display matrix says; other than quarter turns are ignored.
 
-    The matrix sends the stored column p and row q to the shown column a p + c q and row b p + d q.
+    The matrix maps the stored column p and row q to the shown column a p + c q and row b p + d q.
     """
     side = _side_data(frame, SideData.DISPLAYMATRIX)
     if side is None:
@@ -433,7 +433,7 @@ def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]
 
 
 def _unreadable(path: Path, error: Exception | None) -> ClipError:
-    """Why FFmpeg cannot open a file, or finds no video in it, and what to do where that is known."""
+    """Why FFmpeg cannot open a file or finds no video in it, and what to do if that is known."""
     if path.stat().st_size == 0:
         return ClipError(f"{path}: is empty; copy or export it again")
     if lacks_index(path):
@@ -447,9 +447,9 @@ def _unreadable(path: Path, error: Exception | None) -> ClipError:
 
 
 def lacks_index(path: Path) -> bool:
-    """Return whether a file is an MP4 or QuickTime one without its whole index, as a recording that was cut short is.
+    """Return whether an MP4 or QuickTime file lacks its whole index, as a recording that was cut short does.
 
-    Such a file is a row of boxes: eight bytes with size and name, and what it holds (ISO/IEC 14496-12, 4.2).
+    Such a file is a row of boxes: eight bytes of size and name, then the content (ISO/IEC 14496-12, 4.2).
     """
     with path.open("rb") as file:
         if file.read(8)[4:] != b"ftyp":
@@ -470,10 +470,10 @@ def lacks_index(path: Path) -> bool:
 
 
 def median_quantiser(path: Path) -> float | None:
-    """Return the median of the mean quantisers of a video's first frames, 0 to 51; None where the file gives none.
+    """Return the median of the mean quantisers, 0 to 51, of a video's first frames; None if it gives none.
 
-    They say how strongly a video is compressed: an encoder leaves a block as it was where it differs by less than the
-    quantiser's step, which doubles every six. Those of H.264 are read; other codecs have other scales.
+    It tells how strongly a video is compressed: an encoder leaves a block unchanged where it differs by less than the
+    quantiser's step, which doubles every six. Only H.264 is read; other codecs have other scales.
     """
     try:
         with open_container(path) as container:
@@ -484,6 +484,6 @@ def median_quantiser(path: Path) -> float | None:
             frames = islice(container.decode(stream), QUANTISED_FRAMES)
             sides = [_side_data(frame, SideData.VIDEO_ENC_PARAMS) for frame in frames]
             means = [float(side.qp_map().mean()) for side in sides if side is not None]
-    except (av.FFmpegError, ValueError, RuntimeError):  # the last if the blocks do not cover the frame
+    except (av.FFmpegError, ValueError, RuntimeError):  # RuntimeError: the blocks do not cover the frame
         return None
     return float(np.median(means)) if means else None

@@ -1,4 +1,4 @@
-"""The working picture: a frame cropped to the domain and downsampled to about one pixel a voxel."""
+"""The working picture: a frame cropped to the domain and reduced to about one pixel a voxel."""
 
 from __future__ import annotations
 
@@ -15,14 +15,9 @@ from smokelift.scene.projection import project_points, voxel_width
 
 @dataclass(frozen=True)
 class WorkingPicture:
-    """The part of the camera's picture that the domain covers, at a resolution that fits the grid.
+    """The part of a camera's picture that the domain covers, at the grid's resolution.
 
-    Attributes
-    ----------
-    camera
-        Camera of the small picture.
-    left, top, width, height
-        The part of the full picture, in its pixels.
+    ``camera`` is that of the working picture; the other attributes are its place in the full picture, in full pixels.
     """
 
     camera: Camera
@@ -33,38 +28,38 @@ class WorkingPicture:
 
     @property
     def pixels(self) -> float:
-        """Pixels of the full picture of which each small one is the mean."""
+        """Number of full pixels that each small one is the mean of."""
         columns, rows = self.camera.size
         return self.width * self.height / (columns * rows)
 
     def resized(self, columns: int, rows: int) -> WorkingPicture:
-        """Return the picture of the same part with another number of pixels."""
+        """Return the same part at another number of pixels."""
         return replace(self, camera=self.camera.resized(columns, rows))
 
     def part(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the part of a full picture (rows, columns, ...), at its own resolution."""
+        """Return the part of a full picture (rows, columns, ...) at its own resolution."""
         return picture[self.top : self.top + self.height, self.left : self.left + self.width]
 
     def cut(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the small picture, averaged over areas of a full one (rows, columns, ...)."""
+        """Return the working picture of a full one (rows, columns, ...)."""
         columns, rows = self.camera.size
         return area_average(self.part(picture), columns, rows)
 
     def of(self, clip: Clip, number: int) -> Picture:
-        """Return the small picture of a clip's frame."""
+        """Return the working picture of a clip's frame."""
         return clip.stored(number).cut(self.part).averaged(*self.camera.size)
 
 
 class CameraError(ValueError):
-    """The camera does not see the domain."""
+    """A camera that does not see the domain."""
 
 
 def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
     """Return the picture that a grid is fitted to.
 
     A pixel is as wide as a voxel at the domain's centre, unless the footage is coarser: finer pixels hold detail that
-    the grid cannot show, and coarser ones lose detail that it can. CameraError is raised if no part of the domain is in
-    the picture.
+    the grid cannot show, coarser ones lose detail that it can. CameraError is raised if the picture shows no part of
+    the domain.
     """
     corners = domain.corners()
     pixels, depth = project_points(camera, corners)
