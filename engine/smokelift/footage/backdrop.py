@@ -43,7 +43,7 @@ MOSTLY = 0.5
 """Mean share of the picture in one colour from which on that colour is no texture that passes by."""
 
 MIN_KNOWN = 0.1
-"""Smallest share of a picture seen clear that tells a background: public clips have .2 and more (docs/clips.md)."""
+"""Smallest share of a picture that must be seen clear: public clips before one show .2 and more (docs/clips.md)."""
 
 SEEN_OFTEN = 0.15
 """Share of the blocks of all frames in one colour from which on that colour is no texture that passes by. Public clips

@@ -7,7 +7,7 @@ but a few objects. A picture has its own colour in each block, which costs as mu
 likely in either.
 
 A frame that is black everywhere says nothing against a picture, since clips fade. All frames of the file up to the next
-cut count, whatever part of it is used.
+cut decide, whatever part of it is used.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ OBJECT = 0.1
 blocks. Public clips before one colour have up to .02 (docs/clips.md)."""
 
 MIN_SHOWN_SHARE = 0.25
-"""Smallest share of the blocks that show the one colour at some time."""
+"""Smallest share of the blocks that must show the one colour at some time."""
 
 MIN_STILL_SHARE = 0.9
 """Smallest share of the frames in which an object is within half of the limit of its median: smoke wavers more."""

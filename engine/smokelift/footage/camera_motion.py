@@ -1,4 +1,4 @@
-"""Whether the camera of a clip moves: where its frames show the texture of the middle one again.
+"""Whether the camera of a clip moves: the texture of the middle frame is searched in every other one.
 
 Both pictures are band-passed, brought to one contrast, cut into cells and correlated. If the camera stands still, all
 cells are in place but the few that smoke covers; if it shakes, pans, zooms or travels, nearly all are found elsewhere.
@@ -19,7 +19,7 @@ MIN_CONTRAST = 4 / 255
 """Contrast in sRGB values below which there is more noise or fog than texture (docs/experiments/turning-camera.md)."""
 
 CELLS = 6
-"""Cells along the picture's longer side; more of them between these overlap by half."""
+"""Cells side by side along the picture's longer side; the cells between these overlap them by half."""
 
 HALF = 0.5
 """Share of a cell's variance that must be texture; correlation at which it is found again; and share of the frames in

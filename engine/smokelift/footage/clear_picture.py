@@ -3,14 +3,14 @@
 A pixel is clear, and has one value within the noise, or it is smoke, and has any. Two facts tell them apart:
 
 - A clear pixel stays; smoke goes on. How often two successive frames of smoke are alike by chance is measured on the
-  pixel. A value that it keeps for so many pairs of frames that smoke would with a probability below `FALSE_ALARM` only
-  is its background, or smoke as steady as one.
+  pixel. If smoke would keep a value for so many pairs of frames with a probability below `FALSE_ALARM` only, that value
+  is the pixel's background, or smoke as steady as one.
 - Smoke moves every background towards its own brightness. So of several such values, the one farthest from the smoke's
   is the background.
 
 A pixel that only drifts is clear as well if it is like its surroundings, or so unlike them that smoke would change it
-more. All else is continued smoothly from around it; its detail is that of the frames' mean, with the contrast that
-smoke takes restored. How wrong that is, is measured where the background is known.
+more. All else is continued smoothly from around it; its detail is that of the frames' mean, and the contrast that smoke
+takes from that is restored. The error is measured where the background is known.
 
 Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
 whole frames.
@@ -49,8 +49,8 @@ MIN_ALIKE_SHARE = 0.8
 """Share of like values of a pixel above which they are its background for certain."""
 
 MIN_SEEN_SHARE = 1 / 8
-"""Smallest share of the frames that show a pixel if its like values are to be its background: a camera that turns shows
-some for a moment only."""
+"""Smallest share of the frames that must show a pixel for like values to be its background: a camera that turns shows
+some pixels for a moment only."""
 
 ONE_SIDED = 0.9
 """Share of the changes to one side from which on smoke only brightens, or only darkens; the rest is noise."""
@@ -154,7 +154,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:
-    """Difference (rows, columns) of a linear picture from the known continued there, in grey sRGB values."""
+    """Difference (rows, columns) of a linear picture from its known part, continued, in grey sRGB values."""
     encoded = linear_to_srgb(image)
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
@@ -180,7 +180,7 @@ def _smoke_of(grey: Picture, window: float) -> _Smoke:
     number = count_of_seen(values)
     certain = (counts.max(0) > MIN_ALIKE_SHARE * number) & (number >= MIN_SEEN_SHARE * len(values))
     behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
-    # at certain pixels, a change as small as a codec's drift says nothing of smoke
+    # where the background is certain, a change as small as a codec's drift says nothing of smoke
     beyond = 0.5 * window + DRIFT
     change = np.where((np.abs(away) > beyond) & certain, away, 0.0)
     turn = _turn(background, change)
@@ -216,7 +216,7 @@ def _clear_values(
 ) -> tuple[Picture, Mask, Mask, Mask]:
     """The linear background of each pixel; whether it is certain; whether it only drifts; the frames that show it.
 
-    An uncertain background is the least smoky value, that of a pixel that drifts the median. ``away`` is the pictures'
+    An uncertain background is the least smoky value; that of a drifting pixel is the median. ``away`` is the pictures'
     grey value, negated where smoke darkens: the lower, the clearer.
     """
     unseen, number = np.isnan(away), count_of_seen(away)
@@ -314,7 +314,7 @@ def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -
 
 
 def spread_out(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """Return values (rows, columns) repeated at the pixels of a picture of a ``size``, width and height."""
+    """Return values (rows, columns) of small pixels, repeated over a picture of a size (width, height)."""
     rows, columns = (np.diff(_edges(*sizes)) for sizes in zip(values.shape, size[::-1], strict=True))
     return np.repeat(np.repeat(values, rows, axis=0), columns, axis=1)
 

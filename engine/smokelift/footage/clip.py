@@ -284,7 +284,7 @@ class Clip:
 
 
 def _kept(pictures: Kept, most: int, read: Read, n: int) -> StoredPicture:
-    """A picture, read-only from now on, of those kept or else read; the last ones are kept, up to ``most`` bytes."""
+    """A picture, kept or else read, made read-only; the latest ones are kept, up to ``most`` bytes."""
     image = pictures.pop(n) if n in pictures else read(n)
     image.values.flags.writeable = False
     pictures[n] = image

@@ -80,8 +80,8 @@ def firelight(clip: Clip, doused: Clip) -> Clip:
 def fire_colour(clip: Clip, light: Clip) -> Vector:
     """Return the colour of a clip's `firelight`, the largest of red, green and blue 1; the light must not be all zero.
 
-    It is the mean over pixels that are not clipped (over all if all are), weighted by the light's brightness: smoke
-    mistaken for fire is evenly bright.
+    It is the mean over pixels that are not clipped (over all if all are), weighted by the light's brightness, since
+    smoke mistaken for fire is as bright everywhere.
     """
     whole, certain = np.zeros(3), np.zeros(3)
     for number in clip.spread(COLOUR_FRAMES):

@@ -46,7 +46,7 @@ class DamagedFrameError(ClipError):
 
 @dataclass(frozen=True, eq=False)
 class StoredPicture:
-    """A picture as its file stores it: 8 bit codes take a quarter of the memory of linear values.
+    """A picture in linear values, or in codes for them: 8 bit codes take a quarter of the memory.
 
     ``values`` (rows, columns, 3) are linear float32, or uint8 or uint16 codes, row 0 at the top. ``table`` (n,) float32
     is the linear value of each code, None if the values are linear.

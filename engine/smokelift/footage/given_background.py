@@ -16,7 +16,7 @@ are a nozzle, a floor, a logo."""
 
 
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
-    """Open a clean plate that changes from frame to frame as a clip; None if it does not change.
+    """Open a clean plate as a clip if it changes from frame to frame; else return None.
 
     Its frames are counted as those of the clip's file. If the camera moves, a numbered picture stands for the sequence
     that it begins, else for itself. ClipError is raised if the plate cannot be read.

@@ -1,11 +1,11 @@
 """Garbage mattes: pictures that are white where a clip may show smoke, and black where it shows none.
 
 A mask hides what is neither smoke nor anything to learn from: a head, a dog, leaves, a label. Every frame is continued
-over it from around, so that whole pictures hold nothing that moves there, and no edge that stays. Counts of pixels
-leave it out (`Clip.seen`). Once the background is known, it stands there instead (`plate.cleared`).
+there from around it, so that whole pictures hold nothing that moves, and no edge that stays. Counts of pixels leave it
+out (`Clip.seen`). Once the background is known, it takes that place (`plate.cleared`).
 
 A pixel is hidden or not: the mask's stored value counts as black or white, whichever is nearer. Soft edges have no
-meaning: a frame that shows only a part of its smoke would be taken for one of less dense smoke.
+meaning: a frame that shows only a part of its smoke would be taken for one of thinner smoke.
 """
 
 from __future__ import annotations

@@ -118,8 +118,8 @@ def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
     """Return the plate, with the clip's noise, of a known background.
 
     The background is a linear colour (3,), or a picture (rows, columns, 3), resized to the clip if need be. Noise that
-    is clipped at black brightens it on the mean, and the plate with it. ClipError is raised if a frame cannot be read,
-    ValueError if the background is neither or not finite.
+    is clipped at black brightens a black one on the mean, and so its plate. ClipError is raised if a frame cannot be
+    read, ValueError if the background is neither or not finite.
     """
     width, height = clip.size
     linear = np.asarray(background, np.float32)
