@@ -131,7 +131,7 @@ def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: f
 def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
     """Read a PNG, JPEG, EXR or HDR file, whose suffix says which, as a linear picture (height, width, 3).
 
-    Without a ``transfer``, PNG and JPEG are sRGB, EXR and HDR linear. The picture is an EXR's display window.
+    Without a ``transfer``, PNG and JPEG are sRGB, EXR and HDR linear. Of an EXR, the display window is read.
     ImageError, with the path, is raised if there is no such file, or it is damaged or of another kind.
     """
     return read_layer(path, transfer)[0]
@@ -159,7 +159,7 @@ def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Pict
 
 
 def readable_size(width: int | Fraction, height: int) -> tuple[int, int]:
-    """Return the width and height that a clip's pictures are read at: whole parts, up to `MAX_PICTURE_SIDE`."""
+    """Return the width and height to read a clip's pictures at: divided by a whole number to fit `MAX_PICTURE_SIDE`."""
     divisor = -(-max(round(width), height) // MAX_PICTURE_SIDE)
     return max(1, round(width / divisor)), max(1, round(height / divisor))
 
@@ -179,7 +179,7 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
 
     FFmpeg would take a path that looks like a URL for one, and fetch it. ``form`` is FFmpeg's name of the format, by
     default what the content shows; ``options`` are that format's. av.FFmpegError or ValueError is raised if the file is
-    damaged or of no format that FFmpeg knows, MemoryError if hardly any memory is left: PyAV would end the process.
+    damaged or of no format that FFmpeg knows, MemoryError if memory is nearly full, where PyAV would end the process.
     """
     bytes(OPENING_BYTES)  # freed at once, untouched: Python raises an error if memory lacks, PyAV does not
     container: InputContainer = av.open(
@@ -244,7 +244,7 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
             _require_size(path, _window(part, name)[1])
     with _silent():
         parts = OpenEXR.File(str(path), separate_channels=True).parts
-    if not parts:  # the library says so that pixels are damaged
+    if not parts:  # so the library reports damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
     part = parts[0]
     ((left, top), (width, height)), ((x0, y0), _) = (_window(part, name) for name in ("displayWindow", "dataWindow"))
@@ -286,7 +286,7 @@ def reduced_size(width: int, height: int, side: float) -> tuple[int, int]:
 
 
 def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
-    """Resize a picture (rows, columns) or (rows, columns, channels): every new pixel is the mean of its area.
+    """Resize a picture (rows, columns) or (rows, columns, channels): a new pixel is the mean of the area it covers.
 
     An axis that grows is interpolated linearly. ValueError is raised if a size is below 1.
     """

@@ -31,7 +31,7 @@ from smokelift.footage.noise import (
 )
 
 CLIPPED_LEVEL = np.float32(0.1)
-"""Lasting noise over white noise that is clipped at black, at least: its mean depends on how the file rounds."""
+"""Smallest lasting noise over white noise clipped at black, whose mean depends on how the file rounds."""
 
 NOISE_FRAMES = 32
 """Frames that the noise before a known background is measured on: a median needs no more."""
@@ -247,7 +247,7 @@ def uncovered(plates: Plates, clip: Clip) -> Plates:
 
 
 def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:
-    """Return a function of a frame's number and `small` picture: its gain (3,) against its background."""
+    """Return what gives the gain (3,) of a frame, by number and `small` picture, against its background."""
 
     @lru_cache(maxsize=1)
     def still(plate: Plate) -> Picture:
