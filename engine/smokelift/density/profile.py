@@ -46,7 +46,7 @@ PROFILE_CUT = 0.03
 how far its width may be wrong (docs/experiments/every-view.md)."""
 
 ROOM = 0.5
-"""Distance, in A, of a ray's middle from the ends of a domain that holds all smoke: about four fifths of the profile
+"""Distance, in A, of a ray's middle from the ends of its way through the domain: about four fifths of the profile
 are inside then (docs/experiments/inside-box.md)."""
 
 SILHOUETTE = 0.05
@@ -237,7 +237,7 @@ class DepthProfile:
         return np.asarray(np.maximum(spread, self._domain.voxel_size))
 
     def _kept_inside(self, aside: NDArray[np.float32]) -> NDArray[np.float32]:
-        """How far (m) behind the axis each pixel's smoke has its middle (rows, columns) if all of it is inside.
+        """How far (m) behind the axis each pixel's smoke has its middle (rows, columns), kept inside the domain.
 
         ``aside`` (rows, columns) is the same without regard to the domain's ends.
         """

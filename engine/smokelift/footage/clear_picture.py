@@ -269,7 +269,7 @@ def _completed(
     contrast = smooth.mean(-1) - brightness
     seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > MIN_CONTRAST, contrast, np.inf)
     detail = mean - coarse
-    most = np.quantile(np.abs(detail[known]), DETAIL_QUANTILE, axis=0) if known.any() else np.zeros(3, np.float32)
+    most = _most_detail(detail, known)
     passed = np.clip(seen, MIN_TRANSMITTANCE, 1)
     detail = np.clip(detail / passed[..., None], -most, most)
     filled = smooth + np.where(seen > MIN_TRANSMITTANCE, 1, 0)[..., None] * detail
@@ -280,6 +280,11 @@ def _completed(
     filled = srgb_to_linear(np.maximum(filled, 0))
     contrast = np.where(known, 1, np.where(seen > MIN_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
     return np.where(known[..., None], image, filled), contrast
+
+
+def _most_detail(detail: Picture, known: Mask) -> Picture:
+    """The largest usual detail (3,) where the picture is known: what is continued has no more."""
+    return np.quantile(np.abs(detail[known]), DETAIL_QUANTILE, axis=0) if known.any() else np.zeros(3, np.float32)
 
 
 def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -> Picture:
@@ -306,7 +311,7 @@ def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -
     mean = linear_to_srgb(whole[part])
     detail = mean - area_average(area_average(mean, right - left, down - top), *size)
     clearly = spread_out(known, clip.size)[part]
-    most = np.quantile(np.abs(detail[clearly]), DETAIL_QUANTILE, axis=0) if clearly.any() else np.zeros(3, np.float32)
+    most = _most_detail(detail, clearly)
     detail = np.clip(detail * spread_out(found.contrast, clip.size)[part][..., None], -most, most)
     filled = srgb_to_linear(np.maximum(area_average(linear_to_srgb(found.image[small]), *size) + detail, 0))
     whole[part] = np.where(clearly[..., None], whole[part], filled)

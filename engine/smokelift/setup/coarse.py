@@ -23,7 +23,7 @@ from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image, Optics, scene_optics
-from smokelift.scene import Camera, CompleteScene, Domain, Light, Scattering
+from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.shot import ShotView
 
@@ -76,10 +76,6 @@ class CoarseFrame:
     number: int
     scene: CompleteScene
     views: tuple[CoarseView, ...]
-
-    def lit_by(self, lights: tuple[Light, ...]) -> CoarseFrame:
-        """The frame with other lights."""
-        return replace(self, scene=replace(self.scene, lights=lights))
 
 
 def coarse_frames(views: Sequence[ShotView], numbers: Sequence[int], scene: CompleteScene) -> tuple[CoarseFrame, ...]:

@@ -20,9 +20,9 @@ SHAPE = (24, 24, 32)
 
 @pytest.fixture(scope="module")
 def shot(plume, tmp_path_factory) -> Iterator[Shot]:
-    """A column with stripes along its height."""
+    """A column with stripes along its height, which ends above the floor and below the ceiling."""
     x, y, z = np.meshgrid(*(np.arange(n) + 0.5 - n / 2 for n in SHAPE), indexing="ij")
-    column = np.exp(-((np.hypot(x, y) / 6) ** 4) - (z / 12) ** 4)
+    column = np.exp(-((np.hypot(x, y) / 6) ** 4) - (z / 8) ** 4)
     moments = [(0.2 * column * (1.5 + np.sin(z + n))).astype(np.float32) for n in range(3)]
     scene = plume.write(tmp_path_factory.mktemp("striped"), moments)
     with Clip.open(scene.clip) as clip:
@@ -79,7 +79,7 @@ def test_a_wide_blur_on_coarser_grids_is_about_the_same(shot, deviation: float) 
             lambda values: fine.blurred(values, deviation),
         )
     )
-    np.testing.assert_allclose(seen, wanted, rtol=0.05)
+    np.testing.assert_allclose(seen, wanted, rtol=0.03)
 
 
 def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -> None:

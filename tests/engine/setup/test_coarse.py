@@ -82,7 +82,7 @@ def test_the_right_light_and_model_leave_the_least(blob, draft) -> None:
 def test_a_light_of_another_colour_is_asked_to_change(blob, draft) -> None:
     (sun,) = blob.scene.lights
     red, green, blue = sun.irradiance
-    tinted = blob.lit_by((replace(sun, irradiance=(red, green, 2 * blue)),))
+    tinted = replace(blob, scene=replace(blob.scene, lights=(replace(sun, irradiance=(red, green, 2 * blue)),)))
     (colour,) = held_out([tinted], "single", "single", draft.density).colours
     assert colour[2] / colour[0] == pytest.approx(0.5, rel=0.05)
 
