@@ -1,5 +1,6 @@
 #include "codes.h"
 #include "depth_profile.h"
+#include "extraction.h"
 #include "halves.h"
 #include "lattice.h"
 #include "patches.h"
@@ -517,6 +518,34 @@ void register_patches(py::module_ &module) {
         py::arg("values").noconvert(), "wanted"_a);
 }
 
+void register_extraction(py::module_ &module) {
+    using namespace py::literals;
+
+    module.def("pyramid_levels", &pyramid_levels, "rows"_a, "columns"_a);
+
+    module.def(
+        "extract",
+        [](const Array &moments, const std::array<float, 3> &source, const ScaleDeviations &deviations,
+           float outlier_freedom, float pixels, int rounds, int iterations) {
+            const Shape n = shape_of(moments);
+            require_fit(n[2] == ExtractionProblem::MOMENTS &&
+                        int(deviations.size()) == pyramid_levels(n[0], n[1]));
+            const ExtractionProblem problem{moments.data(),  n[0],  n[1], source, deviations,
+                                            outlier_freedom, pixels};
+            Array fields = new_array({n[0], n[1], 4});
+            Array deviation({py::ssize_t(n[0]), py::ssize_t(n[1])}),
+                weight({py::ssize_t(n[0]), py::ssize_t(n[1])});
+            float *const found = fields.mutable_data(), *const spread = deviation.mutable_data(),
+                         *const certain = weight.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                extract(problem, rounds, iterations, found, spread, certain);
+            }
+            return py::make_tuple(fields, deviation, weight);
+        },
+        "moments"_a, "source"_a, "deviations"_a, "outlier_freedom"_a, "pixels"_a, "rounds"_a, "iterations"_a);
+}
+
 } // namespace
 
 void register_pictures(py::module_ &module) {
@@ -526,6 +555,7 @@ void register_pictures(py::module_ &module) {
     register_filters(module);
     register_turning(module);
     register_patches(module);
+    register_extraction(module);
 }
 
 } // namespace smokelift

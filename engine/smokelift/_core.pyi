@@ -590,3 +590,25 @@ def blur_picture(picture: Array, weights: npt.NDArray[np.floating[Any]]) -> Arra
     ``weights`` are those of a pixel itself and of its neighbours on either side, outwards. Beyond its edges the picture
     is its own mirror image.
     """
+
+# Extraction
+
+def pyramid_levels(rows: int, columns: int) -> int:
+    """Levels of a pyramid over so many cells; the coarsest has two cells at most along its longer side."""
+
+def extract(
+    moments: Array,
+    source: Sequence[float],
+    deviations: Sequence[tuple[float, float, float, float]],
+    outlier_freedom: float,
+    pixels: float,
+    rounds: int,
+    iterations: int,
+) -> tuple[Array, Array, Array]:
+    """Opacity and ln J (rows, columns, 4) of smoke before a plate, the deviation of T, and the weight of the data.
+
+    ``moments`` (rows, columns, 11) are sums over each cell's pixels: w, w B, w B.B, w D and w D.B, with D = I - B and w
+    the inverse variance of the noise. ``source`` (3,) is J without any deviation, ``deviations`` the prior's standard
+    deviations by level, the finest first. ``outlier_freedom`` are the degrees of freedom of the noise, 0 for normal
+    noise; ``pixels`` are in a cell.
+    """

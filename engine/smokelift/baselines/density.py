@@ -94,10 +94,12 @@ class FixedRateDescent:
         seen = depth.views.views
         everywhere = [np.ones(view.mask.shape, np.bool_) for view in views.views]
         renderers = [
-            PaperRenderer(view.camera, optics.domain, optics.medium, optics.lights, view.plate.image, optics.scattering)
+            PaperRenderer(
+                view.camera, optics.domain, optics.medium, optics.lights, view.background[..., :3], optics.scattering
+            )
             for view in seen
         ]
-        pictures = [view.image for view in seen]
+        pictures = [view.image[..., :3] for view in seen]
         start = depth.density if initial is None else initial
         density, residuals, done = self._descend(renderers, pictures, start, depth.density)
         judged = replace(

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Doubles
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis, depth_at
-from smokelift.density.observation import ObservedClip, apparent_optical_depth
+from smokelift.density.observation import ObservedClip, ObservedView
 from smokelift.density.screen import Screen, reach_along, seen_at, upright_screen, view_frame
 from smokelift.footage.matte import matte
 from smokelift.scene import Camera, Domain, Inlet
@@ -99,7 +99,8 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
     camera, domain = seen[len(seen) // 2].camera, clip.optics.domain.with_at_most(MAX_VOXELS)
     optics = replace(clip.optics, domain=domain)
     amounts = [
-        apparent_optical_depth(each.image, each.plate, matte(each.image, each.plate).mask, optics) for each in seen
+        np.where(matte(each.image, each.plate).mask, ObservedView.of(each, optics).optical_depth, np.float32(0))
+        for each in seen
     ]
     if distance is None and not any(amount.any() for amount in amounts):
         return None

@@ -126,7 +126,7 @@ class RoundDepth:
         coarse = replace(view, projection=project_voxels(view.camera, optics.domain))
         seen = ViewSet((coarse,), any_of_two(views.hull), optics, views.frame)
         density = _density(seen, self._profiles(seen, scatter))
-        renderer = optics.renderer(view.camera, view.plate.image, density > 0)
+        renderer = optics.renderer(view.camera, view.background, density > 0)
         image = renderer.image(density)
         return replace(view, optical_depth=shadowed_optical_depth(view, image, renderer.transmittance, optics))
 

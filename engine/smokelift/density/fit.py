@@ -241,7 +241,7 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
 
 def empty_density(views: ViewSet) -> FittedDensity:
     """The empty result: no smoke is seen, or the views have no voxel in common."""
-    residuals = [view.plate.image - view.image for view in views.views]
+    residuals = [view.background - view.image for view in views.views]
     return FittedDensity(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 
 
@@ -265,16 +265,16 @@ def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
-    """Figures of a fit (see `FittedDensity`) from its residuals (rows, columns, 3), at least one a view."""
+    """Figures of a fit (see `FittedDensity`) from its residuals (rows, columns, channels), at least one per view."""
     losses, decibels = [], {}
     for number, (view, residual) in enumerate(zip(views.views, residuals, strict=False)):
-        left = residual[view.counted]
+        left = residual[view.counted][:, :3]
         losses.append(float(np.sum(np.square(left, dtype=np.float64))))
         if left.size:
             name = f"psnr_view_{number}" if number else "psnr"
             decibels[name] = float(-10 * np.log10(max(losses[-1] / left.size, 1e-12)))
     front = views.views[0]
-    change = float(np.sum(np.square((front.image - front.plate.image)[front.counted], dtype=np.float64)))
+    change = float(np.sum(np.square((front.image - front.background)[front.counted][:, :3], dtype=np.float64)))
     return {
         "loss": sum(losses),
         **decibels,

@@ -7,7 +7,6 @@ keeps its own detail, and only the last octave is left to find on it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,13 +17,11 @@ from numpy.typing import NDArray
 import smokelift._core as _core
 from smokelift.density.coarser_grid import MIN_COARSENED_VOXELS, any_of_two
 from smokelift.density.objective import Term, camera_terms
-from smokelift.density.observation import Observation, ObservedView, ViewSet
+from smokelift.density.observation import ViewSet
 from smokelift.density.temporal_prior import TINY
 from smokelift.footage.images import area_average
-from smokelift.render import Image, Volume
-from smokelift.scene import Domain
+from smokelift.render import Volume
 from smokelift.scene.domain import box_around
-from smokelift.scene.projection import voxel_width
 
 BLUR_REACH = 3.0
 """Reach of a blur in its standard deviations: 0.3 % of a Gaussian lie beyond."""
@@ -52,7 +49,7 @@ class MomentLevel:
         if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
             return None
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))
-        seen = tuple(ObservedView.of(_shrunk(view, optics.domain), optics) for view in views.views)
+        seen = tuple(view.coarser(optics) for view in views.views)
         inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
         return MomentLevel(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
@@ -111,15 +108,3 @@ def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDA
     means = np.zeros(coarse.shape, np.float32)
     means[coarse] = _blurred(_core.means_of_two(values), coarse, deviation / 2)
     return _core.prolong_values(means, marked)
-
-
-def _shrunk(view: ObservedView, domain: Domain) -> Observation:
-    """What a view's camera saw, at one pixel a voxel of a domain if its pixels are finer."""
-    shrink = max(1.0, voxel_width(view.camera, domain))
-    columns, rows = (max(1, round(side / shrink)) for side in view.camera.size)
-
-    def cut(picture: Image) -> Image:
-        return area_average(picture, columns, rows)
-
-    pixels = math.prod(view.camera.size) / (columns * rows)
-    return Observation(view.camera.resized(columns, rows), cut(view.image), view.plate.through(cut, pixels))

@@ -3,9 +3,7 @@
 For one ray with scattered radiance S and transmittance T the effective source is J = S / (1 - T). If all smoke on the
 ray is scaled by s, the picture becomes J (1 - T^s) + T^s B. The transmittance that explains the target I best is
 
-    t = <I - J, B - J> / <B - J, B - J>,   s = ln t / ln T,
-
-with the colours as much as they count in the objective.
+    t = <I - J, B - J> / <B - J, B - J>,   s = ln t / ln T.
 
 Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s.
 Where smoke and background look alike the picture says little, so the neighbours' step counts instead.
@@ -156,7 +154,7 @@ def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image) -
 
 
 def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> Image:
-    """dL / d ln s (rows, columns, 3) of a density, whose image and transmittance are given."""
+    """dL / d ln s (rows, columns, channels) of a density, whose image and transmittance are given."""
     if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
         return np.asarray(image * np.log(np.maximum(transmittance, 1e-30))[..., None])
     return np.asarray((term.renderer.image(smoke.volume_of(values, PROBE)) - image) / np.log(PROBE))
@@ -164,15 +162,14 @@ def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance
 
 def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> NDArray[np.float32]:
     """Logarithm (rows, columns) of each pixel's scale, damped and smoothed."""
-    background, share = term.view.plate.image, np.sqrt(term.weight)
+    background, share = term.view.background, np.sqrt(term.weight)
     clear = transmittance[..., None]
     solid = np.maximum(1 - clear, 1e-6)
     source = (image - clear * background) / solid
     contrast = background - source
-    counted = term.view.weighted(contrast)
     power = _over_channels(contrast, contrast)
-    floor = _over_channels(term.view.noise, term.view.noise) / 3
-    explained = _over_channels(term.view.image - source, counted) / (_over_channels(contrast, counted) + 1e-20)
+    floor = _over_channels(term.view.noise, term.view.noise) / term.view.noise.shape[-1]
+    explained = _over_channels(term.view.image - source, contrast) / (power + 1e-20)
     wanted = np.clip(explained, 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
     change = image - background

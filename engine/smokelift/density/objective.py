@@ -1,14 +1,14 @@
 """What a density fit minimises: one objective for both of its optimisers and for where they stop.
 
-    E(rho) = sum over terms, pixels of  w (L(rho) - I) C (L(rho) - I),    0 <= rho <= bound,  rho = 0 outside the hull
+    E(rho) = sum over terms, pixels of  w |L(rho) - I|^2,    0 <= rho <= bound,  rho = 0 outside the hull
 
-A term is a picture I with the weight w of its pixels and C of their colours (3 x 3, the identity before a background
-that is known; `colour_weight`). Neither changes during a fit. There is one term a camera. Detail that a depth prior
+A term is a picture I, of three channels or of an element's four, with the weight w of its pixels, which does not change
+during a fit. There is one term per camera. Detail that a depth prior
 makes up (`Detail`) has none: before the fit, the start is scaled in turn towards it and the cameras' pictures, and what
 these allow of it is left. A prior has no penalty term. It acts through the voxels that may hold smoke, the start and,
 with it, the preconditioner of the descent.
 
-Noise of standard deviation s leaves E = sum w c s^2 at the true density, c of C's diagonal. Below that a fit reproduces
+Noise of standard deviation s leaves E = sum w s^2 at the true density. Below that a fit reproduces
 noise, so it stops there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of
 the cameras alone.
 """
@@ -34,7 +34,7 @@ puts outside is missing in the picture; with more, density spikes grow at floor 
 class Term:
     """One picture that the density has to show.
 
-    The renderer is of the view's camera, before the view's plate. `weight` (rows, columns) is how much each pixel
+    The renderer is of the view's camera, before the view's background. `weight` (rows, columns) is how much each pixel
     counts, from 0 to 1.
     """
 
@@ -43,19 +43,17 @@ class Term:
     weight: NDArray[np.float32]
 
     def loss(self, residual: Image) -> float:
-        """The term's part of the objective, from L - I (rows, columns, 3)."""
-        power = np.multiply(residual, self.view.weighted(residual), dtype=np.float64)
+        """The term's part of the objective, from L - I (rows, columns, channels)."""
+        power = np.square(residual, dtype=np.float64)
         return float(np.sum(self.weight[..., None] * power))
 
     def image_gradient(self, residual: Image) -> Image:
-        """Derivative of the term's part by the rendered picture (rows, columns, 3)."""
-        return 2 * self.weight[..., None] * self.view.weighted(residual)
+        """Derivative of the term's part by the rendered picture (rows, columns, channels)."""
+        return 2 * self.weight[..., None] * residual
 
     def noise_floor(self) -> float:
         """What the picture's noise leaves of the objective at the true density."""
         power = np.square(self.view.noise_left, dtype=np.float64)
-        if self.view.colours is not None:
-            power *= self.view.colours.of_channels()
         return float(np.sum(self.weight[..., None] * power))
 
 
@@ -75,9 +73,9 @@ def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[
 class Fit:
     """A density (nx, ny, nz) that an optimiser found in so many iterations.
 
-    `loss` is the objective. `residuals` are what is left of each term's picture (rows, columns, 3), L - I. `recorded`
-    are the same if the terms' renderers hold the records of this density's pictures, ready for their gradients; else
-    none.
+    `loss` is the objective. `residuals` are what is left of each term's picture (rows, columns, channels), L - I.
+    `recorded` are the same if the terms' renderers hold the records of this density's pictures, ready for their
+    gradients; else none.
     """
 
     density: Volume

@@ -9,25 +9,22 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
-from smokelift.density.colour_weight import ColourWeight
 from smokelift.density.hull import Places, Projection, common_hull, project_voxels, reached
+from smokelift.extraction import Element
+from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics, Renderer
-from smokelift.scene import SHADOWED, Camera, Domain, Inlet
+from smokelift.scene import Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
+from smokelift.scene.projection import voxel_width
 
 THINNEST_CLEAR = 0.05
 """Lower bound of the transmittance: a brightness does not show an optical depth above 3."""
-
-SHADED, PATCH = 4.0, 3
-"""Noise by which a shaded side of smoke turns away from its source radiance, and pixels along it, at least
-(docs/experiments/bright-background.md)."""
 
 SHADED_DEPTH = 1.5
 """Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
@@ -41,8 +38,12 @@ MIN_CONTRAST = 0.1
 """Contrast of the background to the source radiance in shadow, over that without shadows, below which the latter tells
 more: in deep shadow noise would be taken for smoke."""
 
-ROUNDS = 2
-"""Times that optical depth and the weight of the colours are each found from the other."""
+WHITE = 1.5
+"""Brightness of the white that T is shown over, over the smoke's source radiance: with half of it smoke of the plate's
+own brightness is not fitted, twice of it changes no figure (docs/experiments/extraction.md)."""
+
+MIN_OPACITY = 1e-6
+"""Sum of an element's opacity from which on it shows a source radiance."""
 
 
 def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
@@ -69,6 +70,8 @@ class Observation:
     plate
         The clean plate: what the camera sees without smoke, with the noise of its pictures. By default black with the
         noise of 8 bits, for which `reconstruct_density` substitutes the scene's background.
+    element
+        The smoke without the plate; None where the picture itself tells as much, as before black or one color.
 
     Raises
     ------
@@ -79,6 +82,7 @@ class Observation:
     camera: Camera
     image: Image
     plate: Plate = BLACK
+    element: Element | None = None
 
     def __post_init__(self) -> None:
         require_kind(self.camera, Camera, "camera", "a Camera")
@@ -120,67 +124,68 @@ class ObservedClip(Protocol):
 class ObservedView:
     """An observation against the grid.
 
+    A picture that tells its own transmittance has three channels. An element has a fourth, in which smoke is black: it
+    is shown over one color, so that nothing of the plate's detail is left in it, and over a white of its own.
+
     Attributes
     ----------
-    image : (rows, columns, 3)
-        The observation's, faded to the plate by `share`: so a faint rim ends where its light does, not at the mask.
+    image : (rows, columns, channels)
+        The observation's, faded to the background by `share`: so a faint rim ends where its light does, not at the
+        mask.
+    background : (rows, columns, channels)
+        What the picture shows without smoke.
+    noise : (rows, columns, channels)
+        Standard deviation of the observation's noise.
     share : (rows, columns)
-        How certainly a pixel shows smoke, from 0 to 1; what is left of the observation and of its noise.
+        Probability that a pixel shows smoke; what is left of the observation and of its noise.
     mask : (rows, columns) bool
         Pixels that may show smoke: where `share` is not 0.
     optical_depth : (rows, columns)
-        Of smoke without shadows that explains the picture, or as much as can be shown where only smoke in its own
-        shadow does; 0 outside the mask.
+        Of smoke without shadows that explains the picture; 0 outside the mask.
     counted : (rows, columns) bool
         Pixels that the voxels behind the mask can change: a fit is judged by them.
-    colours
-        How much each combination of the colours counts; None if all do alike, as before a background that is known.
     """
 
     camera: Camera
     image: Image
-    plate: Plate
+    background: Image
+    noise: Image
     share: NDArray[np.float32]
     mask: NDArray[np.bool_]
     optical_depth: NDArray[np.float32]
     projection: Projection
     counted: NDArray[np.bool_]
-    colours: ColourWeight | None = None
 
     @staticmethod
     def of(observation: Observation, optics: Optics) -> ObservedView:
         """Set an observation against the grid of `optics.domain`."""
-        camera, image, plate = observation.camera, observation.image, observation.plate
+        camera, plate = observation.camera, observation.plate
         if plate is BLACK:
             plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
-        share = matte(image, plate).share
-        image = plate.image + share[..., None] * (image - plate.image)
-        mask = share > 0
-        projection = project_voxels(camera, optics.domain)
-        depth = apparent_optical_depth(image, plate, mask, optics)
-        colours = ColourWeight.of(image, plate, depth)
-        if colours is not None:  # each depends on the other
-            for _ in range(ROUNDS):
-                depth = apparent_optical_depth(image, plate, mask, optics, colours)
-                colours = ColourWeight.of(image, plate, depth)
-        return ObservedView(camera, image, plate, share, mask, depth, projection, reached(mask, projection), colours)
+        share = matte(observation.image, plate).share
+        if observation.element is None:
+            image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
+        else:
+            image, background, noise = _over_one_color(observation.element, observation.image, plate)
+        return _against_grid(
+            camera, background + share[..., None] * (image - background), background, noise, share, optics
+        )
 
-    def weighted(self, colours: Image) -> Image:
-        """Colours (rows, columns, 3), weighed by how much they count."""
-        return colours if self.colours is None else self.colours.weighted(colours)
+    def coarser(self, optics: Optics) -> ObservedView:
+        """Set the observation against another grid, at one pixel per voxel if its own pixels are finer."""
+        shrink = max(1.0, voxel_width(self.camera, optics.domain))
+        columns, rows = (max(1, round(side / shrink)) for side in self.camera.size)
+        pictures = (self.image, self.background, self.noise, self.share)
+        image, background, noise, share = (area_average(each, columns, rows) for each in pictures)
+        return _against_grid(self.camera.resized(columns, rows), image, background, noise, share, optics)
 
     def before_darkness(self, source: NDArray[np.float64]) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
-        return bool((self.plate.image[self.mask] <= MAX_DARK_RADIANCE * source).all())
-
-    @cached_property
-    def noise(self) -> Image:
-        """Standard deviation (rows, columns, 3) of the observation's noise, linear radiance."""
-        return noise_at(self.image, self.plate)
+        return bool((self.background[self.mask] <= MAX_DARK_RADIANCE * _in_channels(source, self.background)).all())
 
     @cached_property
     def noise_left(self) -> Image:
-        """Standard deviation (rows, columns, 3) of the noise of `image`, faded like it."""
+        """Standard deviation (rows, columns, channels) of the noise of `image`, faded like it."""
         return self.share[..., None] * self.noise
 
 
@@ -210,7 +215,7 @@ class ViewSet:
     @cached_property
     def renderers(self) -> tuple[Renderer, ...]:
         """Renderers of the views, for densities in the hull."""
-        return tuple(self.optics.renderer(view.camera, view.plate.image, self.hull) for view in self.views)
+        return tuple(self.optics.renderer(view.camera, view.background, self.hull) for view in self.views)
 
     @staticmethod
     def of(observations: Sequence[Observation], optics: Optics, frame: int = 0) -> ViewSet:
@@ -226,26 +231,31 @@ class ViewSet:
         return ViewSet(views, hull, optics, frame)
 
 
+def _against_grid(
+    camera: Camera, image: Image, background: Image, noise: Image, share: NDArray[np.float32], optics: Optics
+) -> ObservedView:
+    """A picture, faded to its background, against the grid of `optics.domain`."""
+    mask = share > 0
+    projection = project_voxels(camera, optics.domain)
+    depth = apparent_optical_depth(image, background, mask, optics)
+    return ObservedView(camera, image, background, noise, share, mask, depth, projection, reached(mask, projection))
+
+
 def apparent_optical_depth(
-    image: Image, plate: Plate, mask: NDArray[np.bool_], optics: Optics, colours: ColourWeight | None = None
+    image: Image, background: Image, mask: NDArray[np.bool_], optics: Optics
 ) -> NDArray[np.float32]:
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
-    J is the source radiance of smoke in the middle of the domain, B the plate. T is the least squares solution over the
-    three channels, or over their combinations as much as they count. No T explains a pixel that the smoke darkens
-    although J is brighter than B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a
-    fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
+    J is the source radiance of smoke in the middle of the domain, B the background. T is the least squares solution
+    over the channels.
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
         source = optics.unshadowed_source()
-    contrast = plate.image - source
-    counted = contrast if colours is None else colours.weighted(contrast)
-    clear = np.sum((image - source) * counted, -1) / np.maximum(np.sum(contrast * counted, -1), 1e-12)
-    depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
-    if optics.scattering in SHADOWED:
-        depth[_in_shadow(image, plate, mask, contrast)] = -np.log(THINNEST_CLEAR)
-    return np.where(mask, depth, 0).astype(np.float32)
+    source = _in_channels(source, image)
+    contrast = background - source
+    clear = np.sum((image - source) * contrast, -1) / np.maximum(np.sum(contrast * contrast, -1), 1e-12)
+    return np.where(mask, -np.log(np.clip(clear, THINNEST_CLEAR, 1.0)), 0).astype(np.float32)
 
 
 def shadowed_optical_depth(
@@ -253,36 +263,41 @@ def shadowed_optical_depth(
 ) -> NDArray[np.float32]:
     """Optical depth (rows, columns) that explains a view's picture in an estimate's shadows: SHADED_DEPTH ln(1 + r).
 
-    The estimate has the view's optical depth. ``image`` (rows, columns, 3) and ``transmittance`` (rows, columns) are
-    what the view's camera sees of it before the view's plate B. Its source radiance is J = (image - T B) / (1 - T), and
-    r is the share of the contrast B - J that the view shows. If J were right the optical depth would be -ln(1 - r),
-    which has no bound as r nears 1. But where the shadows fall is only assumed, so J may be off by a factor of two.
+    The estimate has the view's optical depth. ``image`` (rows, columns, channels) and ``transmittance`` (rows, columns)
+    are what the view's camera sees of it before the view's background B. Its source radiance is J = (image - T B) /
+    (1 - T), and r is the fraction of the contrast B - J that the view shows. If J were right the optical depth would be
+    -ln(1 - r), which has no bound as r nears 1. But where the shadows fall is only assumed, so J may be off by a factor
+    of two.
     """
-    plate, clear = view.plate.image, transmittance[..., None]
-    contrast = plate - (image - clear * plate) / np.maximum(1 - clear, 1e-6)
-    usual = plate - optics.unshadowed_source()
-    counted = view.weighted(contrast)
-    least = MIN_CONTRAST**2 * np.sum(usual * view.weighted(usual), -1)
-    seen = np.sum((plate - view.image) * counted, -1) + least * -np.expm1(-view.optical_depth)
-    share = seen / np.maximum(np.sum(contrast * counted, -1) + least, 1e-12)
-    known = (share > 0) & (view.optical_depth < -0.99 * np.log(THINNEST_CLEAR))  # else as thick as can be shown
-    depth = np.where(known, SHADED_DEPTH * np.log1p(np.maximum(share, 0)), view.optical_depth)
+    background, clear = view.background, transmittance[..., None]
+    contrast = background - (image - clear * background) / np.maximum(1 - clear, 1e-6)
+    usual = background - _in_channels(optics.unshadowed_source(), background)
+    least = MIN_CONTRAST**2 * np.sum(usual * usual, -1)
+    seen = np.sum((background - view.image) * contrast, -1) + least * -np.expm1(-view.optical_depth)
+    fraction = seen / np.maximum(np.sum(contrast * contrast, -1) + least, 1e-12)
+    known = (fraction > 0) & (view.optical_depth < -0.99 * np.log(THINNEST_CLEAR))  # else as thick as can be shown
+    depth = np.where(known, SHADED_DEPTH * np.log1p(np.maximum(fraction, 0)), view.optical_depth)
     return np.where(view.mask, depth, 0).astype(np.float32)
 
 
-def _in_shadow(image: Image, plate: Plate, mask: NDArray[np.bool_], contrast: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where smoke has to be in its own shadow: it turns the picture away from its source radiance.
+def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Image, Image, Image]:
+    """An element, its background and its noise in four channels: over the plate's mean color, and T over a white.
 
-    ``contrast`` (rows, columns, 3) is that of the background to the source radiance. A background that is continued
-    from around the smoke may as well be too bright, by its errors. A shaded side is a patch of pixels; single ones are
-    a codec's errors.
+    So a fit asks for S + T B, which the picture shows best, before a plate without detail, and for T. The white is as
+    bright beside the smoke as `WHITE` says. Errors of T are no noise, whatever their size: they do not end a fit.
     """
-    away = np.sum((image - plate.image) * contrast, -1)
-    noise = np.sum((noise_at(image, plate) * contrast) ** 2, -1)
-    if plate.errors.any():
-        noise += (1 - plate.confidence) * np.sum((contrast @ plate.errors) * contrast, -1)
-    beyond = (away > SHADED * np.sqrt(noise)) & mask
-    return np.asarray(ndimage.binary_opening(beyond, np.ones((PATCH, PATCH))))
+    color = plate.image.mean((0, 1))
+    opacity = 1 - element.transmittance
+    white = WHITE * float(element.radiance.mean(-1).sum()) / max(float(opacity.sum()), MIN_OPACITY)
+    noise = noise_at(picture, plate)
+    image = np.dstack([element.over(color), white * element.transmittance])
+    background = np.dstack([np.broadcast_to(color, noise.shape), np.full(opacity.shape, white)])
+    return image.astype(np.float32), background.astype(np.float32), np.dstack([noise, noise.mean(-1)])
+
+
+def _in_channels(source: NDArray[np.float64], picture: Image) -> NDArray[np.float64]:
+    """A radiance (3,) of smoke in a picture's channels: what is beyond the colors shows none."""
+    return np.pad(source, (0, picture.shape[-1] - len(source)))
 
 
 def _check(observation: Observation, domain: Domain) -> None:

@@ -111,7 +111,7 @@ class BlendCarried:
         if not (prior.any() and moved.any()):
             return Start(prior, {"share": 0.0, "amounts": 0.0})
         somewhere = (prior > 0) | (moved > 0) | (before.density > 0)
-        renderer = views.optics.renderer(view.camera, view.plate.image, somewhere)
+        renderer = views.optics.renderer(view.camera, view.background, somewhere)
 
         def judged(density: Volume) -> tuple[float, Image]:
             """Squared difference from the picture, and optical depths (rows, columns)."""

@@ -10,7 +10,7 @@ from smokelift.footage.images import Picture, area_average, linear_to_srgb, read
 from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
 
-ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.8
+ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.9
 """Difference in sRGB values up to which a pixel has a backdrop's colour, and smallest share of such pixels: the others
 are a nozzle, a floor, a logo."""
 

@@ -34,7 +34,7 @@ class Renderer:
     lights
         Directional and point lights; none leave absorption only.
     background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke.
+        Linear radiance behind the smoke. A fourth channel, in which smoke sends nothing, shows its transmittance.
     scattering
         ``"multiple"``: scattering of all orders, isotropic smoke only; ``"single"``: single scattering with
         self-shadowing; ``"unshadowed"``: light reaches every voxel unattenuated; ``"absorption"``: the background
@@ -64,8 +64,9 @@ class Renderer:
     ) -> None:
         self.camera, self.domain, self.medium = camera, domain, medium
         plan = plan_render(camera, domain, medium, lights, scattering, support)
-        self._colour = np.asarray(plan.lighting.colour, np.float32)
         self._background = np.asarray(background, np.float32)
+        sent = np.asarray(plan.lighting.colour, np.float32)
+        self._colour = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
         self._backend = device.backend(plan, ray_support)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
@@ -81,8 +82,8 @@ class Renderer:
 
         Returns
         -------
-        (rows, columns, 3) float32
-            Linear radiance, row 0 at the top.
+        (rows, columns, channels) float32
+            Linear radiance in the background's channels, row 0 at the top.
         """
         scattered, self._depth = self._backend.image(density, keep_record)
         with products_on_one_thread():
@@ -109,7 +110,7 @@ class Renderer:
 
         Parameters
         ----------
-        image_gradient : (rows, columns, 3)
+        image_gradient : (rows, columns, channels)
             dloss / dimage.
         out : (nx, ny, nz) float32, optional
             Written where there is support, and returned: new memory takes as long as a sweep. Zero elsewhere, as what

@@ -5,12 +5,17 @@ What is open is estimated from the clip or defaulted; remarks and estimates say 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from smokelift.checks import counted, require_kind
 from smokelift.density import AxisEstimate, clip_axis
+from smokelift.extraction import usual_source
 from smokelift.footage.clip import Clip
+from smokelift.footage.given_background import backdrop_colour
 from smokelift.render import scene_optics
 from smokelift.scene import Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_remarks import first_remarks
@@ -23,6 +28,9 @@ from smokelift.setup.illumination import find_scattering, first_light, light_dou
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
+
+SOURCE_FRAMES, SOURCE_SIDE = 4, 64
+"""Frames, and pixels along their longer side, from which the smoke's usual source radiance is found."""
 
 
 def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
@@ -66,7 +74,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         closed=scene.closed,
         inlets=scene.inlets,
     )
-    first = ShotView.before(domain, estimate.clip, camera, plates)
+    first = with_source(ShotView.before(domain, estimate.clip, camera, plates), samples.smoky, complete)
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
     of_scattering: tuple[Estimate[str], ...] = ()
     if coarse and asked is not None:
@@ -107,6 +115,25 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         return replace(shot, remarks=(*shot.remarks, *disagreement(shot)))
     place = clip_axis(shot, settings.distance) if settings.method == "default" else None
     return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
+
+
+def with_source(view: ShotView, smoky: Sequence[int], scene: CompleteScene) -> ShotView:
+    """Return a view with the usual source radiance of its smoke in some frames, if it stands before a picture."""
+    frames = sorted(smoky[:SOURCE_FRAMES])
+    if not frames or backdrop_colour(view.plates.at(frames[0]).image) is not None:
+        return view
+    shown = []
+    for frame in frames:
+        working = view.working_at(frame, scene.domain)
+        if working is not None:
+            picture = view.clip.stored(frame).cut(working.part).linear()
+            shown.append((picture, view.plates.at(frame).through(working.part)))
+    if not shown:
+        return view
+    columns, rows = view.working.camera.size
+    shrink = max(1.0, max(columns, rows) / SOURCE_SIDE)
+    size = max(1, round(columns / shrink)), max(1, round(rows / shrink))
+    return replace(view, source=usual_source(shown, np.array(scene.medium.color), size))
 
 
 def place_estimate(place: AxisEstimate) -> Estimate[str]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from smokelift.checks import Remark
 from smokelift.density import AxisEstimate, Observation
+from smokelift.extraction import Element, extract_element
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
@@ -24,13 +25,15 @@ class ShotView:
     """A camera of a shot, which may move, with its clip and what it sees without smoke in each frame.
 
     Frame 0 of ``clip`` is of the same moment as the input's. The grid is fitted to the small picture ``working``; for a
-    camera that moves it is that of the first frame that shows the domain.
+    camera that moves it is that of the first frame that shows the domain. ``source`` (3,) is the usual source radiance
+    of the smoke before a picture, which is extracted; None before black or one color.
     """
 
     clip: Clip
     camera: Camera
     plates: Plates
     working: WorkingPicture
+    source: Image | None = None
 
     @staticmethod
     def before(domain: Domain, clip: Clip, camera: Camera, plates: Plates) -> ShotView:
@@ -50,7 +53,15 @@ class ShotView:
         else:
             plate = self._still_plates.at(frame)
         image = working.of(self.clip, frame)
-        return Observation(working.camera, image, plate)
+        return Observation(working.camera, image, plate, self.element(frame, working))
+
+    def element(self, frame: int, working: WorkingPicture) -> Element | None:
+        """The smoke of a frame, from 0, without the plate, as a small picture; None before black or one color."""
+        if self.source is None:
+            return None
+        picture = self.clip.stored(frame).cut(working.part).linear()
+        plate = self.plates.at(frame).through(working.part)
+        return extract_element(picture, plate, self.source, working.camera.size)
 
     def working_at(self, frame: int, domain: Domain) -> WorkingPicture | None:
         """The small picture of a frame, from 0; None if the frame shows nothing of the domain."""

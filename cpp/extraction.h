@@ -1,0 +1,35 @@
+// Extraction: the radiance S that smoke sends and its transmittance T in one picture I = S + T B + n before a
+// plate B. Maximum a posteriori, with smoothness on all scales.
+#pragma once
+
+#include "memory.h"
+
+#include <array>
+#include <vector>
+
+namespace smokelift {
+
+// What is known of smoke before any picture, for each level of the pyramid from the finest: standard
+// deviations of opacity, and of the brightness and of the two chroma components of ln J.
+using ScaleDeviations = std::vector<std::array<float, 4>>;
+
+struct ExtractionProblem {
+    static constexpr int MOMENTS = 11; // of a cell: w (3), w B (3), w B.B, w D (3), w D.B, with D = I - B
+
+    const float *moments; // [row][column][MOMENTS], sums over the pixels of each cell
+    int rows, columns;
+    std::array<float, 3> source; // J without any deviation
+    ScaleDeviations deviations;  // one for each level
+    float outlier_freedom;       // those of the noise; 0: normal noise
+    float pixels;                // in a cell
+};
+
+// Number of levels of a pyramid over so many cells: the coarsest has two cells at most along its longer side.
+int pyramid_levels(int rows, int columns);
+
+// The opacity 1 - T and the three deviations of ln J of every cell, interleaved; the standard deviation of
+// its T; and the weight of its data, less than 1 for an outlier.
+void extract(const ExtractionProblem &problem, int rounds, int iterations, float *fields, float *deviation,
+             float *weight);
+
+} // namespace smokelift

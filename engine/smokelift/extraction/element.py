@@ -1,0 +1,197 @@
+"""The smoke of one picture without what is behind it: I = S + T B + n, maximum a posteriori.
+
+S is the radiance that smoke sends, T its transmittance, B the clean plate. Smoke varies slowly over a picture, a wall
+does not. So where B has detail, T is told by how much of it is left, whatever the light; where B is flat, by its color
+and brightness. S = (1 - T) J, with the source radiance J of smoke in a light: its brightness varies by shadows, its
+color hardly. The opacity 1 - T and ln J are sums over the levels of a pyramid, whose coefficients are independent
+(`cpp/extraction.cpp` solves for them). What does not fit, such as a hand before the smoke, counts less: it is an
+outlier of the noise. Figures: docs/experiments/extraction.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import smokelift._core as _core
+from smokelift.footage.images import Picture, area_average, blurred, channel_mean
+from smokelift.footage.plate import Plate, noise_at
+
+FULL_SCALE = 0.12
+"""Distance, over the longer side of the picture, at which smoke's opacity has its whole range."""
+
+ROUGHNESS = 0.85
+"""Exponent of the distance by which differences of opacity and of ln J grow: the Hurst exponent of turbulence seen
+through its depth, (11/3 - 2) / 2 = .83 by Kolmogorov's spectrum, and .8 to .95 in eight baked scenes."""
+
+OPACITY_RANGE, BRIGHTNESS_RANGE = 0.5, 0.5
+"""Standard deviations of the opacity and of the brightness of ln J over that distance."""
+
+BRIGHTNESS_SCALE = 2.25
+"""Distance over which the brightness has its range, in those of the opacity: shadows are wider than wisps."""
+
+CHROMA = 0.005
+"""Variation of the chroma of ln J over that of its brightness: light of one color."""
+
+MEAN_OPACITY, MEAN_BRIGHTNESS = 1.0, 1.0
+"""Standard deviations of the means of the opacity and of ln J over the picture: neither is known."""
+
+MODEL_ERROR = 0.05
+"""Standard deviation of what no T and J that are even over a cell explain, over the mean radiance of the plate."""
+
+OUTLIER_FREEDOM = 5.0
+"""Degrees of freedom of the noise's Student t distribution: outliers of more than three deviations hardly count."""
+
+ROUNDS, ITERATIONS = 6, 40
+"""Linearisations of ln J, and steps of conjugate gradients for each: twice as many of both change T by .003."""
+
+SOURCE_ROUNDS = 4
+"""Times that the usual source radiance is found from the smoke, and that from it."""
+
+BRIGHT_PERCENTILE, MIN_SOURCE = 90, 0.01
+"""Percentile of a picture's brightness that the usual source radiance starts from, and its lower bound: a picture
+darker than that shows no light that eight bits could tell."""
+
+FINER = 1.5
+"""Pixels along a cell whose detail is compared: a codec takes the finest detail of a plate away, and that of thin
+smoke with it (T rms of twelve composed clips at crf 18: .064 with all pixels, .056 with these)."""
+
+WINDOW_BLUR = 2.0
+"""Standard deviation, in cells, of the Gaussian that smooths the deviation of T, which is found in windows of four."""
+
+MAX_CELLS = 192
+"""Cells along the longer side: T and J have no finer detail that a plate could tell."""
+
+CHROMA_BASIS = np.array([[1.5**0.5, 0.5**0.5], [0, -(2**0.5)], [-(1.5**0.5), 0.5**0.5]], np.float32)
+"""Two components of chroma by channel, as in `cpp/extraction.cpp`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """What smoke sends and lets through, and how certainly that is known.
+
+    Attributes
+    ----------
+    radiance : (rows, columns, 3)
+        S, linear, premultiplied by the opacity 1 - T.
+    transmittance : (rows, columns)
+        T, from 0 to 1.
+    deviation : (rows, columns)
+        Standard deviation of T at a fixed S + T B, which is known within the plate's noise.
+    weight : (rows, columns)
+        Weight of the picture, from 0 to 1: little for what is neither smoke nor its plate.
+    """
+
+    radiance: Picture
+    transmittance: Picture
+    deviation: Picture
+    weight: Picture
+
+    def over(self, color: Picture) -> Picture:
+        """Return the element over a color (3,) or a picture (rows, columns, 3)."""
+        return self.radiance + self.transmittance[..., None] * color
+
+
+def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple[int, int]) -> Element:
+    """Extract the smoke of a linear picture (rows, columns, 3) before its plate.
+
+    ``source`` (3,) is the usual J of the clip's smoke, within a factor of two. The element has a ``size`` (columns,
+    rows), at most the picture's; its pixels are means.
+    """
+    columns, rows = size
+    shrink = max(1.0, max(size) / MAX_CELLS)
+    cells = max(1, round(columns / shrink)), max(1, round(rows / shrink))
+    small, moments, pixels = _moments(picture, plate, cells)
+    fields, deviation, weight = _extracted(moments, pixels, source)
+    behind = plate.image
+    deviation = blurred(deviation, WINDOW_BLUR)
+    if cells != size or picture.shape[1::-1] != size:
+        small, behind = (area_average(each, columns, rows) for each in (picture, plate.image))
+    if cells != size:
+        fields, deviation, weight = (area_average(each, columns, rows) for each in (fields, deviation, weight))
+    clear = 1 - fields[..., 0]
+    smooth = fields[..., :1] * source_of(fields, source)
+    # what is finer than the cells is the smoke's own
+    left = small - clear[..., None] * behind - smooth
+    return Element(smooth + weight[..., None] * left, clear, deviation, weight)
+
+
+def source_of(fields: Picture, source: Picture) -> Picture:
+    """Return J (rows, columns, 3) from the fields of an extraction about a ``source`` (3,)."""
+    brightness = 2 / (1 + np.exp(-2 * fields[..., 1:2]))
+    return np.asarray(source * brightness * np.exp(fields[..., 2:] @ CHROMA_BASIS.T), np.float32)
+
+
+def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size: tuple[int, int]) -> Picture:
+    """Return the usual J (3,) of a clip's smoke from some of its pictures: the mean, by opacity squared, of ln J.
+
+    Its color (3,) is given, its brightness is first that of the brightest pixels. The pictures are reduced to a
+    ``size`` (columns, rows).
+    """
+    moments = [_moments(picture, plate, size)[1:] for picture, plate in pictures]
+    brightest = float(np.mean([np.percentile(channel_mean(picture), BRIGHT_PERCENTILE) for picture, _ in pictures]))
+    source = np.asarray(color, np.float32) / np.mean(color) * np.float32(max(brightest, MIN_SOURCE))
+    for _ in range(SOURCE_ROUNDS):
+        total = weights = 0.0
+        for sums, pixels in moments:
+            fields, _, weight = _extracted(sums, pixels, source)
+            solid = weight * np.square(fields[..., 0], dtype=np.float64)
+            total += float((solid * np.log(source_of(fields, source) / source).mean(-1)).sum())
+            weights += float(solid.sum())
+        source = source * np.float32(np.exp(total / max(weights, 1e-12)))
+    return source
+
+
+def _extracted(moments: Picture, pixels: float, source: Picture) -> tuple[Picture, Picture, Picture]:
+    """Opacity and fields of J, deviation of T and weight of the data by cell; see `_core.extract`."""
+    rows, columns = moments.shape[:2]
+    deviations = scale_deviations((columns, rows))
+    return _core.extract(moments, source.tolist(), deviations, OUTLIER_FREEDOM, pixels, ROUNDS, ITERATIONS)
+
+
+def scale_deviations(cells: tuple[int, int]) -> list[tuple[float, float, float, float]]:
+    """Return the prior's standard deviations by level: opacity, brightness and twice chroma of ln J."""
+    longer = max(cells)
+    levels = []
+    for level in range(_core.pyramid_levels(cells[1], cells[0])):
+        distance = 2.0**level / longer / FULL_SCALE
+        opacity = OPACITY_RANGE * min(distance, 1.0) ** ROUGHNESS
+        brightness = BRIGHTNESS_RANGE * min(distance / BRIGHTNESS_SCALE, 1.0) ** ROUGHNESS
+        levels.append((opacity, brightness, CHROMA * brightness, CHROMA * brightness))
+    chroma = CHROMA * BRIGHTNESS_RANGE
+    levels[-1] = MEAN_OPACITY, MEAN_BRIGHTNESS, chroma, chroma
+    return levels
+
+
+def _moments(picture: Picture, plate: Plate, cells: tuple[int, int]) -> tuple[Picture, Picture, float]:
+    """The mean picture of each cell, the moments (rows, columns, 11) that `_core.extract` takes, and a cell's pixels.
+
+    A plate that is continued behind smoke may be wrong: there the light that T lets through is less certain.
+    """
+    columns, rows = cells
+    whole = picture.shape[0] * picture.shape[1]
+    finer = tuple(min(round(FINER * count), whole) for count, whole in zip(cells, picture.shape[1::-1], strict=True))
+    picture = area_average(picture, *finer)
+    plate = plate.through(lambda whole: area_average(whole, *finer), whole / (finer[0] * finer[1]))
+    pixels = finer[0] * finer[1] / (columns * rows)
+    seen, behind, squares, products, known = (
+        area_average(each, columns, rows)
+        for each in (picture, plate.image, np.square(plate.image), picture * plate.image, plate.confidence)
+    )
+    variance = np.square(noise_at(seen, plate)) + np.float32(MODEL_ERROR * float(plate.image.mean())) ** 2
+    if plate.errors.any():
+        variance = variance + (1 - known)[..., None] * np.diag(plate.errors)
+    weight = np.float32(pixels) / np.maximum(variance, 1e-12)
+    moments = np.concatenate(
+        [
+            weight,
+            weight * behind,
+            3 * channel_mean(weight * squares)[..., None],
+            weight * (seen - behind),
+            3 * channel_mean(weight * (products - squares))[..., None],
+        ],
+        -1,
+    )
+    return seen, np.ascontiguousarray(moments, np.float32), pixels
