@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -127,16 +127,10 @@ def score_densities(
     pictures).
     """
     numbers = scored_frames(len(composed.transmittance))
-    renderer = scene_renderer(scene, None, BLACK)
-    clear, light = [], []
-    found = true = 0.0
-    for number in numbers:
-        volume = density(number)
-        light.append(renderer.image(volume))
-        clear.append(renderer.transmittance)
-        found += optical_mass(scene, volume[None])
-        true += optical_mass(smoke.scene, smoke.densities[number][None])
-    figures = score_element(np.stack(clear), np.stack(light), composed.frames(numbers)) | {"mass": _ratio(found, true)}
+    shown = seen_element(scene, [density(number) for number in numbers])
+    found = sum(optical_mass(scene, density(number)[None]) for number in numbers)
+    true = optical_mass(smoke.scene, smoke.densities[numbers])
+    figures = score_element(*shown, composed.frames(numbers)) | {"mass": _ratio(found, true)}
     viewed = [number for number in VIEWED if number < len(composed.transmittance)] or numbers[-1:]
     for view, camera in smoke.cameras.items():
         renderer, means = scene_renderer(scene, camera, BLACK), PictureMeans()
@@ -145,6 +139,14 @@ def score_densities(
             means.add(renderer.image(density(number)), seen)
         figures[f"psnr_{view}"] = means.figures()["psnr"]
     return figures
+
+
+def seen_element(scene: CompleteScene, densities: Iterable[Volume]) -> tuple[Picture, Picture]:
+    """Return what a scene's camera sees of volumes (nx, ny, nz): T (frames, rows, columns) and S, the same by 3."""
+    renderer = scene_renderer(scene, None, BLACK)
+    shown = [(renderer.image(density), renderer.transmittance) for density in densities]
+    light, clear = (np.stack(pictures) for pictures in zip(*shown, strict=True))
+    return clear, light
 
 
 def _resized(truth: Composed, shape: tuple[int, ...]) -> Composed:
