@@ -10,9 +10,9 @@ are only composed. Camera, box, medium and lights are given. With --black the sa
 which nothing has to be separated.
 
 OUT/SCENE-PLATE gets what `compose.compose` writes, and a sequence for each that is known. Rows are printed and added to
-OUT/rows.csv; what is there already is neither composed, reconstructed nor scored again. `score.py` says what the
-figures mean: T rms, imprint, mass, mass up to optical depth 3, the part of the faint tail that is kept, PSNR inside the
-smoke at the clip's pixels, PSNR of new views at 20, 45 and 90 degrees.
+OUT/rows.csv; what is there already is neither composed, reconstructed nor scored again, so each state of the code has
+an OUT of its own. `score.py` says what the figures mean: T rms, imprint, mass, mass up to optical depth 3, the fraction
+of the faint tail that is kept, PSNR inside the smoke at the clip's pixels, PSNR of new views at 20, 45 and 90 degrees.
 """
 
 from __future__ import annotations
