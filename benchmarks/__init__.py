@@ -7,6 +7,7 @@
 - ``stability``: damaged files, hostile values and failing systems against the command line
 - ``clean_clip``, ``disturbances``: what a camera, a codec or a wrong description costs
 - ``background``: backgrounds that are found beside known ones
+- ``extraction``: smoke separated from known plates, and what is reconstructed of it
 - ``direct``: smoke that is continued beside what came
 - ``file_kinds``: clips of every kind of file; ``tests/benchmarks/test_file_kinds.py`` reads some
 - ``blender``: pictures for the manual, and results beside their clips in Cycles

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from benchmarks.accuracy.scenes import BakedViews
 from benchmarks.background.clips import Smoke
@@ -13,7 +15,7 @@ from smokelift import Camera, Domain, Scene
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import Picture
 from smokelift.render import scene_renderer
-from smokelift.scene import completed
+from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array
 
 GRID = (24, 24, 36)
@@ -128,7 +130,7 @@ class Baked:
         )
 
 
-def optical_mass(scene: Scene, densities: Array) -> float:
+def optical_mass(scene: Scene | CompleteScene, densities: npt.NDArray[np.floating[Any]]) -> float:
     """Extinction times volume (m2) of densities (frames, x, y, z) that fill the box of a scene."""
     complete = completed(scene)
     sides = np.array(complete.domain.max) - complete.domain.min

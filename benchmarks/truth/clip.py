@@ -6,8 +6,11 @@ from typing import Any
 
 import av
 import numpy as np
+import numpy.typing as npt
 from av.video.reformatter import Interpolation
 from scipy import ndimage
+
+Array = npt.NDArray[Any]
 
 YAWS = {"front": 0, "nov20": 20, "nov45": 45, "side": 90}  # degrees about the vertical, towards +x
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
@@ -17,20 +20,20 @@ EXACT = int(
 )
 
 
-def srgb_encode(linear: np.ndarray) -> np.ndarray:
+def srgb_encode(linear: Array) -> Array:
     """Return 8-bit sRGB values of linear ones."""
     linear = np.clip(linear, 0.0, 1.0)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.round(255.0 * encoded).astype(np.uint8)
+    return np.asarray(np.round(255.0 * encoded), np.uint8)
 
 
-def srgb_decode(picture: np.ndarray) -> np.ndarray:
+def srgb_decode(picture: Array) -> Array:
     """Return linear values of 8-bit sRGB ones."""
     encoded = picture / 255.0
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
-def wall(width: int, height: int, seed: int) -> np.ndarray:
+def wall(width: int, height: int, seed: int) -> Array:
     """Paint what stands behind the smoke: plaster, a rail, boards, the floor, and a bowl that it rises from.
 
     Parameters
@@ -50,12 +53,12 @@ def wall(width: int, height: int, seed: int) -> np.ndarray:
     scale = fine * height / 384  # the sizes below are for 384 rows
     y, x = (np.mgrid[: fine * height, : fine * width] + 0.5) / scale
 
-    def noise(*sigma: float) -> np.ndarray:
+    def noise(*sigma: float) -> Array:
         field = ndimage.gaussian_filter(rng.normal(size=x.shape), np.multiply(sigma, scale), mode="wrap")
-        return field / field.std()
+        return np.asarray(field / field.std())
 
-    def paint(rgb: tuple[float, float, float], shade: np.ndarray) -> np.ndarray:
-        return np.array(rgb) * shade[..., None]
+    def paint(rgb: tuple[float, float, float], shade: Array) -> Array:
+        return np.asarray(np.array(rgb) * shade[..., None])
 
     blotches = 0.10 * noise(40, 40) + 0.07 * noise(12, 12) + 0.05 * noise(4, 4) + 0.04 * noise(0.8, 0.8)
     plaster = np.exp(blotches + 0.05 * noise(1, 9))
@@ -93,10 +96,10 @@ def wall(width: int, height: int, seed: int) -> np.ndarray:
     rim, mouth = u**2 + (v / 5.5) ** 2, (u / 0.92) ** 2 + (v / 4.0) ** 2
     picture = np.where((rim < 1)[..., None], paint((0.085, 0.078, 0.074), 1 - 0.6 * u), picture)
     picture = np.where((mouth < 1)[..., None], paint((0.012, 0.011, 0.010), np.ones_like(u)), picture)
-    return picture.reshape(height, fine, width, fine, 3).mean(axis=(1, 3))
+    return np.asarray(picture.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)))
 
 
-def look_at(position: np.ndarray, target: np.ndarray, up: np.ndarray) -> np.ndarray:
+def look_at(position: Array, target: Array, up: Array) -> Array:
     """Return the 4x4 camera-to-world matrix; the camera looks along its -Z."""
     back = (position - target) / np.linalg.norm(position - target)
     right = np.cross(up, back)
@@ -106,7 +109,7 @@ def look_at(position: np.ndarray, target: np.ndarray, up: np.ndarray) -> np.ndar
     return matrix
 
 
-def turned(camera: dict[str, Any], degrees: float) -> tuple[np.ndarray, str]:
+def turned(camera: dict[str, Any], degrees: float) -> tuple[Array, str]:
     """Turn a scene's camera about the world's vertical axis.
 
     Returns
@@ -130,7 +133,7 @@ size = {camera["size"]}
     return matrix, text
 
 
-def crop(density: np.ndarray, low: np.ndarray, voxel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def crop(density: Array, low: Array, voxel: float) -> tuple[Array, Array, Array]:
     """Cut the smoke out, with a voxel of clear air around it; return it with the corners of its box."""
     filled = np.nonzero(density)
     first = np.array([max(i.min() - 1, 0) for i in filled])
@@ -139,14 +142,14 @@ def crop(density: np.ndarray, low: np.ndarray, voxel: float) -> tuple[np.ndarray
     return part, low + first * voxel, low + last * voxel
 
 
-def blocks(image: np.ndarray) -> np.ndarray:
+def blocks(image: Array) -> Array:
     """Average over blocks of pixels."""
     height, width = image.shape[:2]
     b = CHECK_BLOCK
-    return image.reshape(height // b, b, width // b, b, -1).mean(axis=(1, 3))
+    return np.asarray(image.reshape(height // b, b, width // b, b, -1).mean(axis=(1, 3)))
 
 
-def write_png(path: Path, picture: np.ndarray) -> None:
+def write_png(path: Path, picture: Array) -> None:
     """Write an 8-bit picture."""
     with av.open(str(path), "w", format="image2", options={"update": "1"}) as container:
         stream = container.add_stream("png", options={"pred": "mixed", "compression_level": "9"})
@@ -156,7 +159,7 @@ def write_png(path: Path, picture: np.ndarray) -> None:
             container.mux(packet)
 
 
-def write_video(path: Path, pictures: list[np.ndarray], fps: float, crf: int) -> None:
+def write_video(path: Path, pictures: list[Array], fps: float, crf: int) -> None:
     """Write 8-bit pictures as H.264, BT.709."""
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", rate=round(fps), options={"crf": str(crf), "preset": "veryslow"})

@@ -1,0 +1,218 @@
+"""Smoke before plates: the files that are composed, and the figures of elements and volumes."""
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.extraction.__main__ import main
+from benchmarks.extraction.compose import FRAME, GIVEN, KNOWN, UNKNOWN, BakedSmoke, Composed, Filming, compose
+from benchmarks.extraction.plates import PAINTED, PHOTOGRAPHS, plate
+from benchmarks.extraction.rows import Row, Rows, cells
+from benchmarks.extraction.score import score_densities, score_element, scored_frames
+from smokelift import Camera, Clip, DirectionalLight, Domain, Medium, Scene
+from smokelift.footage.images import linear_to_srgb, read_image
+from smokelift.output.images import write_image
+from smokelift.render import scene_renderer
+from smokelift.scene import completed, orbit
+from smokelift.transport import face_shapes
+
+SHAPE, FRAMES, VOXEL = (16, 16, 24), 12, 0.125
+FILES = {"front": 0, "nov20": 20, "nov45": 45, "side": 90}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A scene's folder with a ball of smoke that fades, whose front has no transmittance."""
+    folder = tmp_path_factory.mktemp("ball")
+    x, y, z = np.meshgrid(*((np.arange(n) + 0.5 - n / 2) * VOXEL for n in SHAPE), indexing="ij")
+    ball = np.maximum(1 - 2 * (x**2 + y**2 + z**2), 0)
+    density = np.stack([ball * (1 - 0.05 * frame) for frame in range(FRAMES)]).astype(np.float16)
+    faces = {
+        f"velocity_{axis}": np.zeros((FRAMES, *shape), np.float16)
+        for axis, shape in zip("xyz", face_shapes(SHAPE), strict=True)
+    }
+    inflow = np.zeros((FRAMES, density[0].size // 8), np.uint8)
+    np.savez(folder / "truth.npz", density=density, inflow_packed=inflow, voxel_size=VOXEL, fps=24, **faces)
+    scene = Scene(
+        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(48, 72)),
+        domain=Domain((-1, -1, 0), (1, 1, 3), SHAPE),
+        medium=Medium(3.0, 0.8),
+        lights=(DirectionalLight((-0.4, 0.5, -0.8), (8, 8, 8)),),
+        scattering="single",
+    )
+    scene.save(folder / "scene.toml")
+    for name, angle in FILES.items():
+        camera = orbit(scene.camera, scene.domain, angle)
+        Scene(camera=camera).save(folder / f"{name}.toml")
+        renderer = scene_renderer(completed(scene), camera, np.zeros(3, np.float32))
+        pictures = [renderer.image(each.astype(np.float32))[..., 0] for each in density]
+        np.savez(folder / f"{name}.npz", image=np.stack(pictures).astype(np.float16))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def smoke(folder) -> BakedSmoke:
+    return BakedSmoke.load(folder, FRAMES)
+
+
+@pytest.fixture(scope="module")
+def before_planks(smoke, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("composed") / "ball-planks"
+    compose(smoke, "planks", Filming(), out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def composed(before_planks) -> Composed:
+    return Composed.load(before_planks)
+
+
+def test_a_clip_shows_smoke_before_its_plate(before_planks, composed) -> None:
+    with Clip.open(Scene.load(before_planks / f"{GIVEN}.toml").clip) as clip:
+        assert len(clip) == FRAMES
+        difference = linear_to_srgb(clip.frame(6)) - linear_to_srgb(composed.picture(6))
+    assert np.abs(difference).mean() < 0.03  # H.264 halves the chroma
+    np.testing.assert_allclose(read_image(before_planks / "plate.png"), composed.plate, atol=1e-4)
+
+
+def test_scene_files_know_the_plate_a_frame_or_nothing(before_planks) -> None:
+    assert {f"{known}.toml" for known in KNOWN} == {path.name for path in before_planks.glob("*.toml")}
+    given, unknown = (Scene.load(before_planks / f"{known}.toml") for known in (GIVEN, UNKNOWN))
+    assert given.background is not None and given.background.image == before_planks / "plate.png"
+    assert replace(given, background=None) == unknown
+    # the ball is thinnest in the last frame
+    assert f"[background]\nframe = {FRAMES - 1}\n" in (before_planks / f"{FRAME}.toml").read_text()
+
+
+def test_what_is_composed_stays_and_is_not_taken_for_another_clip(smoke, folder, before_planks) -> None:
+    written = (before_planks / "clip.mp4").stat().st_mtime_ns
+    compose(smoke, "planks", Filming(), before_planks)
+    assert (before_planks / "clip.mp4").stat().st_mtime_ns == written
+    with pytest.raises(ValueError, match="another OUT"):
+        compose(BakedSmoke.load(folder, 3), "planks", Filming(), before_planks)
+
+
+def test_the_transmittance_that_is_stored_goes_before_the_renderer_s(folder, smoke, tmp_path) -> None:
+    assert 0 < smoke.front.transmittance.min() < 0.2
+    for path in folder.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    stored = np.full(smoke.front.radiance.shape, 0.5, np.float16)
+    np.savez(tmp_path / "front.npz", image=smoke.front.radiance.astype(np.float16), transmittance=stored)
+    assert (BakedSmoke.load(tmp_path, FRAMES).front.transmittance == 0.5).all()
+
+
+def test_a_camera_adds_what_its_name_says(smoke) -> None:
+    pictures = smoke.front.before(plate("sky", 72, 48))
+    spoiled = Filming(crf=30, noise=0.02, drifts=True)
+    assert (Filming().name, spoiled.name) == ("", "-crf30-noise2-drift")
+    assert np.std(Filming(noise=0.02).filmed(pictures) - linear_to_srgb(pictures)) == pytest.approx(0.02, rel=0.05)
+    redder = spoiled.filmed(pictures)[-1, ..., 0].mean() / linear_to_srgb(pictures)[-1, ..., 0].mean()
+    assert redder == pytest.approx(1.1, abs=0.03)  # a quarter more light
+
+
+@pytest.mark.parametrize("name", PAINTED)
+def test_a_painted_plate_is_one_picture_for_ever(name) -> None:
+    painted = plate(name, 72, 48)
+    assert painted.shape == (72, 48, 3)
+    assert painted.min() >= 0 and painted.max() <= 1
+    np.testing.assert_array_equal(painted, plate(name, 72, 48))
+
+
+def test_a_picture_is_cropped_to_the_clip_about_its_middle(tmp_path) -> None:
+    picture = np.zeros((60, 120, 3), np.float32)
+    picture[:, 40:80] = 0.5
+    write_image(tmp_path / "strip.png", picture)
+    assert plate(str(tmp_path / "strip.png"), 30, 20) == pytest.approx(0.5, abs=0.005)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("skimage") is None, reason="scikit-image is not installed")
+@pytest.mark.parametrize("name", PHOTOGRAPHS)
+def test_photographs_come_from_scikit_image(name) -> None:
+    assert np.std(plate(name, 96, 64)) > 0.05
+
+
+def test_the_true_element_has_nothing_wrong(composed) -> None:
+    figures = score_element(composed.transmittance, composed.radiance, composed)
+    assert figures["transmittance_error"] == figures["radiance_error"] == figures["imprint"] == 0
+    assert (figures["thin_mass"], figures["tail"]) == pytest.approx((1, 1))
+    assert figures["psnr"] > 100
+
+
+def test_a_plate_that_is_printed_on_the_smoke_is_an_imprint(composed) -> None:
+    printed = composed.transmittance + 0.1 * (composed.plate.mean(-1) - composed.plate.mean())
+    figures = score_element(printed, composed.radiance, composed)
+    assert figures["imprint"] > 0.99
+    noise = 0.01 * np.random.default_rng(0).standard_normal(composed.transmittance.shape)
+    assert score_element(composed.transmittance + noise, composed.radiance, composed)["imprint"] < 0.1
+
+
+def test_a_plate_without_detail_cannot_be_printed(smoke, tmp_path) -> None:
+    before_black = compose(smoke, "black", Filming(), tmp_path / "ball-black")
+    figures = score_element(0.9 * before_black.transmittance, before_black.radiance, before_black)
+    assert figures["imprint"] is None
+    assert figures["transmittance_error"] > 0.01
+    assert figures["psnr"] > 100  # nothing shows behind
+
+
+def test_a_cut_tail_and_too_thin_smoke_are_seen(composed) -> None:
+    clear = composed.transmittance
+    assert score_element(np.where(clear > 0.9, 1, clear), composed.radiance, composed)["tail"] == 0
+    assert score_element(0 * clear, composed.radiance, composed)["tail"] == pytest.approx(1)
+    assert score_element(np.sqrt(clear), composed.radiance, composed)["thin_mass"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_smaller_element_is_compared_at_its_size(composed) -> None:
+    half = composed.transmittance[:, ::2, ::2], composed.radiance[:, ::2, ::2]
+    assert score_element(*half, composed)["transmittance_error"] < 0.06
+    with pytest.raises(ValueError, match="same frames"):
+        score_element(composed.transmittance[1:], composed.radiance[1:], composed)
+
+
+def test_the_true_volumes_score_as_the_truth(smoke, composed) -> None:
+    scene = completed(smoke.scene)
+    figures = score_densities(scene, lambda frame: smoke.densities[frame].astype(np.float32), smoke, composed)
+    assert figures["transmittance_error"] < 1e-3
+    assert figures["mass"] == pytest.approx(1)
+    assert min(figures[f"psnr_{view}"] for view in (20, 45, 90)) > 50
+    dark = score_densities(scene, lambda frame: 0.5 * smoke.densities[frame].astype(np.float32), smoke, composed)
+    assert dark["mass"] == pytest.approx(0.5)
+    assert dark["psnr_90"] < 40
+
+
+def test_a_long_clip_is_compared_at_moments_apart() -> None:
+    assert scored_frames(28) == [8, 14, 20, 26]
+    assert scored_frames(5) == [4]
+
+
+def test_rows_are_kept_and_refusals_are_not(tmp_path) -> None:
+    path = tmp_path / "rows.csv"
+    row = Row("ball", "planks", GIVEN, "balanced", "48,48,72")
+    assert Rows.read(path).find(row) is None
+    rows = Rows.read(path)
+    rows.add(replace(row, refused="no."))
+    rows.add(replace(row, known=UNKNOWN, figures={"mass": 0.5, "imprint": None}))
+    assert Rows.read(path).find(row) is None
+    found = Rows.read(path).find(replace(row, known=UNKNOWN))
+    assert found is not None and (found.figures["mass"], found.figures["imprint"]) == (0.5, None)
+    assert "0.50" in cells(found)
+    assert "refused: no." in cells(replace(row, refused="no."))
+
+
+def test_the_command_only_composes_where_nothing_is_known(folder, tmp_path, capsys) -> None:
+    main([str(tmp_path), str(folder), "--plates", "sky", "--known", "--frames", "3"])
+    assert (tmp_path / f"{folder.name}-sky" / "clip.mp4").exists()
+    assert not (tmp_path / "rows.csv").exists()
+
+
+def test_the_command_measures_once(folder, tmp_path, capsys) -> None:
+    command = [str(tmp_path), str(folder), "--plates", "sky", "--known", GIVEN, "--frames", "3"]
+    command += ["--quality", "draft", "--resolution", "16,16,24"]
+    main(command)
+    first = capsys.readouterr().out.splitlines()[-1]
+    assert first.startswith(f"| {folder.name} | sky | given |")
+    (tmp_path / f"{folder.name}-sky" / "clip.mp4").unlink()
+    main(command)
+    assert capsys.readouterr().out.splitlines()[-1] == first
