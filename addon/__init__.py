@@ -13,7 +13,8 @@ It knows nothing of the engine but its command line and its files. From what kno
   for these three), `instances` (the smoke at other times), `nodes` (the node groups of these), `undistort` (the clip
   without its lens's distortion), `usd` (an export that is imported), `follow` (paths of a .blend that is saved
   elsewhere).
-- Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
+- Work beside Blender: `run` (the queue of takes), `side_job` (what changes no result), `shot_check` (the forecast of a
+  run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
   with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
@@ -58,12 +59,13 @@ def _modules() -> tuple[ModuleType, ...]:
         results_panel,
         run,
         setup_panel,
+        side_job,
         undistort,
         usd,
         volume,
     )
 
-    data = (preferences, properties, volume, follow, run)
+    data = (preferences, properties, volume, follow, run, side_job)
     buttons = (operators, box, place, editors, instances, undistort, drop, presets, usd)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)
