@@ -16,7 +16,7 @@ It knows nothing of the engine but its command line and its files. From what kno
 - Work beside Blender: `run` (the queue of takes), `side_job` (what changes no result), `shot_check` (the forecast of a
   run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
-  with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
+  with the sub-panels `element`, `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
   `operators`, `strokes_panel`, `box`, `place` and `editors` (`needs` says when they can be pressed); `drop`, `presets`
   and `preferences`, which Blender calls so.
@@ -47,6 +47,7 @@ def _modules() -> tuple[ModuleType, ...]:
         direct_panel,
         drop,
         editors,
+        element,
         export,
         follow,
         instances,
@@ -69,5 +70,5 @@ def _modules() -> tuple[ModuleType, ...]:
 
     data = (preferences, properties, volume, follow, run, side_job)
     buttons = (operators, background, strokes_panel, box, place, editors, instances, undistort, drop, presets, usd)
-    panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
+    panels = (panel, element, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

@@ -150,7 +150,7 @@ def draw_work(
     own = operator == side_job.operator
     if own and side_job.writing:
         job = side_job.job
-        text = iface_("{:d} of {:d}").format(job.done, job.total)
+        text = iface_("{:d} of {:d}").format(job.done, job.total) if job.total else iface_("Reading the clip")
         layout.progress(factor=job.done / job.total if job.total else 0.0, text=text, translate=False)
         layout.operator("smokelift.stop_writing", text="Cancel", icon="CANCEL")
     else:
