@@ -6,19 +6,20 @@ It knows nothing of the engine but its command line and its files. From what kno
   (a speed ramp), `sentences` (the engine's messages in the panel's words), `contract` (what the add-on repeats of the
   engine).
 - Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
-  `scene_file` (Blender scene to scene file: `clip_table`, `camera_table`, `box_table` and `light_tables`, of
-  a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `proxy` (what viewports show of a
-  large one), `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the
-  clip), `compositing` (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate
-  for these three), `instances` (the smoke at other times), `nodes` (the node groups of these), `undistort` (the clip
-  without its lens's distortion), `usd` (an export that is imported), `follow` (paths of a .blend that is saved
-  elsewhere).
-- Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
+  `scene_file` (Blender scene to scene file: `clip_table`, `background`, `strokes`, `camera_table`, `box_table`
+  and `light_tables`, of a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `proxy` (what
+  viewports show of a large one), `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and
+  light that match the clip), `compositing` (smoke over the clip), `projection` (the clip's background on a card),
+  `plate` (the clean plate for these three), `instances` (the smoke at other times), `nodes` (the node groups of these),
+  `clip_pictures` (frames of the clip as files), `undistort` (the clip without its lens's distortion), `usd` (an export
+  that is imported), `follow` (paths of a .blend that is saved elsewhere).
+- Work beside Blender: `run` (the queue of takes), `side_job` (what changes no result), `shot_check` (the forecast of a
+  run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
-  with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
+  with the sub-panels `element`, `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
-  `operators`, `box`, `place` and `editors` (`needs` says when they can be pressed); `drop`, `presets` and
-  `preferences`, which Blender calls so.
+  `operators`, `strokes_panel`, `box`, `place` and `editors` (`needs` says when they can be pressed); `drop`, `presets`
+  and `preferences`, which Blender calls so.
 """
 
 from types import ModuleType
@@ -40,11 +41,13 @@ def _modules() -> tuple[ModuleType, ...]:
     """Modules with something to register, each after those it needs; panels in the order of the tab."""
     from . import (
         advanced_panel,
+        background,
         batch,
         box,
         direct_panel,
         drop,
         editors,
+        element,
         export,
         follow,
         instances,
@@ -58,12 +61,14 @@ def _modules() -> tuple[ModuleType, ...]:
         results_panel,
         run,
         setup_panel,
+        side_job,
+        strokes_panel,
         undistort,
         usd,
         volume,
     )
 
-    data = (preferences, properties, volume, follow, run)
-    buttons = (operators, box, place, editors, instances, undistort, drop, presets, usd)
-    panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
+    data = (preferences, properties, volume, follow, run, side_job)
+    buttons = (operators, background, strokes_panel, box, place, editors, instances, undistort, drop, presets, usd)
+    panels = (panel, element, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

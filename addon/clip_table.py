@@ -25,11 +25,11 @@ def clip_table(smoke: bpy.types.Object) -> dict[str, Any]:
     clip = settings.clip
     if clip is None:
         raise ShotError("Choose a clip first.")
-    path, count = clip_path(clip), _frame_count(clip)
+    path, count = clip_path(clip), frame_count(clip)
     if not 1 <= settings.first <= settings.last <= count:
         raise ShotError(f"Frames {settings.first} to {settings.last} are not in the clip: it has frames 1 to {count}.")
-    before = clip.frame_offset - 1
-    table: dict[str, Any] = {"path": str(path), "frames": [settings.first + before, settings.last + before]}
+    frames = [number_in_file(clip, number) for number in (settings.first, settings.last)]
+    table: dict[str, Any] = {"path": str(path), "frames": frames}
     if settings.fps > 0.0:
         table["fps"] = settings.fps
     elif clip.source == "SEQUENCE":
@@ -54,7 +54,28 @@ def _transfer(clip: bpy.types.MovieClip) -> str | None:
     return None if TRANSFERS[space] == usual else TRANSFERS[space]
 
 
-def _frame_count(clip: bpy.types.MovieClip) -> int:
+def number_in_file(clip: bpy.types.MovieClip, number: int) -> int:
+    """The number in the clip's file, from 0 as the engine counts, of a frame that is counted from 1."""
+    return number + clip.frame_offset - 1
+
+
+def shown_frame(smoke: bpy.types.Object) -> int:
+    """The frame of the clip that the scene shows now, counted from 1.
+
+    Raises
+    ------
+    ShotError
+        If it shows none.
+    """
+    clip, now = smoke.smokelift.clip, scene_of(smoke).frame_current
+    start, count = clip.frame_start, frame_count(clip)
+    if not start <= now < start + count:
+        raise ShotError(f"The clip is not seen in frame {now}: go to one from {start} to {start + count - 1}.")
+    return now - start + 1
+
+
+def frame_count(clip: bpy.types.MovieClip) -> int:
+    """The number of frames that Blender finds in a clip; ShotError if it cannot be read."""
     path = clip_path(clip)
     if not path.is_file():
         raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
@@ -73,7 +94,7 @@ def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
     """
     settings = smoke.smokelift
     lowest = settings.clip.frame_offset
-    highest = lowest + _frame_count(settings.clip) - 1
+    highest = lowest + frame_count(settings.clip) - 1
     if not lowest <= first <= last <= highest:
         raise ShotError(f"Frames {first} to {last} are not in the clip: it has frames {lowest} to {highest}, from 0.")
     settings.first, settings.last = first - lowest + 1, last - lowest + 1

@@ -1,6 +1,7 @@
-"""What is read in other editors of Blender: the log of a run, and the page of what was found in the clip."""
+"""What is shown in other editors of Blender: the log of a run, pictures, the page of what was found in the clip."""
 
 import functools
+import time
 from pathlib import Path
 
 import bpy
@@ -15,6 +16,9 @@ from .take import Take
 DRAWN_SECONDS = 0.3
 """After which a new window has been drawn."""
 
+LONGEST_OPENING = 5.0
+"""Seconds in which a sidebar is drawn for the first time."""
+
 LOG_TEXT = "Smokelift Log"
 
 
@@ -26,7 +30,7 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> set[str]:
         log = Take(Path(self.take)).log_file
         if not log.is_file():
             self.report({"ERROR"}, rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
@@ -34,8 +38,8 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
         text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
         text.from_string(log.read_text(encoding="utf-8", errors="replace"))
         if not bpy.app.background:
-            editor = _editor(context, "TEXT_EDITOR")
-            editor.text, editor.top = text, 0
+            space = _editor("TEXT_EDITOR").spaces.active
+            space.text, space.top = text, 0
         return {"FINISHED"}
 
 
@@ -56,13 +60,25 @@ class SMOKELIFT_OT_show_page(NeedsClip, bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> set[str]:
         page = bpy.data.images.load(str(shot_check.page_file()), check_existing=True)
         page.reload()
         if not bpy.app.background:
-            _editor(context, "IMAGE_EDITOR").image = page
-            bpy.app.timers.register(functools.partial(_fit, page.name), first_interval=DRAWN_SECONDS)
+            show_image(page)
         return {"FINISHED"}
+
+
+def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
+    """Show the whole of a picture in an Image Editor in a mode, so that one that is painted and one of the result stay.
+
+    To view, it is over a checker where it is transparent; to paint, it is shown without its alpha.
+    """
+    area = _editor("IMAGE_EDITOR", mode)
+    space = area.spaces.active
+    space.mode, space.image = mode, image
+    space.display_channels = "COLOR" if mode == "PAINT" else "COLOR_ALPHA"
+    bpy.app.timers.register(functools.partial(_fit, image.name), first_interval=DRAWN_SECONDS)
+    return area
 
 
 def _fit(name: str) -> None:
@@ -76,15 +92,40 @@ def _fit(name: str) -> None:
                     bpy.ops.image.view_all(fit_view=True)
 
 
-def _editor(context: bpy.types.Context, kind: str) -> bpy.types.Space:
-    """An editor of a kind, in a window of its own if there is none."""
-    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
-    found = next((area for area in areas if area.type == kind), None)
+def _editor(kind: str, mode: str = "") -> bpy.types.Area:
+    """An editor of a kind, and of a mode if it has some; in a window of its own if there is none."""
+    manager = bpy.context.window_manager
+    areas = [area for window in manager.windows for area in window.screen.areas]
+    fitting = (area for area in areas if area.type == kind and mode in ("", area.spaces.active.mode))
+    found = next(fitting, None)
     if found is None:
-        bpy.ops.wm.window_new()
-        found = context.window_manager.windows[-1].screen.areas[0]
+        with bpy.context.temp_override(window=manager.windows[0]):  # a timer has none
+            bpy.ops.wm.window_new()
+        found = manager.windows[-1].screen.areas[0]
         found.type = kind
-    return found.spaces.active
+    return found
+
+
+def open_tab(area: bpy.types.Area) -> None:
+    """Show the tab in the sidebar of an editor."""
+    area.spaces.active.show_region_ui = True
+    choose = functools.partial(_choose_tab, area.as_pointer(), time.monotonic() + LONGEST_OPENING)
+    bpy.app.timers.register(choose)
+
+
+def _choose_tab(area_pointer: int, end: float) -> float | None:
+    """Choose the tab in the sidebar of an area; a timer, as one that was never open has no tabs before it is drawn."""
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    area = next((area for area in areas if area.as_pointer() == area_pointer), None)
+    if area is None or time.monotonic() > end:
+        return None
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    try:
+        sidebar.active_panel_category = "Smokelift"
+    except (AttributeError, TypeError):
+        return DRAWN_SECONDS
+    area.tag_redraw()
+    return None
 
 
 register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_open_log, SMOKELIFT_OT_show_page))

@@ -1,28 +1,23 @@
-"""Hands a smoke on: an export of its files, and assets; and makes the proxy of one that has none.
-
-That changes no result, so it is no run of the queue: a timer of Blender polls the engine.
-"""
+"""Hands a smoke on: an export of its files, and assets; and makes the proxy of one that has none."""
 
 import json
-import time
 from pathlib import Path
-from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
-from . import preferences, smoke_takes, volume
+from . import smoke_takes, volume
 from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from .instances import copy_of, remove_scattered, scatter
-from .job import EngineMissingError, Job, engine_command
+from .job import EngineMissingError, Job
 from .needs import NeedsResult
 from .panel import draw_text
 from .paths import PATH_OPTIONS, absolute
+from .side_job import Request, Writes, again, draw_work, side_job
 from .smoke import active_smoke, find_smoke
-from .subpanel import OfResult, redraw
+from .subpanel import OfResult
 
-TICK_SECONDS = 0.1
 REST_SECONDS = 0.4
 """Time without a change of settings before the size is estimated."""
 
@@ -31,7 +26,7 @@ ASSET_TIMES = 8
 
 
 def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
-    _session.ask_size(settings.id_data)
+    _estimate.ask(settings.id_data)
 
 
 class SmokeliftExport(bpy.types.PropertyGroup):
@@ -78,87 +73,35 @@ class SmokeliftExport(bpy.types.PropertyGroup):
     )
 
 
-class _Session:
-    """What the engine works on: an export, a proxy, or the estimate of an export; never saved."""
+class _Estimate:
+    """The size of the next export of a smoke; never saved."""
 
     def __init__(self) -> None:
-        self.job: Job | None = None
         self.smoke = 0
         self.size = ""
-        self.sentence = ""
-        self.operator = ""
-        """What writes files, while it does and after that; empty for an estimate."""
-        self._asked = 0
 
-    @property
-    def working(self) -> bool:
-        """Whether files are being written."""
-        return self.job is not None and bool(self.operator)
+    def ask(self, smoke: bpy.types.Object) -> None:
+        """Estimate the size once the settings rest. Drawing code may call this."""
+        if not bpy.app.background and not side_job.writing:
+            self.smoke, self.size = smoke.session_uid, ""
+            again(self.start, REST_SECONDS)
 
-    def ask_size(self, smoke: bpy.types.Object) -> None:
-        """Estimate the size of an export once its settings rest. Drawing code may call this."""
-        if bpy.app.background or self.working:
-            return
-        self._asked, self.smoke, self.size = smoke.session_uid, smoke.session_uid, ""
-        _again(self._start_size, REST_SECONDS)
-
-    def start(self, smoke: bpy.types.Object, words: list[str], operator: str = "") -> None:
-        """Start the engine; EngineMissingError if there is none."""
-        self.stop()
-        self.smoke, self.operator, self.sentence = smoke.session_uid, operator, ""
-        words = [*words, "--progress", "json", *preferences.thread_options()]
-        self.job = Job(engine_command(words), Path(bpy.app.tempdir) / "smokelift_export.log")
-        self.job.start()
-        _again(self.poll, TICK_SECONDS)
-
-    def stop(self) -> None:
-        """End the engine at once."""
-        if self.job is not None:
-            self.job.kill()
-        self.job = None
-
-    def poll(self) -> float | None:
-        """Read what the engine says; a timer that ends with it."""
-        job = self.job
-        if job is None:
-            return None
-        if job.poll():
-            redraw(bpy.context.window_manager)
-        if not job.ended:
-            return TICK_SECONDS
-        self.job = None
-        done = job.outcome == "done"
-        if not self.operator:
-            self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
-            return None
-        self.sentence = job.sentence
+    def start(self) -> None:
+        """Start the engine; a timer that runs once."""
         smoke = find_smoke(self.smoke)
-        if smoke is None or not done:
-            return None
-        if self.operator == SMOKELIFT_OT_make_proxy.bl_idname:
-            volume.show(smoke, volume.shown_take(smoke))
-        elif smoke.smokelift_export.host == "blender":
-            write_asset(smoke, folder_of(smoke))
-        return None
-
-    def _start_size(self) -> None:
-        smoke = find_smoke(self._asked)
-        if smoke is None or self.working or volume.shown_take(smoke) is None:
+        if smoke is None or side_job.writing or volume.shown_take(smoke) is None:
             return
         try:
-            self.start(smoke, [*arguments(smoke), "--size"])
+            side_job.start(smoke, ([*arguments(smoke), "--size"], self._keep))
         except EngineMissingError as error:
             self.size = str(error)
 
-
-def _again(timer: Any, seconds: float) -> None:
-    """Have Blender call a function, once, however often it is asked for."""
-    if bpy.app.timers.is_registered(timer):
-        bpy.app.timers.unregister(timer)
-    bpy.app.timers.register(timer, first_interval=seconds)
+    def _keep(self, _smoke: bpy.types.Object, job: Job) -> None:
+        done = job.outcome == "done"
+        self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
 
 
-_session = _Session()
+_estimate = _Estimate()
 
 
 def folder_of(smoke: bpy.types.Object) -> Path:
@@ -209,77 +152,34 @@ def _first(folder: Path) -> int:
     return int(json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0])
 
 
-class _Writes(NeedsResult):
-    """An operator that has the engine write files of the result on show; without a window it waits for them."""
-
-    def words(self, smoke: bpy.types.Object) -> list[str]:
-        """The engine's arguments."""
-        raise NotImplementedError
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
-        try:
-            _session.start(smoke, self.words(smoke), type(self).bl_idname)
-        except EngineMissingError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        if not bpy.app.background:
-            return {"FINISHED"}
-        job = _session.job
-        while _session.poll() is not None:
-            time.sleep(TICK_SECONDS)
-        if job.outcome != "done":
-            self.report({"ERROR"}, job.sentence)
-            return {"CANCELLED"}
-        return {"FINISHED"}
-
-
-class SMOKELIFT_OT_export(_Writes, bpy.types.Operator):
+class SMOKELIFT_OT_export(Writes, NeedsResult, bpy.types.Operator):
     """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
 
     bl_idname = "smokelift.export"
     bl_label = "Export Smoke"
 
-    def words(self, smoke: bpy.types.Object) -> list[str]:
-        return arguments(smoke)
+    def request(self, smoke: bpy.types.Object) -> Request:
+        return arguments(smoke), _complete
 
 
-class SMOKELIFT_OT_make_proxy(_Writes, bpy.types.Operator):
+def _complete(smoke: bpy.types.Object, job: Job) -> None:
+    if job.outcome == "done" and smoke.smokelift_export.host == "blender":
+        write_asset(smoke, folder_of(smoke))
+
+
+class SMOKELIFT_OT_make_proxy(Writes, NeedsResult, bpy.types.Operator):
     """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
 
     bl_idname = "smokelift.make_proxy"
     bl_label = "Make Proxy"
 
-    def words(self, smoke: bpy.types.Object) -> list[str]:
-        return ["proxy", str(volume.shown_take(smoke).directory)]
+    def request(self, smoke: bpy.types.Object) -> Request:
+        return ["proxy", str(volume.shown_take(smoke).directory)], _show
 
 
-class SMOKELIFT_OT_cancel_export(bpy.types.Operator):
-    """Stop the export"""
-
-    bl_idname = "smokelift.cancel_export"
-    bl_label = "Cancel Export"
-    bl_options = {"INTERNAL"}
-
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        _session.stop()
-        return {"FINISHED"}
-
-
-def draw_work(
-    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, operator: str, icon: str
-) -> None:
-    """The button that has files written; their progress while that is at work, and what it said at its end."""
-    own = operator == _session.operator
-    if own and _session.working:
-        job = _session.job
-        text = iface_("{:d} of {:d}").format(job.done, job.total)
-        layout.progress(factor=job.done / job.total if job.total else 0.0, text=text, translate=False)
-        layout.operator("smokelift.cancel_export", text="Cancel", icon="CANCEL")
-    else:
-        layout.operator(operator, icon=icon)
-    if own and _session.smoke == smoke.session_uid and _session.sentence:
-        draw_text(layout, context, _session.sentence, "INFO")
+def _show(smoke: bpy.types.Object, job: Job) -> None:
+    if job.outcome == "done":
+        volume.show(smoke, volume.shown_take(smoke))
 
 
 class _ExportPanel(OfResult):
@@ -294,10 +194,10 @@ class _ExportPanel(OfResult):
         layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
         for name in ("host", "precision", "use_velocity", "proxy"):
             layout.prop(settings, name)
-        if _session.smoke != smoke.session_uid:
-            _session.ask_size(smoke)
-        elif _session.size:
-            draw_text(layout, context, _session.size, "DISK_DRIVE")
+        if _estimate.smoke != smoke.session_uid:
+            _estimate.ask(smoke)
+        elif _estimate.size:
+            draw_text(layout, context, _estimate.size, "DISK_DRIVE")
         draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
         layout.operator("smokelift.add_instance", icon="DUPLICATE")
         layout.operator("smokelift.scatter", icon="GEOMETRY_NODES")
@@ -320,7 +220,6 @@ class SMOKELIFT_PT_clip_export(_ExportPanel, bpy.types.Panel):
 _CLASSES = (
     SmokeliftExport,
     SMOKELIFT_OT_export,
-    SMOKELIFT_OT_cancel_export,
     SMOKELIFT_OT_make_proxy,
     SMOKELIFT_PT_view_export,
     SMOKELIFT_PT_clip_export,
@@ -336,10 +235,8 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Unregister them and end the engine."""
-    _session.stop()
-    for timer in (_session.poll, _session._start_size):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
+    """Unregister them, and the estimate that waits."""
+    if bpy.app.timers.is_registered(_estimate.start):
+        bpy.app.timers.unregister(_estimate.start)
     del bpy.types.Object.smokelift_export
     _unregister()

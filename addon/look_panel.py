@@ -4,10 +4,10 @@ import bpy
 from bpy.props import EnumProperty
 
 from . import look, volume
-from .export import draw_work
 from .needs import NeedsResult
 from .panel import draw_text
 from .proxy import in_viewport, modifier_of
+from .side_job import draw_work
 from .smoke import is_override, smoke_with_look
 from .subpanel import OfResult
 

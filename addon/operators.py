@@ -1,21 +1,16 @@
 """The buttons that add a smoke, choose one, make it and stop that."""
 
-import functools
-import time
-
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, StringProperty
 
 from . import run, shot_check, smoke_takes
 from .blender_scene import ShotError
+from .editors import open_tab
 from .needs import NeedsClip
 from .properties import SEEDS
 from .smoke import activate, active_smoke, new_smoke, smokes
 from .take import TakeError
-
-LONGEST_OPENING = 5.0
-"""Seconds in which a sidebar is drawn for the first time."""
 
 
 class SMOKELIFT_OT_add(bpy.types.Operator):
@@ -44,33 +39,9 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
             self.report({"ERROR"}, text.format(self.filepath))
             return {"CANCELLED"}
         new_smoke(context.scene, clip)
-        if not bpy.app.background:
-            _open_tab(context)
+        if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
+            open_tab(context.area)
         return {"FINISHED"}
-
-
-def _open_tab(context: bpy.types.Context) -> None:
-    """Show the tab in the 3D View that the operator was called from."""
-    if context.area is None or context.area.type != "VIEW_3D":
-        return
-    context.space_data.show_region_ui = True
-    choose = functools.partial(_choose_tab, context.area.as_pointer(), time.monotonic() + LONGEST_OPENING)
-    bpy.app.timers.register(choose)
-
-
-def _choose_tab(area_pointer: int, end: float) -> float | None:
-    """Choose the tab in the sidebar of an area; a timer, as one that was never open has no tabs before it is drawn."""
-    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
-    area = next((area for area in areas if area.as_pointer() == area_pointer), None)
-    if area is None or time.monotonic() > end:
-        return None
-    sidebar = next(region for region in area.regions if region.type == "UI")
-    try:
-        sidebar.active_panel_category = "Smokelift"
-    except (AttributeError, TypeError):
-        return run.TICK_SECONDS
-    area.tag_redraw()
-    return None
 
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -33,10 +33,11 @@ def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None
 
 
 def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """Use all frames of a new clip, and a folder that no other smoke has."""
+    """Use all frames of a new clip, none of the old one's, and a folder that no other smoke has."""
     if settings.clip is None:
         return
     settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
+    settings.plate_frames = ""
     settings.folder, settings.results = free_folder(settings.id_data), ""
 
 
@@ -222,6 +223,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
                 "Clean Plate",
                 "Picture of the same view without smoke; for a moving camera, one for each frame",
             ),
+            ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
         ],
         update=_changed,
     )
@@ -233,6 +235,18 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         ),
         subtype="FILE_PATH",
         options=PATH_OPTIONS,
+        update=_changed,
+    )
+    plate_frames: StringProperty(
+        name="Frames",
+        description="Frames of the clip without smoke, counted from 1 and separated by commas",
+        update=_changed,
+    )
+    strokes: PointerProperty(
+        name="Strokes",
+        description="Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel "
+        "shows the background. Nothing is said of the rest, which is transparent",
+        type=bpy.types.Image,
         update=_changed,
     )
     mask: StringProperty(

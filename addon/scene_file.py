@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix
 
+from .background import background_table
 from .blender_scene import ShotError, at_frame
 from .box_table import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, keep_camera_outside
 from .camera_table import camera_over_frames
@@ -19,6 +20,21 @@ from .contract import IMAGE_SUFFIXES, SIDES
 from .light_tables import light_tables, require_lights_outside
 from .paths import absolute
 from .smoke import scene_of
+
+
+def footage_tables(smoke: bpy.types.Object) -> dict[str, Any]:
+    """The tables of the clip and of what is behind its smoke.
+
+    Raises
+    ------
+    ShotError
+        If something is missing or unusable.
+    """
+    tables: dict[str, Any] = {"clip": clip_table(smoke)}
+    if smoke.smokelift.mask:
+        tables["clip"]["mask"] = _existing_mask(smoke.smokelift.mask)
+    background = background_table(smoke)
+    return {**tables, "background": background} if background else tables
 
 
 def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
@@ -37,9 +53,7 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
         If something is missing or unusable.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
-    tables: dict[str, Any] = {"clip": clip_table(smoke)}
-    if settings.mask:
-        tables["clip"]["mask"] = _existing_mask(settings.mask)
+    tables = footage_tables(smoke)
     with at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
         rotation = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
@@ -60,11 +74,9 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
             require_lights_outside(tables)
         if settings.closed:
             tables.setdefault("domain", {})["closed"] = [side for side in SIDES if side in settings.closed]
-    if settings.plate_mode == "FILE":
-        plate = _existing(settings.plate, "clean plate")
-        if "matrices" in tables.get("camera", {}):
-            _require_moving_plate(Path(plate))
-        tables["background"] = {"image": plate}
+    plate = tables.get("background", {}).get("image")
+    if plate is not None and "matrices" in tables.get("camera", {}):
+        _require_moving_plate(Path(plate))
     return tables
 
 
@@ -78,15 +90,6 @@ def options(smoke: bpy.types.Object) -> list[str]:
     if settings.distance and not has_inlet(smoke):
         words.append(f"--distance={settings.distance:g}")
     return words
-
-
-def _existing(path: str, what: str) -> str:
-    if not path:
-        raise ShotError(f"Choose the {what}, or choose From the Clip.")
-    file = absolute(path)
-    if not file.is_file():
-        raise ShotError(f"The {what} {file} is not there: choose it again.")
-    return str(file)
 
 
 def _existing_mask(path: str) -> str:

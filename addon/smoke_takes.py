@@ -77,7 +77,7 @@ def _next_take(smoke: bpy.types.Object) -> Take:
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
-    """Write today's paths of clip, mask and plate into the scene file of a resumed take, if the project was moved.
+    """Write today's paths of clip, mask, plate and strokes into a resumed take's scene file, if the project was moved.
 
     Raises
     ------
@@ -91,6 +91,8 @@ def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
             files["clip", "mask"] = absolute(settings.mask)
         if settings.plate:
             files["background", "image"] = absolute(settings.plate)
+        if settings.strokes is not None:
+            files["background", "strokes"] = absolute(settings.strokes.filepath, settings.strokes.library)
         take.update_moved_files(files)
 
 

@@ -10,8 +10,11 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import smoke_takes
-from .compositing import SINCE_5, compositor
+from .clip_pictures import write_pictures
 from .smoke import active_smoke
+
+KEPT = ("first", "last", "folder", "fps", "plate_frames")
+"""Settings that a clip of the same frames keeps."""
 
 COEFFICIENTS = {
     "POLYNOMIAL": ("k1", "k2", "k3"),
@@ -30,45 +33,15 @@ def is_distorted(clip: bpy.types.MovieClip) -> bool:
 
 def undistorted(clip: bpy.types.MovieClip, folder: Path) -> bpy.types.MovieClip:
     """Write a clip's undistorted pictures (PNG, 16 bits) into a folder; returns them as a clip of the same frames."""
-    scene = bpy.data.scenes.new("Smokelift Undistort")
-    try:
-        _write(scene, clip, folder)
-    finally:
-        tree = scene.compositing_node_group if SINCE_5 else None
-        bpy.data.objects.remove(scene.camera)
-        bpy.data.scenes.remove(scene)
-        if tree is not None:
-            bpy.data.node_groups.remove(tree)
-    made = bpy.data.movieclips.load(str(folder / f"undistorted_{clip.frame_start:04d}.png"))
+    last = clip.frame_start + clip.frame_duration - 1
+    made = bpy.data.movieclips.load(
+        str(write_pictures(clip, clip.frame_start, last, folder / "undistorted_", undistort=True))
+    )
     made.name = f"{clip.name} undistorted"
     made.frame_start = clip.frame_start
     for name in ("sensor_width", "focal_length", "pixel_aspect"):
         setattr(made.tracking.camera, name, getattr(clip.tracking.camera, name))
     return made
-
-
-def _write(scene: bpy.types.Scene, clip: bpy.types.MovieClip, folder: Path) -> None:
-    render = scene.render
-    scene.camera = bpy.data.objects.new("Smokelift Undistort", bpy.data.cameras.new("Smokelift Undistort"))
-    scene.collection.objects.link(scene.camera)
-    render.resolution_x, render.resolution_y, render.resolution_percentage = *clip.size, 100
-    scene.frame_start, scene.frame_end = clip.frame_start, clip.frame_start + clip.frame_duration - 1
-    scene.view_settings.view_transform = "Standard"
-    render.filepath = str(folder / "undistorted_")
-    picture = render.image_settings
-    picture.file_format, picture.color_mode, picture.color_depth = "PNG", "RGB", "16"
-    tree, shown = compositor(scene)
-    source, lens = tree.nodes.new("CompositorNodeMovieClip"), tree.nodes.new("CompositorNodeMovieDistortion")
-    source.clip = lens.clip = clip
-    if "Type" in lens.inputs:  # since 5.0
-        lens.inputs["Type"].default_value = "Undistort"
-    else:
-        lens.distortion_type = "UNDISTORT"
-    tree.links.new(source.outputs["Image"], lens.inputs["Image"])
-    tree.links.new(lens.outputs["Image"], shown)
-    for node in [node for node in tree.nodes if node.type == "R_LAYERS"]:
-        tree.nodes.remove(node)
-    bpy.ops.render.render(animation=True, scene=scene.name)
 
 
 class SMOKELIFT_OT_undistort(bpy.types.Operator):
@@ -95,7 +68,10 @@ class SMOKELIFT_OT_undistort(bpy.types.Operator):
         if settings.mask:
             self.report({"ERROR"}, "The mask is distorted too: clear it, and paint one over the undistorted clip.")
             return {"CANCELLED"}
-        clip, kept = settings.clip, {name: getattr(settings, name) for name in ("first", "last", "folder", "fps")}
+        if settings.strokes is not None:
+            self.report({"ERROR"}, "The strokes are distorted too: clear them, and paint new ones afterwards.")
+            return {"CANCELLED"}
+        clip, kept = settings.clip, {name: getattr(settings, name) for name in KEPT}
         folder = smoke_takes.output_folder(smoke) / "undistorted"
         try:
             settings.clip = undistorted(clip, folder)

@@ -120,7 +120,8 @@ def _holds(hint: Any) -> str:
     if get_origin(hint) is tuple:
         parts = get_args(hint)
         if parts[-1] is Ellipsis:
-            return f"list of {_holds(parts[0])}"
+            item = _holds(parts[0])
+            return f"list of {item}s" if parts[0] is int else f"list of {item}"
         return f"{('no', 'one', 'two', 'three')[len(parts)]} {_holds(parts[0])}s"
     return {float: "number", int: "whole number", Path: "path", str: "text"}.get(hint, getattr(hint, "__name__", ""))
 

@@ -23,7 +23,7 @@ from smokelift.output.sheet import write_sheet
 from smokelift.output.video_file import write_video
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
-from smokelift.scene import Background, Camera, CompleteScene, orbit
+from smokelift.scene import Camera, CompleteScene, orbit
 
 SHEET_ANGLES = (0, 20, 45, 90)
 ORBIT_ANGLES = tuple(range(0, 360, 30))
@@ -109,7 +109,7 @@ def _turning(sequence: Sequence, clip: Clip, framing: Framing) -> Iterator[Image
 
 def _behind_own(scene: CompleteScene, clip: Clip) -> Image | None:
     """What is behind the smoke for the scene's own camera, (3,) linear; None if the scene says it."""
-    return _behind_others(scene, clip) if scene.background == Background() else None
+    return _behind_others(scene, clip) if scene.background.estimated else None
 
 
 def _behind_others(scene: CompleteScene, clip: Clip) -> Image:
@@ -119,7 +119,7 @@ def _behind_others(scene: CompleteScene, clip: Clip) -> Image:
     the smoke, which absorbs and does no more; of a background that the sequence does not keep, the clip's mean is.
     """
     absorbs = scene.scattering == "absorption"
-    if absorbs and scene.background == Background():
+    if absorbs and scene.background.estimated:
         return np.asarray(clip.frame(0).mean((0, 1)))
     plate = background_picture(scene)
     colour = plate if plate.ndim == 1 else backdrop_colour(plate)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from smokelift.checks import require_kind
 from smokelift.scene.camera import Camera
@@ -71,7 +71,7 @@ class ClipSource:
 
 @dataclass(frozen=True)
 class Background:
-    """What the camera sees behind the smoke: one colour or a clean plate; with neither it is estimated from the clip.
+    """What the camera sees behind the smoke: one colour, a clean plate or frames of the clip; else it is estimated.
 
     Attributes
     ----------
@@ -80,19 +80,45 @@ class Background:
     image
         A clean plate: a picture. A video, or pictures written ``plate_####.png``, is a plate that changes: its frame n
         is behind the clip's frame n.
+    frame
+        Frames of the clip's file that are free of smoke, counted from 0: one number or a list.
+    strokes
+        A picture of the clip's size with alpha, painted green where smoke is, red where none is, and blue where the
+        clean plate has the pixel's own value. It may stand with any of the others, or alone.
     """
 
     color: Vector | None = None
     image: Path | None = None
+    frame: tuple[int, ...] | None = None
+    strokes: Path | None = None
 
     def __post_init__(self) -> None:
         """Check the values."""
-        if self.color is not None and self.image is not None:
-            raise SceneError("takes color or image, not both", key="image")
+        given = [key for key in ("color", "image", "frame") if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise SceneError(f"takes {given[0]} or {given[1]}, not both", key=given[1])
         if self.color is not None:
             set_fields(self, color=colour(self.color, "color"))
         if self.image is not None:
             set_fields(self, image=file_path(self.image, "image"))
+        if self.frame is not None:
+            set_fields(self, frame=_frames(self.frame, "frame"))
+        if self.strokes is not None:
+            set_fields(self, strokes=file_path(self.strokes, "strokes"))
+
+    @property
+    def estimated(self) -> bool:
+        """Whether the picture behind the smoke is estimated, since the scene does not give it."""
+        return self.color is None and self.image is None and self.frame is None
+
+
+def _frames(value: Any, key: str) -> tuple[int, ...]:
+    """Return one number of a frame or a list of them as a tuple, or raise a SceneError that names ``key``."""
+    expected = "the number of a frame, counted from 0, or a list of such numbers"
+    listed = value if isinstance(value, list | tuple) else [value]
+    if not listed:
+        raise unexpected(value, key, expected)
+    return tuple(integer(number, key, expected, least=0) for number in listed)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
-from smokelift.scene import Background, Camera, CompleteScene, Domain, Inlet
+from smokelift.scene import Camera, CompleteScene, Domain, Inlet
 from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.settings import Quality, Settings
 
@@ -127,7 +127,7 @@ class Shot:
     def estimated_background(self) -> Image | None:
         """Full picture (rows, columns, 3) behind the smoke; None where the scene has one, or one for every frame."""
         plates = self.views[0].plates
-        return plates.image if self.scene.background == Background() and isinstance(plates, Plate) else None
+        return plates.image if self.scene.background.estimated and isinstance(plates, Plate) else None
 
     @property
     def inlets(self) -> tuple[Inlet, ...]:

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import pytest
 
-from addon import advanced_panel, direct_panel, panel, shot_check, volume
+from addon import advanced_panel, direct_panel, element, panel, shot_check, volume
 from addon.contract import QUALITIES
 from conftest import changed, made
 from tests.example_shot import smoke
@@ -49,6 +49,16 @@ def drawn(scene: bpy.types.Scene, *panels: type) -> list[str]:
     return texts
 
 
+def drawn_with(scene: bpy.types.Scene, plate_mode: str, *panels: type) -> list[str]:
+    """The texts with a kind of background; the check stays done."""
+    state = bpy.context.window_manager.smokelift
+    kept = {name: getattr(state, name) for name in ("check_smoke", "check_done", "notes")}
+    smoke(scene).smokelift.plate_mode = plate_mode
+    for name, value in kept.items():
+        setattr(state, name, value)
+    return drawn(scene, *panels)
+
+
 def test_no_line_is_cut_off(shot) -> None:
     manager = bpy.context.window_manager
     state = manager.smokelift
@@ -59,7 +69,8 @@ def test_no_line_is_cut_off(shot) -> None:
         row = manager.smokelift.jobs.add()
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
-    texts = drawn(shot, panel.SMOKELIFT_PT_view, advanced_panel.SMOKELIFT_PT_view_advanced)
+    panels = (panel.SMOKELIFT_PT_view, element.SMOKELIFT_PT_view_element, advanced_panel.SMOKELIFT_PT_view_advanced)
+    texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES") for text in drawn_with(shot, mode, *panels)]
     assert {"24 h", "112 G", "100 G", "12%"} <= set(texts)
     assert [text for text in texts if len(text) > LETTERS] == []
 

@@ -27,7 +27,7 @@ def bent(scene, tmp_path) -> bpy.types.Scene:
     lens.sensor_width, lens.focal_length, lens.k1 = 36.0, 35.0, -0.5
     settings = smoke(scene).smokelift
     settings.clip, settings.output = clip, str(tmp_path / "out")
-    settings.first = 2
+    settings.first, settings.plate_frames = 2, "3"
     return scene
 
 
@@ -48,7 +48,7 @@ def test_the_clip_is_made_straight(bent, tmp_path) -> None:
     assert settings.clip != before
     assert not undistort.is_distorted(settings.clip)
     assert (settings.clip.frame_start, settings.clip.frame_duration) == (101, 3)
-    assert (settings.first, settings.last, settings.folder) == (2, 3, folder)
+    assert (settings.first, settings.last, settings.folder, settings.plate_frames) == (2, 3, folder, "3")
     assert clip_table(smoke(bent))["frames"] == [1, 2]
     files = sorted((tmp_path / "out" / "undistorted").iterdir())
     assert [file.name for file in files] == [f"undistorted_{number:04d}.png" for number in (101, 102, 103)]
@@ -65,6 +65,12 @@ def test_the_clip_is_made_straight(bent, tmp_path) -> None:
 def test_what_is_distorted_too_is_refused(bent, name, value, said) -> None:
     setattr(smoke(bent).smokelift, name, value)
     with pytest.raises(RuntimeError, match=f"{said} is distorted too"):
+        bpy.ops.smokelift.undistort()
+
+
+def test_strokes_that_are_distorted_too_are_refused(bent) -> None:
+    smoke(bent).smokelift.strokes = bpy.data.images.new("strokes.png", SIZE, SIZE, alpha=True)
+    with pytest.raises(RuntimeError, match="strokes are distorted too"):
         bpy.ops.smokelift.undistort()
 
 

@@ -58,6 +58,19 @@ def test_every_clip_may_have_a_mask(tmp_path: Path) -> None:
     assert view.clip.mask == tmp_path / "side.png"
 
 
+def test_frames_free_of_smoke_and_strokes_are_read(tmp_path: Path) -> None:
+    for text, frame in (("98", (98,)), ("[98, 102]", (98, 102))):
+        background = load(tmp_path, f'[background]\nframe = {text}\nstrokes = "strokes.png"\n').background
+        assert background == Background(frame=frame, strokes=tmp_path / "strokes.png")
+        assert not background.estimated
+
+
+def test_strokes_alone_leave_the_background_to_be_estimated(tmp_path: Path) -> None:
+    background = load(tmp_path, '[background]\nstrokes = "strokes.png"\n').background
+    assert background is not None
+    assert background.estimated
+
+
 def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
     inlets = "[[inlet]]\ncentre = [0, 0, 0]\nradius = 0.5\n[[inlet]]\ncentre = [1, 0, 1]\nradius = 0.25\n"
     text = GOOD.replace("[domain]", '[domain]\nclosed = ["z-", "x+"]').replace("[medium]", f"{inlets}[medium]")
@@ -138,6 +151,16 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
             'color = [0.1, 0.2, 0.3]\nimage = "a.png"',
             "line 36: [background] takes color or image, not both",
         ),
+        (
+            "color = [0.1, 0.2, 0.3]",
+            'frame = 3\nimage = "a.png"',
+            "line 35: [background] takes image or frame, not both",
+        ),
+        ("color = [0.1, 0.2, 0.3]", "frame = -1", "line 35: [background] frame must be the number of a frame"),
+        ("color = [0.1, 0.2, 0.3]", "frame = []", "line 35: [background] frame must be the number of a frame"),
+        ("color = [0.1, 0.2, 0.3]", "frame = [3, 4.5]", "line 35: [background] frame must be the number of a frame"),
+        ("color = [0.1, 0.2, 0.3]", "frame = true", "line 35: [background] frame must be the number of a frame"),
+        ("color = [0.1, 0.2, 0.3]", "strokes = 1", "line 35: [background] strokes must be the path of a file"),
         (
             "target = [0, 0, 1.5]\nfov",
             f"target = [0, 0, 1.5]\nmatrices = {[[list(row) for row in FRONT]]}\nfov",

@@ -72,7 +72,12 @@ domains = st.builds(
     st.floats(0.01, 10),
     st.tuples(*[st.integers(1, 500)] * 3),
 )
-backgrounds = st.none() | st.just(Background()) | st.builds(Background, color=colours)
+strokes = st.none() | paths.map(lambda name: Path("/strokes") / f"{name}.png")
+backgrounds = (
+    st.none()
+    | st.builds(Background, color=colours | st.none(), strokes=strokes)
+    | st.builds(Background, frame=st.lists(st.integers(0, 10**6), min_size=1).map(tuple), strokes=strokes)
+)
 walls = st.lists(st.sampled_from(SIDES), max_size=6).map(tuple)
 
 
@@ -118,10 +123,10 @@ def test_paths_move_with_the_scene_file(tmp_path: Path) -> None:
     old.mkdir()
     Scene(
         clip=ClipSource(old / "clips" / "a.mp4", mask=old / "mask.png"),
-        background=Background(image=tmp_path / "plate.png"),
+        background=Background(image=tmp_path / "plate.png", strokes=old / "strokes.png"),
         domain=Domain((0, 0, 0), (1, 1, 1), (4, 4, 4)),
     ).save(old / "scene.toml")
     old.rename(new)
     scene = Scene.load(new / "scene.toml")
     assert scene.clip == ClipSource(new / "clips" / "a.mp4", mask=new / "mask.png")
-    assert scene.background == Background(image=tmp_path / "plate.png")
+    assert scene.background == Background(image=tmp_path / "plate.png", strokes=new / "strokes.png")
