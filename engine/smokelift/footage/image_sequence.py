@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from PIL import Image
 
 from smokelift.checks import Remark
+from smokelift.footage.alpha import association, association_notes
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
@@ -19,7 +22,18 @@ from smokelift.footage.frame_source import (
     shown_before,
     sound_samples,
 )
-from smokelift.footage.images import READABLE, ImageError, Transfer, area_average, read_layer, readable_size
+from smokelift.footage.images import (
+    READABLE,
+    ImageError,
+    Transfer,
+    area_average,
+    decoder,
+    read_encoded,
+    read_layer,
+    readable_size,
+)
+
+Value = TypeVar("Value")
 
 _EXIF, _FOCAL_LENGTH_IN_35MM_FILM = 0x8769, 0xA405
 _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
@@ -42,14 +56,17 @@ class ImageSequence:
             self.warning = Remark("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
         self.lens = _focal_length(self.files[0])
         self._size: tuple[int, int] | None = None
+        encoded = sound_samples(self.count, lambda n: _readable(read_encoded, self.files[n]))
+        self._held = association((each for each in encoded if each is not None), decoder(transfer))
         self.backdrop = backdrop_of(sound_samples(self.count, self._layer))
 
     @property
     def notes(self) -> tuple[Remark, ...]:
-        """Remark that the pictures are reduced, if they are."""
+        """How colours are held beside alpha, and that the pictures are reduced, if they are."""
+        held = association_notes(self._held)
         if self._size is None or self._size == (small := readable_size(*self._size)):
-            return ()
-        return (Remark("scaled pictures", {"size": self._size, "scaled": small}),)
+            return held
+        return (*held, Remark("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
         """Return a picture; raise ClipError if it is damaged or its size is not the first one's."""
@@ -76,10 +93,15 @@ class ImageSequence:
         """Do nothing: no file is held open."""
 
     def _layer(self, n: int) -> Layer:
-        try:
-            return read_layer(self.files[n], self._transfer)
-        except ImageError as error:
-            raise DamagedFrameError(str(error)) from error
+        return _readable(lambda file: read_layer(file, self._transfer, self._held), self.files[n])
+
+
+def _readable(read: Callable[[Path], Value], file: Path) -> Value:
+    """What is read of a picture; DamagedFrameError if that fails."""
+    try:
+        return read(file)
+    except ImageError as error:
+        raise DamagedFrameError(str(error)) from error
 
 
 def is_pattern(path: Path) -> bool:

@@ -1,8 +1,8 @@
 """Single pictures as linear float32 arrays [row, column, rgb], row 0 at the top.
 
-Integer pictures (PNG, JPEG) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets three equal
-channels. Alpha is shown over black: EXR colours are premultiplied, by the format's rule; PNG colours are multiplied by
-it in linear light.
+Integer pictures (PNG, JPEG) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets
+three equal channels. Alpha is shown over black: EXR colours are premultiplied in linear light, by the format's rule;
+those of integer pictures are read by one of the three conventions of `alpha`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from av.container import InputContainer
 from PIL import Image, ImageOps
 
 import smokelift._core as _core
+from smokelift.footage.alpha import Association
 from smokelift.footage.colour import Encoding, hlg_to_linear, pq_to_linear
 from smokelift.scene import LARGEST_PICTURE
 
@@ -34,6 +35,7 @@ Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
 Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
+Codes = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MAX_PIXELS = 2**28
 """Largest number of pixels of a picture."""
@@ -58,7 +60,7 @@ class ImageError(ValueError):
     """A picture that cannot be read or written."""
 
 
-def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:
+def look_up(values: npt.NDArray[Value], codes: Codes) -> npt.NDArray[Value]:
     """Return ``values[codes]``, in the codes' shape.
 
     NumPy's indexing takes three times as long, and ends the process (NumPy 1.26) if it lacks memory for its buffers.
@@ -87,7 +89,12 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return encoded
 
 
+def _as_it_is(linear: npt.ArrayLike) -> Picture:
+    return np.array(linear, np.float32)
+
+
 _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
+    "linear": _as_it_is,
     "srgb": srgb_to_linear,
     "hlg": hlg_to_linear,
     "pq": pq_to_linear,
@@ -95,33 +102,39 @@ _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
 
 
 def decode_integers(
-    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16],
-    encoding: Encoding | None = None,
-    white: float = 1.0,
-    premultiplied: bool = False,
+    codes: Codes, encoding: Encoding | None = None, white: float = 1.0, held: Association = "straight"
 ) -> Picture:
     """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black.
 
-    The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque.
-    ``premultiplied`` colours are over black as they are stored.
+    The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque. ``held``
+    says how colours are held beside alpha.
     """
-    linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
     alpha = decode_alpha(codes, white)
-    if alpha is not None and not premultiplied:
+    if alpha is not None and held == "premultiplied in code values":
+        opacity = alpha[..., None]
+        over_black = codes[..., :3] / np.float32(np.iinfo(codes.dtype).max * white)
+        own = np.minimum(np.divide(over_black, opacity, out=np.zeros_like(over_black), where=opacity > 0), 1)
+        return decoder(encoding)(own) * opacity
+    linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
+    if alpha is not None and held == "straight":
         linear *= alpha[..., None]
     return linear
+
+
+def decoder(encoding: Encoding | None) -> Callable[[npt.ArrayLike], Picture]:
+    """Return the function that makes values of an encoding, by default sRGB, linear."""
+    return _DECODERS[encoding or "srgb"]
 
 
 @lru_cache
 def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) -> Picture:
     """Return the linear values of the codes 0 to ``top``, read-only; see `decode_integers`."""
-    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
-    values = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
+    values = decoder(encoding)(np.arange(top + 1, dtype=np.float32) / np.float32(top * white))
     values.flags.writeable = False
     return values
 
 
-def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: float = 1.0) -> Picture | None:
+def decode_alpha(codes: Codes, white: float = 1.0) -> Picture | None:
     """Return the alpha, from 0 to 1, of integer pixels [row, column, rgb or rgba]; None if they have none."""
     if codes.shape[-1] < 4:
         return None
@@ -129,28 +142,52 @@ def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: f
 
 
 def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
-    """Read a PNG, JPEG, EXR or HDR file, whose suffix says which, as a linear picture (height, width, 3).
+    """Read a file of one of the `READABLE` kinds, by its suffix, as a linear picture (height, width, 3).
 
-    Without a ``transfer``, PNG and JPEG are sRGB, EXR and HDR linear. Of an EXR, the display window is read.
+    Without a ``transfer``, integer pixels are sRGB, those of EXR and HDR linear. Of an EXR, the display window is read.
     ImageError, with the path, is raised if there is no such file, or it is damaged or of another kind.
     """
     return read_layer(path, transfer)[0]
 
 
-def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Picture, Picture | None]:
-    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one."""
-    path = Path(path)
+def read_layer(
+    path: str | Path, transfer: Transfer | None = None, held: Association = "straight"
+) -> tuple[Picture, Picture | None]:
+    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one.
+
+    ``held`` says how integer pixels hold their colours beside alpha.
+    """
+    stored = _read(Path(path))
+    if not isinstance(stored, tuple):
+        return decode_integers(stored, transfer, held=held), decode_alpha(stored)
+    values, alpha = stored
+    return srgb_to_linear(values) if transfer == "srgb" else values, alpha
+
+
+def read_encoded(path: Path) -> Picture | None:
+    """Return the encoded values (height, width, rgba), with 1 as white, of a file with integer pixels and alpha."""
+    stored = _read(path)
+    return None if isinstance(stored, tuple) or stored.shape[-1] < 4 else encoded_values(stored)
+
+
+def encoded_values(codes: Codes, white: float = 1.0) -> Picture:
+    """Return integer pixels as the values that they encode, with 1 as white; ``white`` as of `decode_integers`."""
+    return np.asarray(codes / np.float32(np.iinfo(codes.dtype).max * white))
+
+
+def _read(path: Path) -> Codes | tuple[Picture, Picture | None]:
+    """The integer pixels of a file; the linear ones, and alpha, of an EXR or HDR."""
     suffix = path.suffix.lower()
     if suffix not in READABLE:
         raise ImageError(f"{path}: is none of {', '.join(READABLE)}; save it as one of these")
     if not path.is_file():
         raise ImageError(f"{path}: no such file")
     try:
-        if suffix in (".exr", ".hdr"):
-            values, alpha = _read_exr(path) if suffix == ".exr" else (_read_radiance(path), None)
-            return srgb_to_linear(values) if transfer == "srgb" else values, alpha
-        codes = _read_integers(path)
-        return decode_integers(codes, transfer), decode_alpha(codes)
+        if suffix == ".exr":
+            return _read_exr(path)
+        if suffix == ".hdr":
+            return _read_radiance(path), None
+        return _read_integers(path)
     except ImageError:
         raise
     # three libraries raise exceptions of their own that mean the same to the caller
@@ -210,7 +247,7 @@ def _read_radiance(path: Path) -> npt.NDArray[Any]:
     return _read_with_ffmpeg(path, "gbrpf32le")
 
 
-def _read_integers(path: Path) -> npt.NDArray[Any]:
+def _read_integers(path: Path) -> Codes:
     with path.open("rb") as file:
         head = file.read(25)
     if head.startswith(b"\x89PNG") and head[24:] == b"\x10":

@@ -48,6 +48,9 @@ SENTENCES: Mapping[str, str] = {
     ),
     "other primaries": "The clip's primaries, {primaries}, are converted to BT.709.",
     "scaled pictures": "Pictures of {size} pixels are scaled to {scaled}: they are large, or their pixels not square.",
+    "premultiplied colours": (
+        "The clip's colors are read as {held} by its alpha channel, because its smoke then has most nearly one color."
+    ),
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
     "disagreeing views": (
         "The views agree on only {agreed:.0%} of the smoke that they show. Check where their cameras stand, which "
