@@ -25,6 +25,7 @@ from smokelift.footage.frame_source import (
 from smokelift.footage.images import (
     READABLE,
     ImageError,
+    PictureKindError,
     Transfer,
     area_average,
     decoder,
@@ -97,9 +98,11 @@ class ImageSequence:
 
 
 def _readable(read: Callable[[Path], Value], file: Path) -> Value:
-    """What is read of a picture; DamagedFrameError if that fails."""
+    """What is read of a picture; DamagedFrameError if that fails, ClipError if its kind is not read."""
     try:
         return read(file)
+    except PictureKindError as error:
+        raise ClipError(str(error)) from error
     except ImageError as error:
         raise DamagedFrameError(str(error)) from error
 

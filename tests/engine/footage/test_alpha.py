@@ -36,13 +36,14 @@ def stored(held: str, n: int, grey: float, shade: float = 0.0, most: float = 0.9
 
 
 def written(folder: Path, kind: str, pictures: list[np.ndarray]) -> Path:
-    """Write a clip: numbered PNG pictures, or ProRes 4444."""
+    """Write a clip: numbered PNG, TIFF or DPX pictures, or ProRes 4444."""
     if kind == "mov":
         encode(folder / "a.mov", "prores_ks", "yuva444p10le", pictures)
         return folder / "a.mov"
+    pixels = {"png": "rgba64be", "tif": "rgba64le", "dpx": "rgba", "tiff": "rgba"}[kind]
     for n, picture in enumerate(pictures):
-        encode(folder / f"a{n}.png", "png", "rgba64be", [picture])
-    return folder / "a#.png"
+        encode(folder / f"a{n}.{kind}", {"png": "png", "dpx": "dpx"}.get(kind, "tiff"), pixels, [picture])
+    return folder / f"a#.{kind}"
 
 
 def encode(path: Path, codec: str, pixels: str, pictures: list[np.ndarray]) -> None:
@@ -59,7 +60,7 @@ def encode(path: Path, codec: str, pixels: str, pictures: list[np.ndarray]) -> N
         out.mux(stream.encode())
 
 
-@pytest.mark.parametrize("kind", ["png", "mov"])
+@pytest.mark.parametrize("kind", ["png", "tif", "tiff", "dpx", "mov"])
 @pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
 @pytest.mark.parametrize("grey", [0.715, 0.1])
 def test_smoke_is_as_bright_however_a_program_held_it(tmp_path: Path, kind: str, held: str, grey: float) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -398,3 +399,14 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
         pytest.raises(ClipError, match=r"frame_0003\.png: is 8 x 8 pixels, the first picture 32 x 16"),
     ):
         clip.frame(2)
+
+
+def test_pictures_of_a_kind_that_is_not_read_are_named_and_not_taken_for_damage(tmp_path: Path) -> None:
+    for n in range(4):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"Z": np.ones((16, 32), np.float32)}).write(str(tmp_path / f"z{n}.exr"))
+        Image.fromarray(flat(10)).save(tmp_path / f"b{n}.bmp")
+    for pattern, reason in (("z#.exr", "holds neither RGB nor Y channels, but Z"), ("b#.bmp", "is none of .*save it")):
+        with pytest.raises(ClipError, match=rf"0\.\w+: {reason}") as refused:
+            Clip.open(tmp_path / pattern)
+        assert "damaged" not in str(refused.value) and "missing" not in str(refused.value)
