@@ -120,8 +120,9 @@ def is_video(path: Path) -> bool:
 def numbered_pictures(path: Path) -> tuple[Path, ...]:
     """Return the pictures of a sequence in order, with those missing in between.
 
-    The path is a pattern ``frame_####.png`` (its last row of #, each a digit at least), the first picture of a
-    sequence, or one picture without a number. ClipError is raised if there is none, or more are missing than there are.
+    The path is a pattern ``frame_####.png`` (its last row of #, each a digit at least, or the sign of a negative
+    number), the first picture of a sequence, or one picture without a number. ClipError is raised if there is none, or
+    more are missing than there are.
     """
     pattern = is_pattern(path)
     named = re.fullmatch(r"(.*?)(#+)([^#]*)" if pattern else r"(.*?)(\d+)(\.[^.]+)", path.name)
@@ -131,16 +132,22 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
     if named is None:
         return (path,)
     prefix, number, suffix = named.groups()
-    numbered = re.compile(re.escape(prefix) + rf"(\d{{{len(number)},}})" + re.escape(suffix))
-    folder = path.parent.iterdir() if path.parent.is_dir() else ()
-    found = {int(match[1]): each for each in folder if (match := numbered.fullmatch(each.name))}
+    if not pattern and prefix.endswith("-") and 0 in _found(path, prefix[:-1], len(number) + 1, suffix):
+        prefix, number = prefix[:-1], f"-{number}"
+    digits = len(number)
+    found = _found(path, prefix, digits, suffix)
     start = min(found, default=0) if pattern else int(number)
     if start not in found:
         raise ClipError(f"{path}: no such pictures; check the folder and the name")
+    if start < 0 and 0 not in found:
+        raise ClipError(
+            f"{found[start]}: has a dash before its number, which may be a minus sign; number the pictures from 0 on, "
+            f"or give {prefix}-{'#' * max(1, digits - 1)}{suffix}"
+        )
     last = max(found)
 
     def file(n: int) -> Path:
-        return found.get(n) or path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}")
+        return found.get(n) or path.with_name(f"{prefix}{n:0{digits}d}{suffix}")
 
     if last - start + 1 > 2 * sum(n >= start for n in found):
         missing = next(n for n in range(start, last) if n not in found)
@@ -149,6 +156,15 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
             "first picture of a sequence without such gaps"
         )
     return tuple(file(n) for n in range(start, last + 1))
+
+
+def _found(path: Path, prefix: str, digits: int, suffix: str) -> dict[int, Path]:
+    """The pictures beside a path by their numbers of at least so many digits, a minus sign counted as one."""
+    number = rf"-0*[1-9]\d*|\d{{{digits},}}"
+    numbered = re.compile(re.escape(prefix) + rf"({number})" + re.escape(suffix))
+    folder = path.parent.iterdir() if path.parent.is_dir() else ()
+    found = {match[1]: each for each in folder if (match := numbered.fullmatch(each.name))}
+    return {int(number): each for number, each in found.items() if len(number) >= digits}
 
 
 def _focal_length(path: Path) -> float | None:

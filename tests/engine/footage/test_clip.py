@@ -371,6 +371,31 @@ def test_picture_sequences(tmp_path: Path) -> None:
     assert codes(Clip.open(tmp_path / "still.png")) == [77]
 
 
+def test_pictures_with_negative_numbers_come_first(tmp_path: Path) -> None:
+    for n in range(-2, 3):
+        Image.fromarray(flat(100 + 10 * n)).save(tmp_path / f"frame_{n:04d}.png")
+    levels = [80, 90, 100, 110, 120]
+    for name in ("frame_####.png", "frame_-002.png"):
+        with Clip.open(tmp_path / name, fps=24) as clip:
+            assert codes(clip) == levels
+    assert codes(Clip.open(tmp_path / "frame_-001.png")) == levels[1:]
+    assert codes(Clip.open(tmp_path / "frame_0000.png")) == levels[2:]
+    (tmp_path / "frame_-001.png").unlink()
+    assert codes(Clip.open(tmp_path / "frame_####.png")) == [80, 80, 100, 110, 120]
+
+
+def test_a_dash_is_no_minus_sign_where_no_picture_has_the_number_0(tmp_path: Path) -> None:
+    for n in (1, 2):
+        Image.fromarray(flat(50 * n)).save(tmp_path / f"shot-{n:03d}.png")
+    for name in ("shot-###.png", "shot-001.png"):
+        assert codes(Clip.open(tmp_path / name)) == [50, 100]
+    for name in ("shot0003.png", "shot0004.png"):
+        with pytest.raises(ClipError, match=r"shot-002\.png: has a dash before its number.* or give shot-###\.png"):
+            Clip.open(tmp_path / "shot####.png")
+        Image.fromarray(flat(9)).save(tmp_path / name)
+    assert codes(Clip.open(tmp_path / "shot0003.png")) == [9, 9]
+
+
 def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
     pictures(tmp_path, [1, 2, 4])
     (tmp_path / "frame_0005.png").write_bytes(b"nothing")
