@@ -101,10 +101,11 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
     value = "a picture"
     if (plate.image == colour).all():
         value = "black" if colour.max() < BLACK else f"one color, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
+    assumed = any(remark.kind == "background assumed" for remark in shot.remarks)
     return Fact(
         "background",
         f"{value}, {unknown:.0%} of it unknown" if unknown else value,
-        "estimated",
+        UNDETERMINED if assumed else "estimated",
         _said(shot, "background", "black background"),
     )
 

@@ -65,6 +65,10 @@ SENTENCES: Mapping[str, str] = {
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
     "background of one colour": "Background not given: it is of one color, {color:.2g} (linear).",
+    "background assumed": (
+        "Background not given, and no part of the picture shows it: {color:.2g} (linear) is assumed, and all that "
+        "differs from it counts as smoke."
+    ),
     "background with objects": (
         "Background: {share:.1%} of the picture has other colors and never changes, as a nozzle, a floor or a logo "
         "does. If that is smoke, give the color as background."

@@ -31,17 +31,17 @@ COARSE_QUANTISER = 42.0
 
 def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
     """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
-    found, change = estimate.found, estimate.samples.exposure
+    found, samples, change = estimate.found, estimate.samples, estimate.samples.exposure
     return (
-        *backdrop_remarks(found),
+        *backdrop_remarks(found, not given and _between_bars(samples)),
         *((Remark("background unused"),) if found.source == "alpha" and given else ()),
-        *doubts(found, estimate.samples, given),
+        *doubts(found, samples, given),
         *(() if change == 0 else (Remark("exposure", {"change": change}),)),
     )
 
 
-def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
-    """Return how a background was found, and what stands before it if it has one colour."""
+def backdrop_remarks(found: Backdrop, bars: bool = False) -> tuple[Remark, ...]:
+    """Return how a background was found, and what stands before it if it has one colour, not that of ``bars``."""
     clip, plates = found.clip, found.plates
     if found.source == "alpha":
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
@@ -55,6 +55,8 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
     if not (image == colour).all():
         colour = np.median(image.reshape(-1, 3), axis=0)
     red, green, blue = map(float, colour)
+    if bars or found.source == "black for want of a picture":
+        return (Remark("background assumed", {"color": (red, green, blue)}),)
     other = float((image != colour).any(-1).mean())
     black = max(red, green, blue) < BLACK
     return (
