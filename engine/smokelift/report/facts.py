@@ -78,7 +78,7 @@ def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
 
 def _cost(shot: Shot, cost: Cost) -> Fact:
     spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
-    free = f"Right to a factor of 1.5; {cost.memory_free / 2**30:.1f} GiB of memory are free."
+    free = f"Right to a factor of 1.5 if nothing else runs; {cost.memory_free / 2**30:.1f} GiB of memory are free."
     return Fact("cost", f"{counted(shot.length, 'frame')}: {spent}", "estimated", free)
 
 
