@@ -112,6 +112,9 @@ SENTENCES: Mapping[str, str] = {
     "no smoke in one frame": (
         "One frame alone does not show what is behind its smoke: give a clean plate or a color as background."
     ),
+    "smoke behind the mask": (
+        "What the mask hides looks like smoke: if the mask is black where smoke may be and white elsewhere, invert it."
+    ),
     "no smoke before an estimated background": (
         "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is "
         "not seen: give a clean plate or a color as background."

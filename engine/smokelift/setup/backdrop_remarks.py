@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from smokelift.checks import Doubt, Remark
-from smokelift.footage.backdrop import Backdrop
+from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, unknown_part
+from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, sample_smoke, unknown_part
 
 BLACK = 0.001
 """Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
@@ -93,11 +93,22 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
 
 def what_helps(clip: Clip, given: bool) -> Doubt:
     """Return what may help where no smoke is found; ``given`` as in `doubts`."""
+    if clip.mask is not None and _shows_smoke(clip.as_filmed()):
+        return Doubt("smoke behind the mask")
     if given:
         return Doubt("no smoke before the given background")
     if len(clip) == 1 and clip.backdrop is None:
         return Doubt("no smoke in one frame")
     return Doubt("no smoke before an estimated background")
+
+
+def _shows_smoke(clip: Clip) -> bool:
+    """Whether smoke is found in a clip of which nothing is given; not if its camera moves."""
+    try:
+        found = find_backdrop(clip, None, None)
+    except ValueError:
+        return False
+    return bool(sample_smoke(found.clip, found.plates).smoky)
 
 
 def _between_bars(samples: SmokeSamples) -> bool:
