@@ -47,7 +47,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         ),
         _box(shot, has_box),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
-        *_medium(shot, given.medium is not None),
+        *_medium(shot, not any(remark.kind == "assumed medium" for remark in shot.remarks)),
         *_light(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
         _place(shot),

@@ -184,6 +184,11 @@ SENTENCES: Mapping[str, str] = {
         "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
         "{red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
     ),
+    "possible fire": (
+        "Some of the smoke may be fire: {share:.1%} of its pixels have the colors of fire, and {bright:.0%} of these "
+        "are brighter than light explains, too few to be certain. If it is fire, give its color as the flame's, "
+        "for example 1, 0.4, 0.1."
+    ),
     "assumed light": (
         "Light not given: light from everywhere is assumed, as bright as smoke and background ask for (irradiance "
         "{irradiance:.2f})."

@@ -37,7 +37,16 @@ def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
         *((Remark("background unused"),) if found.source == "alpha" and given else ()),
         *doubts(found, samples, given),
         *(() if change == 0 else (Remark("exposure", {"change": change}),)),
+        *_possible_fire(estimate),
     )
+
+
+def _possible_fire(estimate: FirstEstimate) -> tuple[Doubt, ...]:
+    """That some of what counts as smoke may be fire."""
+    hot = estimate.hot
+    if estimate.fire is not None or not hot.may_burn:
+        return ()
+    return (Doubt("possible fire", {"share": hot.share, "bright": hot.bright}),)
 
 
 def backdrop_remarks(found: Backdrop, bars: bool = False) -> tuple[Remark, ...]:
