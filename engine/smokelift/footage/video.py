@@ -92,6 +92,7 @@ class Video:
         self._failed = False  # whether any decoding has failed
         self._lost: set[int] = set()  # indices into _times of damaged frames, not to be tried again
         self._keys: list[int] = []
+        self._shown: list[int] = []
         self._start()
         self._times, broken = self._index()
         if broken:
@@ -281,8 +282,9 @@ class Video:
         if frame is None:
             self._rewind()
             self._lost.add(index)
+            number = bisect.bisect_left(self._shown, index)
             raise DamagedFrameError(
-                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
+                f"{self._path}: frame {number} is damaged and cannot be decoded; export the clip again"
             )
         self._next = index + 1
         return frame

@@ -282,6 +282,16 @@ def test_a_damaged_frame_is_as_one_that_a_camera_dropped(tmp_path: Path, broken:
     assert changed.damaged == tuple(broken)  # known after the file is closed
 
 
+def test_a_damaged_frame_has_its_number_in_the_clip_at_a_varying_rate_too(tmp_path: Path) -> None:
+    times = [0, 40, 80, 120, 160, 200, 210, 220, 230, 240]
+    path = encode(tmp_path / "a.mov", [flat(v) for v in LEVELS[:10]], codec="png", pixels="rgb24", times=times)
+    video = Video(blanked(path, [4]), None)
+    (damaged, *_) = video.damaged(0, 9)
+    with pytest.raises(ClipError, match=rf"frame {damaged} is damaged"):
+        video.read(damaged)
+    assert damaged != 4
+
+
 def wide_codes(path: Path, planes: Sequence[int], codec: str = "ffv1", **tags: int) -> Path:
     """Write a flat 4:4:4 picture of 10 bit luma and chroma codes."""
     with av.open(str(path), "w") as out:
