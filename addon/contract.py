@@ -38,7 +38,7 @@ it takes multiples of a quarter of them, which all of its own limits are."""
 MIN_VOXELS = 8
 """Voxels along any side, at least."""
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".dpx", ".exr", ".hdr")
 """Pictures that the engine reads. It takes any other file for a video."""
 
 PANORAMA_SUFFIXES = (".exr", ".hdr")

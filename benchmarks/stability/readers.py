@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
@@ -128,8 +129,17 @@ def _picture() -> Array:
     return np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 
 
-def _write_jpeg(path: Path) -> None:
+def _write_by_pillow(path: Path) -> None:
     Image.fromarray((255 * _picture()).astype(np.uint8)).save(path)
+
+
+def _write_dpx(path: Path) -> None:
+    with av.open(str(path), "w", format="image2", options={"update": "1"}) as out:
+        stream = out.add_stream("dpx", rate=1)
+        stream.height, stream.width, stream.pix_fmt = 5, 7, "gbrp10le"
+        codes = (65535 * _picture()).astype(np.uint16)
+        out.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb48le").reformat(format="gbrp10le")))
+        out.mux(stream.encode())
 
 
 def _write_hdr(path: Path) -> None:
@@ -152,7 +162,9 @@ READERS: Mapping[str, Reader] = {
     "truth": Reader("truth.npz", _write_truth, Truth.load, TruthError),
     "EXR": Reader("plate.exr", lambda path: write_image(path, _picture()), read_image, ImageError),
     "PNG": Reader("plate.png", lambda path: write_image(path, _picture()), read_image, ImageError),
-    "JPEG": Reader("plate.jpg", _write_jpeg, read_image, ImageError),
+    "JPEG": Reader("plate.jpg", _write_by_pillow, read_image, ImageError),
+    "TIFF": Reader("plate.tif", _write_by_pillow, read_image, ImageError),
+    "DPX": Reader("plate.dpx", _write_dpx, read_image, ImageError),
     "HDR": Reader("plate.hdr", _write_hdr, read_image, ImageError),
     "environment": Reader(
         "sky.exr",

@@ -31,7 +31,7 @@ def main(words: list[str]) -> None:
     numbers = sorted(map(int, index["frames"]))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    add_smoke(scene, options.sequence.resolve(), index["scene"], numbers)
+    add_smoke(scene, options.sequence.resolve(), index["scene"], numbers, index.get("start_number", 1))
     add_lights(scene, index["scene"].get("lights", []))
     camera = add_camera(scene, index["scene"]["camera"])
     scene.render.engine = "CYCLES"
@@ -51,12 +51,12 @@ def spread(numbers: list[int], count: int) -> list[int]:
     return [numbers[round((n + 1) * len(numbers) / count) - 1] for n in range(count)]
 
 
-def add_smoke(scene: bpy.types.Scene, folder: Path, described: dict[str, Any], numbers: list[int]) -> None:
-    """Add the sequence as a volume with the optical properties of its medium."""
+def add_smoke(scene: bpy.types.Scene, folder: Path, described: dict[str, Any], numbers: list[int], start: int) -> None:
+    """Add the sequence, whose frame 1 has a file of the number ``start``, with the optical properties of its medium."""
     volume = bpy.data.volumes.new("Smoke")
-    volume.filepath = str(folder / f"smoke_{numbers[0]:04d}.vdb")
+    volume.filepath = str(folder / f"smoke_{numbers[0] + start - 1:04d}.vdb")
     volume.is_sequence = True
-    volume.frame_start, volume.frame_offset, volume.frame_duration = numbers[0], numbers[0] - 1, len(numbers)
+    volume.frame_start, volume.frame_offset, volume.frame_duration = numbers[0], numbers[0] + start - 2, len(numbers)
     medium = described["medium"]
     material = bpy.data.materials.new("Smoke")
     material.use_nodes = True

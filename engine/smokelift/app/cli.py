@@ -9,6 +9,7 @@ import argparse
 import errno
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,7 +40,12 @@ _HINT = " Finished frames stay; --resume goes on from them."
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong with a word, its control characters spelt out."""
+    """Says what is wrong with a word, its control characters spelt out; takes -5:3 and -30,10 for values."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        # by default whole words that are numbers; there is no way to say it from outside
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message))

@@ -38,6 +38,7 @@ OPTIONS = (
     "detail",
     "seed",
     "device",
+    "start_number",
     "npz",
 )
 """Keys of a shot that are options of ``smokelift reconstruct``."""

@@ -43,7 +43,8 @@ def look_at_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] =
     if record.forecast is not None:
         return record
     shot.folder.mkdir(parents=True, exist_ok=True)
-    options = [word for word in shot.options if word != "--npz"]  # `inspect` writes nothing
+    # `inspect` writes nothing
+    options = [word for word in shot.options if not word.startswith(("--npz", "--start-number"))]
     result = run_engine(["inspect", str(shot.input), *options], stop, shot.log, engine)
     if result.status != DONE:
         return replace(record, status=_status(result), sentence=result.sentence)

@@ -67,6 +67,7 @@ def directed_writer(
         {**sequence.settings, "direct": {"job": job, **settings}},
         npz=npz,
         resume=resume,
+        start_number=sequence.start_number,
         choices=sequence.choices,
         provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
         sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},

@@ -146,8 +146,7 @@ class Clip:
         """Remarks on the clip: defects, frames that are replaced, how pictures are read; ClipError as of `damaged`."""
         remarks = [self.warning] if self.warning else []
         if self.damaged:
-            frames = numbered([self.first + n for n in self.damaged])
-            remarks.append(Remark("damaged frames", {"path": str(self.path), "frames": frames}))
+            remarks.append(Remark("damaged frames", {"path": str(self.path), "frames": self.damaged_frames}))
         return (*remarks, *self.notes)
 
     @property
@@ -166,6 +165,11 @@ class Clip:
                 "the clip again, or choose other frames"
             )
         return tuple(n - self.first for n in damaged)
+
+    @property
+    def damaged_frames(self) -> str:
+        """The damaged frames by their numbers in the file, counted from 0 as a range of frames is: see `numbered`."""
+        return numbered([self.first + n for n in self.damaged])
 
     def frame(self, n: int) -> Picture:
         """Return frame ``n``, counted from 0 at the start of the range: linear (height, width, 3), float32, read-only.

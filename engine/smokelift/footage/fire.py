@@ -8,6 +8,8 @@ rest. What a flame hides is unknown: the smoke beside it is continued there. Fig
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import ndimage
 
@@ -50,21 +52,42 @@ COLOUR_FRAMES = 8
 """Largest number of frames that the colour of fire is taken from."""
 
 
-def fire_share(colours: Picture, behind: Picture) -> float:
-    """Return the share of fire among smoke pixels; 0 if none is brighter than light explains.
+@dataclass(frozen=True)
+class HotPixels:
+    """Smoke pixels that have the colours of fire and add as much light.
 
-    ``colours`` and ``behind`` are the linear radiance (n, 3) of the pixels and of their background.
+    ``share`` is theirs of all smoke pixels, ``bright`` that of them which are brighter than light explains.
+    """
+
+    share: float
+    bright: float
+
+    @property
+    def burn(self) -> bool:
+        """Whether they are fire."""
+        return self.share > MIN_FIRE_SHARE and self.bright >= MIN_BRIGHT_SHARE
+
+    @property
+    def may_burn(self) -> bool:
+        """Whether some of them are brighter than light explains, as many as fire has at least."""
+        return self.share * self.bright > MIN_FIRE_SHARE
+
+
+def hot_pixels(colours: Picture, behind: Picture) -> HotPixels:
+    """Return how much of the smoke may be fire.
+
+    ``colours`` and ``behind`` are the linear radiance (n, 3) of the smoke's pixels and of their background.
     """
     fire, brightest = _hot(colours, behind), brightest_channel(colours)
-    if fire.sum() <= MIN_FIRE_SHARE * len(colours):
-        return 0.0
+    if not fire.any():
+        return HotPixels(0.0, 0.0)
     added = brightest_channel(colours - behind)
     # a core clipped to yellow or white does not show its colour
     other = ~_warm(colours) & (brightest > MIN_COLOURED_VALUE) & (brightest < CLIPPED_VALUE)
     bright = colours[..., 0] > WHITE_RED
     if other.mean() >= MIN_SMOKE_SHARE:
         bright |= added > MIN_BRIGHTNESS_RATIO * np.percentile(added[other], 95)
-    return float(fire.mean()) if bright[fire].mean() >= MIN_BRIGHT_SHARE else 0.0
+    return HotPixels(float(fire.mean()), float(bright[fire].mean()))
 
 
 def without_fire(clip: Clip, plates: Plates) -> Clip:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from PIL import Image
 
 from smokelift.checks import Remark
+from smokelift.footage.alpha import association, association_notes
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
@@ -19,7 +22,19 @@ from smokelift.footage.frame_source import (
     shown_before,
     sound_samples,
 )
-from smokelift.footage.images import READABLE, ImageError, Transfer, area_average, read_layer, readable_size
+from smokelift.footage.images import (
+    READABLE,
+    ImageError,
+    PictureKindError,
+    Transfer,
+    area_average,
+    decoder,
+    read_encoded,
+    read_layer,
+    readable_size,
+)
+
+Value = TypeVar("Value")
 
 _EXIF, _FOCAL_LENGTH_IN_35MM_FILM = 0x8769, 0xA405
 _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
@@ -42,14 +57,17 @@ class ImageSequence:
             self.warning = Remark("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
         self.lens = _focal_length(self.files[0])
         self._size: tuple[int, int] | None = None
+        encoded = sound_samples(self.count, lambda n: _readable(read_encoded, self.files[n]))
+        self._held = association((each for each in encoded if each is not None), decoder(transfer))
         self.backdrop = backdrop_of(sound_samples(self.count, self._layer))
 
     @property
     def notes(self) -> tuple[Remark, ...]:
-        """Remark that the pictures are reduced, if they are."""
+        """How colours are held beside alpha, and that the pictures are reduced, if they are."""
+        held = association_notes(self._held)
         if self._size is None or self._size == (small := readable_size(*self._size)):
-            return ()
-        return (Remark("scaled pictures", {"size": self._size, "scaled": small}),)
+            return held
+        return (*held, Remark("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
         """Return a picture; raise ClipError if it is damaged or its size is not the first one's."""
@@ -76,10 +94,17 @@ class ImageSequence:
         """Do nothing: no file is held open."""
 
     def _layer(self, n: int) -> Layer:
-        try:
-            return read_layer(self.files[n], self._transfer)
-        except ImageError as error:
-            raise DamagedFrameError(str(error)) from error
+        return _readable(lambda file: read_layer(file, self._transfer, self._held), self.files[n])
+
+
+def _readable(read: Callable[[Path], Value], file: Path) -> Value:
+    """What is read of a picture; DamagedFrameError if that fails, ClipError if its kind is not read."""
+    try:
+        return read(file)
+    except PictureKindError as error:
+        raise ClipError(str(error)) from error
+    except ImageError as error:
+        raise DamagedFrameError(str(error)) from error
 
 
 def is_pattern(path: Path) -> bool:
@@ -95,8 +120,9 @@ def is_video(path: Path) -> bool:
 def numbered_pictures(path: Path) -> tuple[Path, ...]:
     """Return the pictures of a sequence in order, with those missing in between.
 
-    The path is a pattern ``frame_####.png`` (its last row of #, each a digit at least), the first picture of a
-    sequence, or one picture without a number. ClipError is raised if there is none, or more are missing than there are.
+    The path is a pattern ``frame_####.png`` (its last row of #, each a digit at least, or the sign of a negative
+    number), the first picture of a sequence, or one picture without a number. ClipError is raised if there is none, or
+    more are missing than there are.
     """
     pattern = is_pattern(path)
     named = re.fullmatch(r"(.*?)(#+)([^#]*)" if pattern else r"(.*?)(\d+)(\.[^.]+)", path.name)
@@ -106,16 +132,22 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
     if named is None:
         return (path,)
     prefix, number, suffix = named.groups()
-    numbered = re.compile(re.escape(prefix) + rf"(\d{{{len(number)},}})" + re.escape(suffix))
-    folder = path.parent.iterdir() if path.parent.is_dir() else ()
-    found = {int(match[1]): each for each in folder if (match := numbered.fullmatch(each.name))}
+    if not pattern and prefix.endswith("-") and 0 in _found(path, prefix[:-1], len(number) + 1, suffix):
+        prefix, number = prefix[:-1], f"-{number}"
+    digits = len(number)
+    found = _found(path, prefix, digits, suffix)
     start = min(found, default=0) if pattern else int(number)
     if start not in found:
         raise ClipError(f"{path}: no such pictures; check the folder and the name")
+    if start < 0 and 0 not in found:
+        raise ClipError(
+            f"{found[start]}: has a dash before its number, which may be a minus sign; number the pictures from 0 on, "
+            f"or give {prefix}-{'#' * max(1, digits - 1)}{suffix}"
+        )
     last = max(found)
 
     def file(n: int) -> Path:
-        return found.get(n) or path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}")
+        return found.get(n) or path.with_name(f"{prefix}{n:0{digits}d}{suffix}")
 
     if last - start + 1 > 2 * sum(n >= start for n in found):
         missing = next(n for n in range(start, last) if n not in found)
@@ -124,6 +156,15 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
             "first picture of a sequence without such gaps"
         )
     return tuple(file(n) for n in range(start, last + 1))
+
+
+def _found(path: Path, prefix: str, digits: int, suffix: str) -> dict[int, Path]:
+    """The pictures beside a path by their numbers of at least so many digits, a minus sign counted as one."""
+    number = rf"-0*[1-9]\d*|\d{{{digits},}}"
+    numbered = re.compile(re.escape(prefix) + rf"({number})" + re.escape(suffix))
+    folder = path.parent.iterdir() if path.parent.is_dir() else ()
+    found = {match[1]: each for each in folder if (match := numbered.fullmatch(each.name))}
+    return {int(number): each for number, each in found.items() if len(number) >= digits}
 
 
 def _focal_length(path: Path) -> float | None:

@@ -1,8 +1,8 @@
 """Single pictures as linear float32 arrays [row, column, rgb], row 0 at the top.
 
-Integer pictures (PNG, JPEG) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets three equal
-channels. Alpha is shown over black: EXR colours are premultiplied, by the format's rule; PNG colours are multiplied by
-it in linear light.
+Integer pictures (PNG, JPEG, TIFF, DPX) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets
+three equal channels. Alpha is shown over black: EXR colours are premultiplied in linear light, by the format's rule;
+those of integer pictures are read by one of the three conventions of `alpha`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import io
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from fractions import Fraction
 from functools import lru_cache
@@ -25,8 +26,16 @@ import OpenEXR
 import scipy.sparse
 from av.container import InputContainer
 from PIL import Image, ImageOps
+from PIL.TiffImagePlugin import (
+    BITSPERSAMPLE,
+    PHOTOMETRIC_INTERPRETATION,
+    SAMPLEFORMAT,
+    TILEWIDTH,
+    ImageFileDirectory_v2,
+)
 
 import smokelift._core as _core
+from smokelift.footage.alpha import Association
 from smokelift.footage.colour import Encoding, hlg_to_linear, pq_to_linear
 from smokelift.scene import LARGEST_PICTURE
 
@@ -34,6 +43,7 @@ Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
 Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
+Codes = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MAX_PIXELS = 2**28
 """Largest number of pixels of a picture."""
@@ -45,7 +55,20 @@ a side, so smoke on a twentieth of the picture still has more pixels than voxels
 OPENING_BYTES = 2**25
 """Memory in bytes that FFmpeg needs to open a file: its decoders' contexts, and some frames to know them by."""
 
-READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+READABLE = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".dpx", ".exr", ".hdr")
+
+LOG_BYTE, LOG_TRANSFERS = 801, (1, 3)
+"""Place in a DPX of its first element's transfer characteristic, and those that are printing density and logarithmic
+(SMPTE ST 268-1). All others are read as sRGB: programs write linear (2) for what is only not logarithmic."""
+
+BEAUTY = ("combined", "beauty", "rgba")
+"""Names, in small letters, that renderers give to the part or the layer with the picture: Blender, Arnold, Redshift."""
+
+DEPTHS = ("Z", "ZBack")
+"""Names that OpenEXR gives to depths."""
+
+FLOAT = 3
+"""Sample format of floating point numbers (TIFF 6.0, section 19)."""
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue (ITU-R BT.709)."""
@@ -58,7 +81,11 @@ class ImageError(ValueError):
     """A picture that cannot be read or written."""
 
 
-def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:
+class PictureKindError(ImageError):
+    """A sound picture of a kind that is not read, as all of its sequence are."""
+
+
+def look_up(values: npt.NDArray[Value], codes: Codes) -> npt.NDArray[Value]:
     """Return ``values[codes]``, in the codes' shape.
 
     NumPy's indexing takes three times as long, and ends the process (NumPy 1.26) if it lacks memory for its buffers.
@@ -87,7 +114,12 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return encoded
 
 
+def _as_it_is(linear: npt.ArrayLike) -> Picture:
+    return np.array(linear, np.float32)
+
+
 _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
+    "linear": _as_it_is,
     "srgb": srgb_to_linear,
     "hlg": hlg_to_linear,
     "pq": pq_to_linear,
@@ -95,33 +127,39 @@ _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
 
 
 def decode_integers(
-    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16],
-    encoding: Encoding | None = None,
-    white: float = 1.0,
-    premultiplied: bool = False,
+    codes: Codes, encoding: Encoding | None = None, white: float = 1.0, held: Association = "straight"
 ) -> Picture:
     """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black.
 
-    The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque.
-    ``premultiplied`` colours are over black as they are stored.
+    The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque. ``held``
+    says how colours are held beside alpha.
     """
-    linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
     alpha = decode_alpha(codes, white)
-    if alpha is not None and not premultiplied:
+    if alpha is not None and held == "premultiplied in code values":
+        opacity = alpha[..., None]
+        over_black = codes[..., :3] / np.float32(np.iinfo(codes.dtype).max * white)
+        own = np.minimum(np.divide(over_black, opacity, out=np.zeros_like(over_black), where=opacity > 0), 1)
+        return decoder(encoding)(own) * opacity
+    linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
+    if alpha is not None and held == "straight":
         linear *= alpha[..., None]
     return linear
+
+
+def decoder(encoding: Encoding | None) -> Callable[[npt.ArrayLike], Picture]:
+    """Return the function that makes values of an encoding, by default sRGB, linear."""
+    return _DECODERS[encoding or "srgb"]
 
 
 @lru_cache
 def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) -> Picture:
     """Return the linear values of the codes 0 to ``top``, read-only; see `decode_integers`."""
-    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
-    values = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
+    values = decoder(encoding)(np.arange(top + 1, dtype=np.float32) / np.float32(top * white))
     values.flags.writeable = False
     return values
 
 
-def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: float = 1.0) -> Picture | None:
+def decode_alpha(codes: Codes, white: float = 1.0) -> Picture | None:
     """Return the alpha, from 0 to 1, of integer pixels [row, column, rgb or rgba]; None if they have none."""
     if codes.shape[-1] < 4:
         return None
@@ -129,28 +167,54 @@ def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: f
 
 
 def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
-    """Read a PNG, JPEG, EXR or HDR file, whose suffix says which, as a linear picture (height, width, 3).
+    """Read a file of one of the `READABLE` kinds, by its suffix, as a linear picture (height, width, 3).
 
-    Without a ``transfer``, PNG and JPEG are sRGB, EXR and HDR linear. Of an EXR, the display window is read.
-    ImageError, with the path, is raised if there is no such file, or it is damaged or of another kind.
+    Without a ``transfer``, integer pixels are sRGB, those of EXR and HDR linear. Of an EXR, the display window is read.
+    ImageError, with the path, is raised if there is no such file, or it is damaged; PictureKindError if it is of
+    another kind.
     """
     return read_layer(path, transfer)[0]
 
 
-def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Picture, Picture | None]:
-    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one."""
-    path = Path(path)
+def read_layer(
+    path: str | Path, transfer: Transfer | None = None, held: Association = "straight"
+) -> tuple[Picture, Picture | None]:
+    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one.
+
+    ``held`` says how integer pixels hold their colours beside alpha.
+    """
+    stored = _read(Path(path))
+    if not isinstance(stored, tuple):
+        return decode_integers(stored, transfer, held=held), decode_alpha(stored)
+    values, alpha = stored
+    return srgb_to_linear(values) if transfer == "srgb" else values, alpha
+
+
+def read_encoded(path: Path) -> Picture | None:
+    """Return the encoded values (height, width, rgba), with 1 as white, of a file with integer pixels and alpha."""
+    stored = _read(path)
+    return None if isinstance(stored, tuple) or stored.shape[-1] < 4 else encoded_values(stored)
+
+
+def encoded_values(codes: Codes, white: float = 1.0) -> Picture:
+    """Return integer pixels as the values that they encode, with 1 as white; ``white`` as of `decode_integers`."""
+    return np.asarray(codes / np.float32(np.iinfo(codes.dtype).max * white))
+
+
+def _read(path: Path) -> Codes | tuple[Picture, Picture | None]:
+    """The integer pixels of a file; the linear ones, and alpha, of an EXR or HDR."""
     suffix = path.suffix.lower()
     if suffix not in READABLE:
-        raise ImageError(f"{path}: is none of {', '.join(READABLE)}; save it as one of these")
+        raise PictureKindError(f"{path}: is none of {', '.join(READABLE)}; save it as one of these")
     if not path.is_file():
         raise ImageError(f"{path}: no such file")
     try:
-        if suffix in (".exr", ".hdr"):
-            values, alpha = _read_exr(path) if suffix == ".exr" else (_read_radiance(path), None)
-            return srgb_to_linear(values) if transfer == "srgb" else values, alpha
-        codes = _read_integers(path)
-        return decode_integers(codes, transfer), decode_alpha(codes)
+        if suffix == ".exr":
+            return _read_exr(path)
+        if suffix == ".hdr":
+            return _read_radiance(path), None
+        with warnings.catch_warnings(action="ignore"):  # what Pillow warns of, it reads or raises an error for
+            return _read_integers(path)
     except ImageError:
         raise
     # three libraries raise exceptions of their own that mean the same to the caller
@@ -188,12 +252,19 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
     return container
 
 
-def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
+def _read_with_ffmpeg(path: Path, pixels: str | None = None) -> npt.NDArray[Any]:
+    """Decode a picture to pixels of FFmpeg's name, by default RGB and alpha of 8 or 16 bits, as far as it has them."""
     # as a pattern, "frame_%d.png" would mean other files
     with open_container(path, "image2", pattern_type="none") as container:
         stream = container.streams.video[0]
         _require_size(path, (stream.width, stream.height))
-        return next(container.decode(stream)).to_ndarray(format=pixels)
+        frame = next(container.decode(stream))
+        parts = frame.format.components
+        alpha = "a" * any(part.is_alpha for part in parts)
+        wide = max(part.bits for part in parts) > 8
+        return frame.to_ndarray(
+            format=pixels or (f"rgb{alpha}{64 if alpha else 48}le" if wide else f"rgb{alpha or 24}")
+        )
 
 
 def _require_size(path: Path, size: tuple[int, int]) -> None:
@@ -210,15 +281,40 @@ def _read_radiance(path: Path) -> npt.NDArray[Any]:
     return _read_with_ffmpeg(path, "gbrpf32le")
 
 
-def _read_integers(path: Path) -> npt.NDArray[Any]:
+def _read_integers(path: Path) -> Codes:
     with path.open("rb") as file:
-        head = file.read(25)
-    if head.startswith(b"\x89PNG") and head[24:] == b"\x10":
-        return _read_with_ffmpeg(path, "rgba64le")  # Pillow would cut 16 bit colour to 8
+        head = file.read(LOG_BYTE + 1)
+    if head.startswith((b"SDPX", b"XPDS")) and head[LOG_BYTE] in LOG_TRANSFERS:
+        raise PictureKindError(
+            f"{path}: holds the densities of film or a camera's log values, of which there are many kinds; save it "
+            "as .exr, or as .png"
+        )
+    if head[:4] in (b"II*\0", b"MM\0*"):
+        by_ffmpeg = _is_plain_tiff(path, head)
+    else:
+        by_ffmpeg = head.startswith((b"SDPX", b"XPDS")) or (head.startswith(b"\x89PNG") and head[24] == 16)
+    if by_ffmpeg:
+        return _read_with_ffmpeg(path)  # Pillow would cut 16 bit colour to 8
     with Image.open(path) as picture:
         _require_size(path, picture.size)
         upright = ImageOps.exif_transpose(picture)
         return np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
+
+
+def _is_plain_tiff(path: Path, head: bytes) -> bool:
+    """Whether FFmpeg reads a TIFF, which it does with the alpha that is stored, and Pillow without."""
+    tags = ImageFileDirectory_v2(head[:8])
+    with path.open("rb") as file:
+        file.seek(tags.next)
+        tags.load(file)
+    grey_or_rgb = tags.get(PHOTOMETRIC_INTERPRETATION) in (1, 2) and TILEWIDTH not in tags
+    wide = max(tags.get(BITSPERSAMPLE, (1,))) > 8
+    if FLOAT in tags.get(SAMPLEFORMAT, ()) or (wide and not grey_or_rgb):
+        raise PictureKindError(
+            f"{path}: is neither grey nor RGB in whole numbers, or is stored in tiles; save it as .exr, or as an "
+            "ordinary TIFF of 8 or 16 bits"
+        )
+    return grey_or_rgb
 
 
 @contextmanager
@@ -246,11 +342,10 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
         parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # so the library reports damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
-    part = parts[0]
+    part, colours = _exr_colours(path, parts)
     ((left, top), (width, height)), ((x0, y0), _) = (_window(part, name) for name in ("displayWindow", "dataWindow"))
     image = np.zeros((height, width, 4), np.float32)
-    colours = _exr_channels(path, tuple(part.channels))
-    opacity = [f"{colours[0][:-1]}A"] if f"{colours[0][:-1]}A" in part.channels else []
+    opacity = [f"{_layer_of(colours[0])}A"] if f"{_layer_of(colours[0])}A" in part.channels else []
     for channel, name in enumerate((*colours, *opacity)):
         pixels = part.channels[name].pixels[max(0, top - y0) :, max(0, left - x0) :]
         target = image[max(0, y0 - top) :, max(0, x0 - left) :, channel]
@@ -266,17 +361,36 @@ def _window(part: Any, name: str) -> tuple[tuple[int, int], tuple[int, int]]:
     return (left, top), (right - left + 1, bottom - top + 1)
 
 
-def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:
-    """Choose red, green and blue: plain ones, else Blender's combined pass, else any layer, else grey."""
-    layers = [name[:-1] for name in names if name.endswith(".R")]
-    for prefix in ("", *sorted(layers, key=lambda layer: not layer.endswith("Combined."))):
-        rgb = (f"{prefix}R", f"{prefix}G", f"{prefix}B")
-        if set(rgb) <= set(names):
-            return rgb
-    for grey in ("Y", *(names if len(names) == 1 else ())):
-        if grey in names:
-            return grey, grey, grey
-    raise ImageError(f"{path}: holds neither RGB nor Y channels, but {', '.join(names)}")
+def _exr_colours(path: Path, parts: Sequence[Any]) -> tuple[Any, tuple[str, str, str]]:
+    """Choose the part, and in it red, green and blue: plain ones, else those of a `BEAUTY` pass, else the first.
+
+    Where no part has them, it is grey: luminance, or all that there is if that is no depth.
+    """
+    named = [(part, name) for part in parts for name in part.channels]
+
+    def rank(found: tuple[Any, str]) -> tuple[bool, bool, bool]:
+        part, layer = found
+        whole = f"{part.name() or ''}.{layer}".strip(".").lower()
+        return whole != "", whole.rpartition(".")[2] not in BEAUTY, layer != ""
+
+    for part, layer in sorted(((part, _layer_of(name)) for part, name in named), key=rank):
+        red, green, blue = (f"{layer}{channel}" for channel in "RGB")
+        if {red, green, blue} <= set(part.channels):
+            return part, (red, green, blue)
+    for part, name in named:
+        # a normal or a motion has X and Y
+        luminance = name == f"{_layer_of(name)}Y" and f"{_layer_of(name)}X" not in part.channels
+        if luminance or (len(named) == 1 and name.rpartition(".")[2] not in DEPTHS):
+            return part, (name, name, name)
+    listed = ", ".join(dict.fromkeys(name for _, name in named))
+    raise PictureKindError(
+        f"{path}: holds neither RGB nor Y channels, but {listed}; choose the file with the beauty pass, or render it"
+    )
+
+
+def _layer_of(channel: str) -> str:
+    """The layer of an EXR's channel with its dot, empty if it has none."""
+    return "".join(channel.rpartition(".")[:2])
 
 
 def reduced_size(width: int, height: int, side: float) -> tuple[int, int]:

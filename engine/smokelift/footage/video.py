@@ -31,6 +31,7 @@ from av.video.stream import VideoStream
 
 import smokelift._core as _core
 from smokelift.checks import Remark
+from smokelift.footage.alpha import Association, association, association_notes
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
@@ -48,10 +49,11 @@ from smokelift.footage.images import (
     code_values,
     decode_alpha,
     decode_integers,
+    decoder,
+    encoded_values,
     open_container,
     readable_size,
     size_refusal,
-    srgb_to_linear,
 )
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
@@ -59,9 +61,6 @@ _GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AR
 _FOCAL_LENGTH = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 """Decoders of codecs whose default decoder in FFmpeg leaves the alpha channel out."""
-
-BEYOND_ALPHA = 0.02
-"""Share of white by which rounding and compression may make colours exceed alpha."""
 
 SQUARE = 0.01
 """Largest difference of a pixel's shape from 1 that is ignored: half a pixel in fifty."""
@@ -93,6 +92,7 @@ class Video:
         self._failed = False  # whether any decoding has failed
         self._lost: set[int] = set()  # indices into _times of damaged frames, not to be tried again
         self._keys: list[int] = []
+        self._shown: list[int] = []
         self._start()
         self._times, broken = self._index()
         if broken:
@@ -101,7 +101,8 @@ class Video:
         if not self._times:
             self.close()
             raise ClipError(f"{path}: holds no frame that can be decoded; export it again")
-        self._varies, self._interlaced, self._premultiplied = False, False, False
+        self._varies, self._interlaced = False, False
+        self._held: Association = "straight"
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
         self.backdrop = self._matted()
@@ -266,6 +267,7 @@ class Video:
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
         notes = [Remark("varying frame rate", {"fps": self.fps})] * self._varies
+        notes.extend(association_notes(self._held))
         if encoding in ("hlg", "pq") and self._transfer is None:
             notes.append(Remark("high dynamic range", {"transfer": encoding.upper()}))
         if primaries is not None:
@@ -280,8 +282,9 @@ class Video:
         if frame is None:
             self._rewind()
             self._lost.add(index)
+            number = bisect.bisect_left(self._shown, index)
             raise DamagedFrameError(
-                f"{self._path}: frame {index} is damaged and cannot be decoded; export the clip again"
+                f"{self._path}: frame {number} is damaged and cannot be decoded; export the clip again"
             )
         self._next = index + 1
         return frame
@@ -324,13 +327,14 @@ class Video:
         return good
 
     def _matted(self) -> float | None:
-        """Find out whether colours are premultiplied; return the grey to show them over, None without alpha."""
+        """Find out how colours are held beside alpha; return the grey to show them over, None without alpha."""
         frames = []
         for frame in sound_samples(self.count, lambda n: self._decode(self._shown[n])):
             if not _has_alpha(frame):
                 return None
             frames.append(frame)
-        self._premultiplied = bool(frames) and all(map(_is_premultiplied, frames))
+        encoded = (encoded_values(self._codes(frame), _white(frame)) for frame in frames)
+        self._held = association(encoded, decoder(self._encoding()))
         return backdrop_of(map(self._layer, frames))
 
     def _size(self) -> tuple[int, int]:
@@ -370,7 +374,7 @@ class Video:
 
     def _layer(self, frame: av.VideoFrame) -> Layer:
         codes, white = self._codes(frame), _white(frame)
-        linear = _upright(decode_integers(codes, self._encoding(), white, self._premultiplied), frame)
+        linear = _upright(decode_integers(codes, self._encoding(), white, self._held), frame)
         alpha = decode_alpha(codes, white)
         picture = to_bt709(linear, self._stream.codec_context.color_primaries)
         return picture, None if alpha is None else _upright(alpha, frame)
@@ -389,12 +393,6 @@ class Video:
 
 def _has_alpha(frame: av.VideoFrame) -> bool:
     return any(component.is_alpha for component in frame.format.components)
-
-
-def _is_premultiplied(frame: av.VideoFrame) -> bool:
-    """Whether colours are premultiplied: none is brighter than white times alpha in linear light."""
-    pixels = frame.reformat(format="rgba", threads=1).to_ndarray() / np.float32(255)
-    return bool((srgb_to_linear(pixels[..., :3]) <= pixels[..., 3:] + np.float32(BEYOND_ALPHA)).all())
 
 
 def _lines(plane: VideoPlane) -> npt.NDArray[np.uint8]:

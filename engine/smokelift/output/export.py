@@ -97,6 +97,8 @@ class ExportSettings:
 def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSettings) -> Iterator[tuple[int, int]]:
     """Export a sequence to a folder: `smoke_0001.vdb`, ..., `smoke.usda`, `export.json`, and `proxy_0001.vdb`, ...
 
+    Files have the numbers of the sequence's own, and so do the times of the USD file.
+
     There is no USD file for a program whose axes are left-handed. An earlier export in the folder is replaced. The
     sequence stays as it is.
 
@@ -186,7 +188,7 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
     domain, extinction, host = sequence.scene.domain, sequence.scene.medium.extinction, HOSTS[settings.host]
     thinned = _thinned(sequence.density(number), domain, extinction)
     velocity = sequence.velocity_at_centres(number) if settings.velocity else None
-    paths = [frame_path(out, number, "vdb")]
+    paths = [frame_path(out, sequence.file_number(number), "vdb")]
     rho = thinned
     if settings.precision == "quantised":
         rho = _rounded(rho, density_step(domain, extinction))
@@ -211,7 +213,7 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
         whole_box=host.whole_box,
     )
     if settings.proxy > 1:
-        paths.append(proxy_path(out, number))
+        paths.append(proxy_path(out, sequence.file_number(number)))
         write_proxy(paths[1], host.turned(thinned / np.float32(peak)), host.box(domain), settings.proxy)
     return sum(path.stat().st_size for path in paths)
 
@@ -254,8 +256,8 @@ def _medium(sequence: Sequence, peak: float) -> Medium:
 
 
 def _usd(sequence: Sequence, settings: ExportSettings, peak: float) -> str:
-    host, numbers, grids = HOSTS[settings.host], sequence.frames, _grids(sequence, settings)
-    domain = host.box(sequence.scene.domain)
+    host, grids = HOSTS[settings.host], _grids(sequence, settings)
+    domain, numbers = host.box(sequence.scene.domain), [sequence.file_number(number) for number in sequence.frames]
     purpose = "default" if settings.proxy == 1 else "render"
     files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
     volumes = [UsdVolume("Volume", purpose, files, grids, domain)]
@@ -273,7 +275,7 @@ def _note(sequence: Sequence, settings: ExportSettings, peak: float) -> dict[str
         "precision": settings.precision,
         "grids": list(_grids(sequence, settings)),
         "proxy": settings.proxy,
-        "frames": [sequence.frames[0], sequence.frames[-1]],
+        "frames": [sequence.file_number(sequence.frames[0]), sequence.file_number(sequence.frames[-1])],
         "fps": sequence.fps,
         "medium": {key: value for key, value in vars(_medium(sequence, peak)).items() if value is not None},
         "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},

@@ -17,7 +17,7 @@ import numpy as np
 
 from smokelift.checks import shown
 from smokelift.output.atomic import atomic_path
-from smokelift.output.layout import INDEX
+from smokelift.output.layout import INDEX, MAX_START_NUMBER
 from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
 from smokelift.scene.files import read_text
@@ -84,6 +84,8 @@ class Index:
         Of the frames' files, by name (`smokelift.output.checksum`).
     complete
         Whether the run came to its end.
+    start_number
+        Number in the names of the files of frame 1.
     versions
         Of the software.
     """
@@ -96,12 +98,17 @@ class Index:
     sources: dict[str, Any] = field(default_factory=dict)
     checksums: dict[str, str] = field(default_factory=dict)
     complete: bool = False
+    start_number: int = 1
     versions: dict[str, Any] = field(default_factory=software_versions)
 
     @property
     def numbers(self) -> tuple[int, ...]:
         """The finished frames' numbers, in order."""
         return tuple(sorted(map(int, self.frames)))
+
+    def file_number(self, number: int) -> int:
+        """The number in the names of a frame's files."""
+        return number + self.start_number - 1
 
     def box(self, number: int, otherwise: Domain) -> Domain:
         """The box of a frame's files, where it is not the scene's; its voxels are those of the scene's."""
@@ -139,10 +146,13 @@ class Index:
             raise SequenceError(f"{path}: cannot be read: {error}") from error
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise SequenceError(f"{path}: is not a sequence of format {FORMAT}, which this version reads")
+        data = {"start_number": 1, **data}  # version 1.0.0 writes none
         kinds = {key: get_origin(hint) or hint for key, hint in get_type_hints(Index).items()}
         for key, kind in kinds.items():
             if not isinstance(data.get(key), kind):
                 raise SequenceError(f"{path}: is damaged: {key} is missing or of another type")
+        if not 0 <= data["start_number"] <= MAX_START_NUMBER:
+            raise SequenceError(f"{path}: is damaged: start_number cannot be {shown(data['start_number'])}")
         for number, figures in data["frames"].items():
             if not re.fullmatch(r"0|[1-9][0-9]{0,8}", number) or not isinstance(figures, dict):
                 raise SequenceError(f"{path}: is damaged: there can be no frame {shown(number)} of {shown(figures)}")
@@ -198,6 +208,7 @@ def _versions(index: Index) -> dict[str, Any]:
 COMPARED: tuple[tuple[str, Callable[[Index], Any]], ...] = (
     ("sources", lambda index: index.sources),
     ("settings", _own_settings),
+    ("start_number", lambda index: index.start_number),
     ("scene", _scene),
     ("settings", lambda index: index.settings),
     ("versions", _versions),

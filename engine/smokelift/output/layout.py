@@ -17,16 +17,19 @@ PREVIEW = "preview.mp4"
 PICTURES = (CONTACT_SHEET, ORBIT, STRIP, PREVIEW)
 """What shows a sequence at a glance; nothing is computed from it."""
 
+MAX_START_NUMBER = 1_000_000
+"""Largest number of a first file: Blender's timeline ends at 1,048,574."""
+
 _FRAME = re.compile(r"smoke_\d{4,}\.(vdb|npz)|proxy_\d{4,}\.vdb")
 
 
 def frame_path(directory: Path, number: int, kind: str) -> Path:
-    """Return the file of a frame; the kind is ``"vdb"`` or ``"npz"``."""
+    """Return the file with a number in its name; the kind is ``"vdb"`` or ``"npz"``."""
     return directory / f"smoke_{number:04d}.{kind}"
 
 
 def proxy_path(directory: Path, number: int) -> Path:
-    """Return the file of a frame's coarse copy."""
+    """Return the coarse copy of the file with that number in its name."""
     return directory / f"proxy_{number:04d}.vdb"
 
 

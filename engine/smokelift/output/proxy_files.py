@@ -50,7 +50,7 @@ def write_proxies(sequence: Sequence) -> Iterator[int]:
     if not sequence.frames:
         raise SequenceError(f"{sequence.directory}: has no finished frame to make a proxy of yet.")
     for number in sequence.frames:
-        path = proxy_path(sequence.directory, number)
+        path = proxy_path(sequence.directory, sequence.file_number(number))
         try:
             write_proxy(path, sequence.density(number), sequence.scene.domain, flame=sequence.flame(number))
         except OSError as error:

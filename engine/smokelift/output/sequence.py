@@ -48,6 +48,8 @@ class Sequence:
     provenance
         What of the result is measured, estimated, assumed and made up: ``what``, ``origin``, ``how`` and ``settings``
         of each part (see `smokelift.report`).
+    start_number
+        Number in the names of the files of frame 1.
     """
 
     directory: Path
@@ -58,6 +60,7 @@ class Sequence:
     complete: bool
     choices: tuple[Mapping[str, Any], ...]
     provenance: tuple[Mapping[str, Any], ...]
+    start_number: int
     _boxes: Mapping[int, Domain]
     _figures: Mapping[str, Mapping[str, Any]]
     _checksums: Mapping[str, str]
@@ -89,6 +92,7 @@ class Sequence:
             index.complete,
             tuple(index.choices),
             tuple(index.provenance),
+            index.start_number,
             boxes,
             index.frames,
             index.checksums,
@@ -99,6 +103,10 @@ class Sequence:
         """Frames a second: those of the clip, or `USUAL_FPS` where the scene does not say them."""
         clip = self.scene.clip
         return (clip.fps if clip is not None else None) or USUAL_FPS
+
+    def file_number(self, number: int) -> int:
+        """Return the number in the names of a frame's files."""
+        return number + self.start_number - 1
 
     def box(self, number: int) -> Domain:
         """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing.
@@ -187,7 +195,7 @@ class Sequence:
             If there is no such frame, or a file is not the one that was written.
         """
         self._check(number)
-        paths = {kind: frame_path(self.directory, number, kind) for kind in ("vdb", "npz")}
+        paths = {kind: frame_path(self.directory, self.file_number(number), kind) for kind in ("vdb", "npz")}
         there = {kind: path for kind, path in paths.items() if path.is_file()}
         for path in there.values():
             self._check_sum(path)
@@ -243,7 +251,7 @@ class Sequence:
     def _read(self, number: int, names: tuple[str, ...]) -> Mapping[str, Array]:
         """Arrays of a NumPy twin, or else the OpenVDB grid that holds the same; emission where it is there."""
         self._check(number)
-        twin, grids = (frame_path(self.directory, number, kind) for kind in ("npz", "vdb"))
+        twin, grids = (frame_path(self.directory, self.file_number(number), kind) for kind in ("npz", "vdb"))
         whole, box = self.scene.domain, self._boxes[int(number)]
         path = twin if twin.is_file() else grids
         if not path.is_file():

@@ -31,7 +31,16 @@ from smokelift.output.index import (
     changed,
     plain,
 )
-from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
+from smokelift.output.layout import (
+    BACKGROUND,
+    INDEX,
+    LOCK,
+    MAX_START_NUMBER,
+    RESUME,
+    frame_path,
+    is_foreign,
+    proxy_path,
+)
 from smokelift.output.lock import Lock
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS, write_proxy
 from smokelift.output.resume import ResumeState
@@ -60,6 +69,8 @@ class SequenceWriter:
         Whether to go on from the finished frames in the directory. An empty directory starts a new run.
     background : (rows, columns, 3), optional
         An estimated background of the scene's picture, kept as `background.exr`.
+    start_number
+        Number in the names of the files of frame 1, from 0 to `MAX_START_NUMBER`.
     choices, provenance, sources
         Where the result comes from, in values that JSON can hold: see `smokelift.output.index.Index`. Kept.
 
@@ -84,6 +95,7 @@ class SequenceWriter:
         npz: bool = False,
         resume: bool = False,
         background: Array | None = None,
+        start_number: int = 1,
         choices: Sequence[Mapping[str, Any]] = (),
         provenance: Sequence[Mapping[str, Any]] = (),
         sources: Mapping[str, Any] | None = None,
@@ -97,7 +109,9 @@ class SequenceWriter:
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
         origins = plain({"choices": choices, "provenance": provenance, "sources": sources or {}})
-        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **origins)
+        if not 0 <= start_number <= MAX_START_NUMBER:
+            raise ValueError(f"start_number must be from 0 to {MAX_START_NUMBER}, not {start_number}")
+        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **origins, start_number=start_number)
         self._npz = npz
         self._kinds: tuple[str, ...] = ()
         self._resume = resume
@@ -166,7 +180,7 @@ class SequenceWriter:
         Parameters
         ----------
         number
-            The frame's number in its file name, the one after the last finished.
+            The frame's number, the one after the last finished; in its file name it counts from ``start_number``.
         density : (nx, ny, nz)
             Not negative.
         velocity_faces
@@ -191,8 +205,8 @@ class SequenceWriter:
         """
         if self.finished and number != self.finished[-1] + 1:
             raise ValueError(f"frame {number} cannot follow frame {self.finished[-1]}: a sequence has no gaps")
-        if number < 0:
-            raise ValueError(f"a frame's number must not be negative, as {number} is")
+        if min(number, self._index.file_number(number)) < 0:
+            raise ValueError(f"a frame's number, and that of its file, must not be negative, as of {number}")
         box = box or self._domain
         rho = checked_volume(density, box.shape, "density")
         velocity = Velocity(velocity_faces, self._domain.voxel_size)
@@ -202,7 +216,7 @@ class SequenceWriter:
         self.state = None  # a run has gone on by now, and the arrays are large
         state = state or ResumeState(number, rho, velocity.faces)
         try:
-            paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
+            paths = [self._path(number, kind) for kind in self._kinds]
             for kind, path in zip(self._kinds, paths, strict=True):
                 if ready is not None and kind in ready:
                     with atomic_path(path) as aside:
@@ -210,7 +224,13 @@ class SequenceWriter:
                 else:
                     self._write_arrays(path, rho, velocity, fire, box)
             if "vdb" in self._kinds and math.prod(self._domain.shape) >= MIN_PROXY_VOXELS:  # of all frames or of none
-                write_proxy(proxy_path(self.directory, number), rho, box, flame=fire, lattice=self._domain)
+                write_proxy(
+                    proxy_path(self.directory, self._index.file_number(number)),
+                    rho,
+                    box,
+                    flame=fire,
+                    lattice=self._domain,
+                )
             frames = {**self._index.frames, str(number): plain({**(figures or {}), **own_box})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
@@ -220,6 +240,10 @@ class SequenceWriter:
             self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
             raise self._failed(f"frame {number}", error) from error
+
+    def _path(self, number: int, kind: str) -> Path:
+        """The file of a frame."""
+        return frame_path(self.directory, self._index.file_number(number), kind)
 
     def _write_arrays(self, path: Path, density: Array, velocity: Velocity, flame: Array | None, box: Domain) -> None:
         if path.suffix == ".npz":
@@ -244,7 +268,7 @@ class SequenceWriter:
             self.state = self._last_state(there)
             last = self.state.number if self.state is not None else -1
             frames = {number: figures for number, figures in frames.items() if int(number) <= last}
-        kept = {frame_path(self.directory, int(number), kind).name for number in frames for kind in ("vdb", "npz")}
+        kept = {self._path(int(number), kind).name for number in frames for kind in ("vdb", "npz")}
         checksums = {name: digits for name, digits in there.checksums.items() if name in kept}
         self._index = replace(self._index, frames=frames, checksums=checksums, complete=there.complete)
         self._check_files()
@@ -265,7 +289,7 @@ class SequenceWriter:
 
     def _check_files(self) -> None:
         """Refuse to go on, or to call the sequence complete, if files of finished frames were taken away."""
-        for path in (frame_path(self.directory, number, kind) for number in self.finished for kind in self._kinds):
+        for path in (self._path(number, kind) for number in self.finished for kind in self._kinds):
             if not path.is_file():
                 raise SequenceError(
                     f"{path}: is missing, so this run cannot go on with this output; choose another directory"

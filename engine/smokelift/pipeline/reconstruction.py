@@ -54,6 +54,7 @@ class Reconstruction:
         *,
         npz: bool = False,
         resume: bool = False,
+        start_number: int = 1,
         on_frame: Callable[[Frame], object] | None = None,
     ) -> Sequence:
         """Compute and write all frames, as the command line does.
@@ -66,6 +67,8 @@ class Reconstruction:
             Write NumPy twins as well.
         resume
             Go on after the frames that are finished in the directory.
+        start_number
+            Number in the names of the first frame's files, 1001 for the clip's own, say. The frame itself stays 1.
         on_frame
             Is called with each frame once it is written, but not with those that were finished before. What it raises
             ends the run; the finished frames stay.
@@ -75,6 +78,8 @@ class Reconstruction:
         SequenceError
             If the directory cannot be written to or holds something else, or no file could be written because there is
             no OpenVDB module.
+        ValueError
+            If there can be no file with the start number.
         """
         shot = self.shot
         others = other_parts(self.method, shot.settings)
@@ -86,6 +91,7 @@ class Reconstruction:
             npz=npz,
             resume=resume,
             background=shot.estimated_background,
+            start_number=start_number,
             choices=[record(estimate) for estimate in shot.estimates],
             provenance=[part.as_dict() for part in provenance(shot)],
             sources=sources(shot),

@@ -2,8 +2,8 @@
 
 It follows the voxels of the box, and more so those that may hold smoke. The time of frames is counted in Poisson solves
 by cosine transforms, which are timed on this machine. The set-up is not modelled: a forecast prepares the shot as the
-run does, so the run takes that time and memory again. How long it waited for the processor says how busy the machine
-is. All constants: docs/experiments/memory-and-time.md.
+run does, so the run takes that time and memory again. What other programs take meanwhile is left out: how busy the
+machine is now does not say how busy it will be. All constants: docs/experiments/memory-and-time.md.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class NotEnoughMemoryError(MemoryError):
 class Cost:
     """What a run takes: seconds, bytes of memory at its peak, and at most so many bytes of OpenVDB files.
 
-    The seconds are right to a factor of 1.5 if the machine's load does not change. ``memory_free`` is bytes now.
+    The seconds are right to a factor of 1.5 on a machine without other work. ``memory_free`` is bytes now.
     """
 
     seconds: float
@@ -112,16 +112,16 @@ class Spent:
     memory: int | None = None
 
     @property
-    def wait(self) -> float:
-        """Seconds that pass for each second of work: 1 on a machine without other work."""
-        return max(1.0, self.seconds / self.processor) if self.processor > 0 else 1.0
+    def work(self) -> float:
+        """Seconds that it takes without other work on the machine, where it need not wait for a processor."""
+        return min(self.seconds, self.processor)
 
 
 def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Cost:
     """Estimate the cost of a run from its grid, its smoke and what preparing it took, in a part of a second."""
     frames = START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
     return Cost(
-        seconds=prepared.seconds + prepared.wait * frames,
+        seconds=prepared.work + frames,
         memory=max(memory_needed(resolution, work), prepared.memory or 0),
         memory_free=memory_free(),
         disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_A_SMOKY_VOXEL_ON_DISK),

@@ -47,7 +47,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         ),
         _box(shot, has_box),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
-        *_medium(shot, given.medium is not None),
+        *_medium(shot, not any(remark.kind == "assumed medium" for remark in shot.remarks)),
         *_light(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
         _place(shot),
@@ -78,7 +78,7 @@ def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
 
 def _cost(shot: Shot, cost: Cost) -> Fact:
     spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
-    free = f"Right to a factor of 1.5; {cost.memory_free / 2**30:.1f} GiB of memory are free."
+    free = f"Right to a factor of 1.5 if nothing else runs; {cost.memory_free / 2**30:.1f} GiB of memory are free."
     return Fact("cost", f"{counted(shot.length, 'frame')}: {spent}", "estimated", free)
 
 
@@ -101,10 +101,11 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
     value = "a picture"
     if (plate.image == colour).all():
         value = "black" if colour.max() < BLACK else f"one color, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
+    assumed = any(remark.kind == "background assumed" for remark in shot.remarks)
     return Fact(
         "background",
         f"{value}, {unknown:.0%} of it unknown" if unknown else value,
-        "estimated",
+        UNDETERMINED if assumed else "estimated",
         _said(shot, "background", "black background"),
     )
 

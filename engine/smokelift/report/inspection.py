@@ -61,9 +61,11 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
     lit = " and the light" if _light_starts(shot, shot.scene.domain) else ""
     masked = "" if shot.clip.mask is None else ", the mask's outline"
     panels = [
-        Panel(f"frame {number} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
+        Panel(f"frame {shot.clip.first + number} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
         Panel("background", eight_bit(plate.image)),
-        Panel(f"smoke of frame {number}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)),
+        Panel(
+            f"smoke of frame {shot.clip.first + number}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)
+        ),
         Panel(f"unknown background: {unknown.mean():.1%} of the picture", _unknown_picture(plate, unknown)),
         Panel("brightness: frame (grey), its smoke (orange), background (blue)", _histogram(picture, plate, seen)),
         *([] if path is None else [Panel("path of the box's middle while the camera moves", path)]),

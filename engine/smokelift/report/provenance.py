@@ -9,7 +9,7 @@ from typing import Any, Literal
 from smokelift.checks import Remark
 from smokelift.density.detailed_depth import unseen_sides
 from smokelift.density.turntable import Turntable
-from smokelift.footage.clip import Clip, numbered
+from smokelift.footage.clip import Clip
 from smokelift.report.sentences import sentence
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.shot import Shot
@@ -84,8 +84,7 @@ def _pictures(clip: Clip) -> Iterator[Provenance]:
     for note in clip.notes:
         yield Provenance("pictures", "measured", note)
     if clip.damaged:
-        frames = numbered([n + 1 for n in clip.damaged])
-        yield Provenance("some pictures", "assumed", Remark("replaced pictures", {"frames": frames}))
+        yield Provenance("some pictures", "assumed", Remark("replaced pictures", {"frames": clip.damaged_frames}))
 
 
 def _distribution(shot: Shot) -> str:

@@ -48,6 +48,9 @@ SENTENCES: Mapping[str, str] = {
     ),
     "other primaries": "The clip's primaries, {primaries}, are converted to BT.709.",
     "scaled pictures": "Pictures of {size} pixels are scaled to {scaled}: they are large, or their pixels not square.",
+    "premultiplied colours": (
+        "The clip's colors are read as {held} by its alpha channel, because its smoke then has most nearly one color."
+    ),
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
     "disagreeing views": (
         "The views agree on only {agreed:.0%} of the smoke that they show. Check where their cameras stand, which "
@@ -62,6 +65,10 @@ SENTENCES: Mapping[str, str] = {
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
     "background of one colour": "Background not given: it is of one color, {color:.2g} (linear).",
+    "background assumed": (
+        "Background not given, and no part of the picture shows it: {color:.2g} (linear) is assumed, and all that "
+        "differs from it counts as smoke."
+    ),
     "background with objects": (
         "Background: {share:.1%} of the picture has other colors and never changes, as a nozzle, a floor or a logo "
         "does. If that is smoke, give the color as background."
@@ -104,6 +111,9 @@ SENTENCES: Mapping[str, str] = {
     ),
     "no smoke in one frame": (
         "One frame alone does not show what is behind its smoke: give a clean plate or a color as background."
+    ),
+    "smoke behind the mask": (
+        "What the mask hides looks like smoke: if the mask is black where smoke may be and white elsewhere, invert it."
     ),
     "no smoke before an estimated background": (
         "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is "
@@ -173,6 +183,11 @@ SENTENCES: Mapping[str, str] = {
     "fire": (
         "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
         "{red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
+    ),
+    "possible fire": (
+        "Some of the smoke may be fire: {share:.1%} of its pixels have the colors of fire, and {bright:.0%} of these "
+        "are brighter than light explains, too few to be certain. If it is fire, give its color as the flame's, "
+        "for example 1, 0.4, 0.1."
     ),
     "assumed light": (
         "Light not given: light from everywhere is assumed, as bright as smoke and background ask for (irradiance "

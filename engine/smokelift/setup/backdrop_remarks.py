@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from smokelift.checks import Doubt, Remark
-from smokelift.footage.backdrop import Backdrop
+from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, unknown_part
+from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, sample_smoke, unknown_part
 
 BLACK = 0.001
 """Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
@@ -31,17 +31,26 @@ COARSE_QUANTISER = 42.0
 
 def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
     """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
-    found, change = estimate.found, estimate.samples.exposure
+    found, samples, change = estimate.found, estimate.samples, estimate.samples.exposure
     return (
-        *backdrop_remarks(found),
+        *backdrop_remarks(found, not given and _between_bars(samples)),
         *((Remark("background unused"),) if found.source == "alpha" and given else ()),
-        *doubts(found, estimate.samples, given),
+        *doubts(found, samples, given),
         *(() if change == 0 else (Remark("exposure", {"change": change}),)),
+        *_possible_fire(estimate),
     )
 
 
-def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
-    """Return how a background was found, and what stands before it if it has one colour."""
+def _possible_fire(estimate: FirstEstimate) -> tuple[Doubt, ...]:
+    """That some of what counts as smoke may be fire."""
+    hot = estimate.hot
+    if estimate.fire is not None or not hot.may_burn:
+        return ()
+    return (Doubt("possible fire", {"share": hot.share, "bright": hot.bright}),)
+
+
+def backdrop_remarks(found: Backdrop, bars: bool = False) -> tuple[Remark, ...]:
+    """Return how a background was found, and what stands before it if it has one colour, not that of ``bars``."""
     clip, plates = found.clip, found.plates
     if found.source == "alpha":
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
@@ -55,6 +64,8 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
     if not (image == colour).all():
         colour = np.median(image.reshape(-1, 3), axis=0)
     red, green, blue = map(float, colour)
+    if bars or found.source == "black for want of a picture":
+        return (Remark("background assumed", {"color": (red, green, blue)}),)
     other = float((image != colour).any(-1).mean())
     black = max(red, green, blue) < BLACK
     return (
@@ -91,11 +102,22 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
 
 def what_helps(clip: Clip, given: bool) -> Doubt:
     """Return what may help where no smoke is found; ``given`` as in `doubts`."""
+    if clip.mask is not None and _shows_smoke(clip.as_filmed()):
+        return Doubt("smoke behind the mask")
     if given:
         return Doubt("no smoke before the given background")
     if len(clip) == 1 and clip.backdrop is None:
         return Doubt("no smoke in one frame")
     return Doubt("no smoke before an estimated background")
+
+
+def _shows_smoke(clip: Clip) -> bool:
+    """Whether smoke is found in a clip of which nothing is given; not if its camera moves."""
+    try:
+        found = find_backdrop(clip, None, None)
+    except ValueError:
+        return False
+    return bool(sample_smoke(found.clip, found.plates).smoky)
 
 
 def _between_bars(samples: SmokeSamples) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
-from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
+from smokelift.footage.fire import HotPixels, fire_colour, firelight, hot_pixels, without_fire
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates, evened, exposures
@@ -94,26 +94,33 @@ class FirstEstimate:
     """What a clip shows: its background, its smoke, and its fire if any burns.
 
     ``clip`` is the footage at its background's exposure, without fire and without the brightness that noise adds.
+    ``hot`` are the pixels that may be fire.
     """
 
     clip: Clip
     found: Backdrop
     samples: SmokeSamples
     fire: Fire | None
+    hot: HotPixels
 
 
-def first_estimate(clip: Clip, camera: Camera | None, background: Background | None) -> FirstEstimate:
-    """Estimate what a clip shows; parameters and errors as of `find_backdrop`."""
+def first_estimate(
+    clip: Clip, camera: Camera | None, background: Background | None, flame_color: Vector | None = None
+) -> FirstEstimate:
+    """Estimate what a clip shows; parameters and errors as of `find_backdrop`.
+
+    Where a ``flame_color`` is given there is fire, however little of it is certain.
+    """
     found = find_backdrop(clip, camera, background)
     samples = sample_smoke(found.clip, found.plates)
     exposed = evened(found.clip, found.plates, samples.gains)
-    fire, share = None, fire_share(samples.colours, samples.behind)
-    if share:
+    fire, hot = None, hot_pixels(samples.colours, samples.behind)
+    if hot.burn or (flame_color is not None and hot.share):
         doused = without_fire(exposed, found.plates)
         light = firelight(exposed, doused)
-        fire, exposed = Fire(share, light, fire_colour(exposed, light)), doused
+        fire, exposed = Fire(hot.share, light, flame_color or fire_colour(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
-    return FirstEstimate(exposed, found, samples, fire)
+    return FirstEstimate(exposed, found, samples, fire, hot)
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:

@@ -53,17 +53,18 @@ def find_medium(
 ) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
     """Complete the medium, with its flame's colour if fire burns; return what was measured and assumed too."""
     medium, samples, fire = scene.medium, estimate.samples, estimate.fire
+    flame_color = None if medium is None else medium.flame_color
     estimates: list[Estimate[Any]] = []
     remarks: list[Remark] = []
-    if medium is None:
-        medium = Medium(extinction=OPTICAL_DEPTH_AT_ONE / min(domain.size))
+    if medium is None or (flame_color is not None and medium == Medium(flame_color=flame_color)):
+        medium = Medium(OPTICAL_DEPTH_AT_ONE / min(domain.size), flame_color=flame_color)
         remarks.append(Remark("assumed medium", {"extinction": medium.extinction, "albedo": medium.albedo}))
         color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
         medium = replace(medium, color=color)
         estimates.append(coloured)
     remarks += several_colours(samples)
     if fire is not None:
-        red, green, blue = color = medium.flame_color or fire.color
+        red, green, blue = color = fire.color
         figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
         estimates.append(Estimate("fire", figures, what="fire", value=f"{fire.share:.3f}", source="measured"))
         medium = replace(medium, flame_color=color)

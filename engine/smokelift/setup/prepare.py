@@ -55,7 +55,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
-    estimate = first_estimate(clip, scene.camera, scene.background)
+    estimate = first_estimate(
+        clip, scene.camera, scene.background, None if scene.medium is None else scene.medium.flame_color
+    )
     plates, samples = estimate.found.plates, estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain

@@ -32,6 +32,28 @@ def test_reconstruct_writes_vdb_files(shot, tmp_path, capsys) -> None:
     assert Sequence.open(tmp_path / "out").density(2).any()
 
 
+def test_files_are_numbered_as_the_clip_and_every_command_goes_on(shot, finished, tmp_path, capsys) -> None:
+    out, more = tmp_path / "out", tmp_path / "more"
+    assert command("reconstruct", shot, "--out", out, "--npz", "--start-number", 1001, *QUICK) == 0
+    sequence, usual = Sequence.open(out), Sequence.open(finished)
+    assert sequence.frames == usual.frames
+    assert {f"smoke_100{n}.npz" for n in range(1, 6)} <= set(names(out))
+    np.testing.assert_array_equal(sequence.density(4), usual.density(4))
+    for words in (
+        ("check", out),
+        ("evaluate", out),
+        ("render", out, "--frame", 3, "--out", tmp_path / "a.png"),
+        ("continue", out, "--frames", 2, "--out", more, "--npz"),
+        ("reconstruct", shot, "--out", out, "--npz", "--resume", "--start-number", 1001, *QUICK),
+    ):
+        assert command(*words) == 0, capsys.readouterr().err
+    assert Sequence.open(more).start_number == 1001
+    assert {f"smoke_100{n}.npz" for n in range(1, 8)} <= set(names(more))
+    for wrong in ("-1", "1.5", "99999999"):
+        assert command("reconstruct", shot, "--out", out, "--start-number", wrong) == 2
+        assert "expected a whole number from 0 to 1000000" in capsys.readouterr().err
+
+
 def test_progress_as_json(plume, tmp_path, capsys) -> None:
     scene = replace(plume.scene, medium=None)
     scene.save(tmp_path / "scene.toml")

@@ -36,6 +36,7 @@ def here(shot, plume, tmp_path, monkeypatch):
         (("clipless.toml",), "[clip]"),
         (("SHOT", "--frames", "2:9"), "0 to 4"),
         (("SHOT", "--frames", "3:1"), "frames"),
+        (("SHOT", "--frames", "-2:3"), "frames must be [first, last], whole numbers from 0"),
         (("SHOT", "--detail", "1.5"), "detail must be"),
         (("SHOT", "--seed", "-1"), "seed must be"),
         (("SHOT", "--distance", "4.7", *QUICK), "reaches from 3.4 to 4.6 m"),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -281,6 +282,16 @@ def test_a_damaged_frame_is_as_one_that_a_camera_dropped(tmp_path: Path, broken:
     assert changed.damaged == tuple(broken)  # known after the file is closed
 
 
+def test_a_damaged_frame_has_its_number_in_the_clip_at_a_varying_rate_too(tmp_path: Path) -> None:
+    times = [0, 40, 80, 120, 160, 200, 210, 220, 230, 240]
+    path = encode(tmp_path / "a.mov", [flat(v) for v in LEVELS[:10]], codec="png", pixels="rgb24", times=times)
+    video = Video(blanked(path, [4]), None)
+    (damaged, *_) = video.damaged(0, 9)
+    with pytest.raises(ClipError, match=rf"frame {damaged} is damaged"):
+        video.read(damaged)
+    assert damaged != 4
+
+
 def wide_codes(path: Path, planes: Sequence[int], codec: str = "ffv1", **tags: int) -> Path:
     """Write a flat 4:4:4 picture of 10 bit luma and chroma codes."""
     with av.open(str(path), "w") as out:
@@ -370,6 +381,31 @@ def test_picture_sequences(tmp_path: Path) -> None:
     assert codes(Clip.open(tmp_path / "still.png")) == [77]
 
 
+def test_pictures_with_negative_numbers_come_first(tmp_path: Path) -> None:
+    for n in range(-2, 3):
+        Image.fromarray(flat(100 + 10 * n)).save(tmp_path / f"frame_{n:04d}.png")
+    levels = [80, 90, 100, 110, 120]
+    for name in ("frame_####.png", "frame_-002.png"):
+        with Clip.open(tmp_path / name, fps=24) as clip:
+            assert codes(clip) == levels
+    assert codes(Clip.open(tmp_path / "frame_-001.png")) == levels[1:]
+    assert codes(Clip.open(tmp_path / "frame_0000.png")) == levels[2:]
+    (tmp_path / "frame_-001.png").unlink()
+    assert codes(Clip.open(tmp_path / "frame_####.png")) == [80, 80, 100, 110, 120]
+
+
+def test_a_dash_is_no_minus_sign_where_no_picture_has_the_number_0(tmp_path: Path) -> None:
+    for n in (1, 2):
+        Image.fromarray(flat(50 * n)).save(tmp_path / f"shot-{n:03d}.png")
+    for name in ("shot-###.png", "shot-001.png"):
+        assert codes(Clip.open(tmp_path / name)) == [50, 100]
+    for name in ("shot0003.png", "shot0004.png"):
+        with pytest.raises(ClipError, match=r"shot-002\.png: has a dash before its number.* or give shot-###\.png"):
+            Clip.open(tmp_path / "shot####.png")
+        Image.fromarray(flat(9)).save(tmp_path / name)
+    assert codes(Clip.open(tmp_path / "shot0003.png")) == [9, 9]
+
+
 def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
     pictures(tmp_path, [1, 2, 4])
     (tmp_path / "frame_0005.png").write_bytes(b"nothing")
@@ -398,3 +434,14 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
         pytest.raises(ClipError, match=r"frame_0003\.png: is 8 x 8 pixels, the first picture 32 x 16"),
     ):
         clip.frame(2)
+
+
+def test_pictures_of_a_kind_that_is_not_read_are_named_and_not_taken_for_damage(tmp_path: Path) -> None:
+    for n in range(4):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"Z": np.ones((16, 32), np.float32)}).write(str(tmp_path / f"z{n}.exr"))
+        Image.fromarray(flat(10)).save(tmp_path / f"b{n}.bmp")
+    for pattern, reason in (("z#.exr", "holds neither RGB nor Y channels, but Z"), ("b#.bmp", "is none of .*save it")):
+        with pytest.raises(ClipError, match=rf"0\.\w+: {reason}") as refused:
+            Clip.open(tmp_path / pattern)
+        assert "damaged" not in str(refused.value) and "missing" not in str(refused.value)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
+from smokelift.footage.fire import fire_colour, firelight, hot_pixels, without_fire
 from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 
@@ -29,8 +29,27 @@ def pixels(**what):
     return seen, np.zeros_like(seen)
 
 
+def fire_share(*seen) -> float:
+    """The share of the pixels that is fire."""
+    hot = hot_pixels(*seen)
+    return hot.share * hot.burn
+
+
 def test_a_flame_in_dark_smoke_is_fire() -> None:
     assert 0.01 < fire_share(*pixels()) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("bright", "burns", "may_burn"), [(0, False, False), (18, False, True), (30, True, True)], ids=str
+)
+def test_fire_of_which_little_is_bright_may_be_fire(bright: int, burns: bool, may_burn: bool) -> None:
+    """A hundred pixels of fire, some of them as bright as white, in smoke that is as bright as most of them."""
+    flames = np.tile(np.float32((0.75, 0.3, 0.06)), (100, 1))
+    flames[:bright] *= 1.25
+    seen = np.concatenate([flames, np.full((900, 3), 0.5, np.float32)])
+    hot = hot_pixels(seen, np.zeros_like(seen))
+    assert (hot.share, hot.bright) == (pytest.approx(0.1), pytest.approx(bright / 100))
+    assert (hot.burn, hot.may_burn) == (burns, may_burn)
 
 
 def test_a_core_that_is_clipped_to_yellow_is_no_bright_smoke() -> None:

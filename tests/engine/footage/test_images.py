@@ -14,11 +14,13 @@ from scipy import ndimage
 from smokelift import _core
 from smokelift.footage.images import (
     ImageError,
+    PictureKindError,
     area_average,
     blurred,
     brightest_channel,
     linear_to_srgb,
     read_image,
+    read_layer,
     srgb_to_linear,
 )
 from smokelift.output.images import write_image
@@ -105,9 +107,7 @@ def test_exr_channels_and_tiles(tmp_path: Path) -> None:
     rgb = colours(40, 50)
     grey = rgb[..., 0].copy()
     np.testing.assert_array_equal(read_image(exr(tmp_path / "y.exr", {"Y": grey})), np.repeat(grey[..., None], 3, 2))
-    np.testing.assert_array_equal(
-        read_image(exr(tmp_path / "depth.exr", {"Z": grey})), np.repeat(grey[..., None], 3, 2)
-    )
+    np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"A": grey})), np.repeat(grey[..., None], 3, 2))
     alpha = np.full((40, 50), 0.25, np.float32)
     premultiplied = np.dstack([rgb * 0.25, alpha])
     np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"RGBA": premultiplied})), premultiplied[..., :3])
@@ -119,9 +119,104 @@ def test_exr_channels_and_tiles(tmp_path: Path) -> None:
               for i, c in enumerate("RGB")}  # fmt: skip
     layers = {name: np.ascontiguousarray(pixels) for name, pixels in layers.items()}
     np.testing.assert_array_equal(read_image(exr(tmp_path / "layers.exr", layers)), rgb)
-    two = {"N.X": grey, "N.Y": grey}
-    with pytest.raises(ImageError, match=r"two\.exr: holds neither RGB nor Y channels, but N\.X, N\.Y"):
-        read_image(exr(tmp_path / "two.exr", two))
+    for names in (("N.X", "N.Y"), ("Z",), ("View.Z",), ("A", "Z")):
+        with pytest.raises(PictureKindError, match=rf"x\.exr: holds neither RGB nor Y channels, but {names[0]}"):
+            read_image(exr(tmp_path / "x.exr", dict.fromkeys(names, grey)))
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [("depth", "Z"), ("colour", "RGB")],
+        [("normal", "X Y Z"), ("beauty", "R G B A")],
+        [("albedo", "R G B"), ("Beauty", "R G B")],
+        [("", "albedo.R albedo.G albedo.B beauty.R beauty.G beauty.B beauty.A Z")],
+        [("", "a.R a.G a.B R G B")],
+        [("depth", "Z"), ("left", "N.X N.Y light.Y")],
+    ],
+)
+def test_the_picture_of_an_exr_is_found_among_parts_and_layers(tmp_path: Path, parts: list[tuple[str, str]]) -> None:
+    """The part or layer that is the picture has the value 0.5, every other one 0.1."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    wanted = ("colour", "beauty", "Beauty", "beauty.", "light.", "")
+
+    def is_wanted(part: str, channel: str) -> bool:
+        layer = channel.rpartition(".")[0]
+        return (f"{layer}." if layer else part) in wanted and not channel.endswith("Z")
+
+    written = [
+        OpenEXR.Part(
+            dict(header),
+            {
+                name: np.full((4, 6), 0.5 if is_wanted(part, name) else 0.1, np.float32)
+                for name in (names.split() if names != "RGB" else "RGB")
+            },
+            part,
+        )
+        for part, names in parts
+    ]
+    OpenEXR.File(written).write(str(tmp_path / "a.exr"))
+    image, alpha = read_layer(tmp_path / "a.exr")
+    np.testing.assert_allclose(image, 0.5)
+    assert (alpha is not None) == ("A" in parts[-1][1].replace(".", " ").split())
+
+
+def by_ffmpeg(path: Path, codec: str, pixels: str, codes: np.ndarray) -> Path:
+    given = "rgba64le" if codes.shape[-1] == 4 else "rgb48le"
+    with av.open(str(path), "w", format="image2", options={"update": "1"}) as out:
+        stream = out.add_stream(codec, rate=1)
+        stream.height, stream.width = codes.shape[:2]
+        stream.pix_fmt = pixels
+        out.mux(stream.encode(av.VideoFrame.from_ndarray(codes, given).reformat(format=pixels)))
+        out.mux(stream.encode())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels", "bits"),
+    [
+        ("a.tif", "tiff", "rgb48le", 16),
+        ("a.tiff", "tiff", "rgba64le", 16),
+        ("a.TIF", "tiff", "rgb24", 8),
+        ("a.tif", "tiff", "rgba", 8),
+        ("a.dpx", "dpx", "gbrp10le", 10),
+        ("a.dpx", "dpx", "gbrp12be", 12),
+        ("a.dpx", "dpx", "rgba64be", 16),
+        ("a.dpx", "dpx", "rgb24", 8),
+    ],
+)
+def test_tiff_and_dpx_keep_their_bits(tmp_path: Path, name: str, codec: str, pixels: str, bits: int) -> None:
+    alpha = "a" in pixels.removeprefix("gbrp").removeprefix("rgb")
+    codes = np.random.default_rng(2).integers(0, 65536, (6, 8, 3 + alpha), np.uint16)
+    path = by_ffmpeg(tmp_path / name, codec, pixels, codes)
+    image, opacity = read_layer(path, "linear", "premultiplied in linear light")
+    np.testing.assert_allclose(image, codes[..., :3] / 65535, atol=1.5 / (2**bits - 1))
+    assert (opacity is not None) == alpha
+    if opacity is not None:
+        np.testing.assert_allclose(opacity, codes[..., 3] / 65535, atol=1.5 / (2**bits - 1))
+    np.testing.assert_allclose(read_layer(path, held="premultiplied in linear light")[0], srgb_to_linear(image))
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "CMYK", "1", "I;16"])
+@pytest.mark.parametrize("compression", [None, "tiff_lzw", "tiff_deflate"])
+def test_tiff_of_other_kinds(tmp_path: Path, mode: str, compression: str | None) -> None:
+    grey = np.kron(np.array([[0, 255], [255, 0]], np.uint8), np.ones((8, 8), np.uint8))
+    picture = Image.fromarray(grey * np.uint16(257)) if mode == "I;16" else Image.fromarray(grey).convert(mode)
+    picture.save(tmp_path / "a.tif", compression=compression)
+    np.testing.assert_allclose(read_image(tmp_path / "a.tif"), np.repeat(grey[..., None] / 255, 3, -1), atol=0.01)
+
+
+def test_log_dpx_and_floating_tiff_are_named(tmp_path: Path) -> None:
+    path = by_ffmpeg(tmp_path / "a.dpx", "dpx", "gbrp10le", np.zeros((6, 8, 3), np.uint16))
+    content = bytearray(path.read_bytes())
+    for code in (1, 3):
+        content[801] = code
+        path.write_bytes(content)
+        with pytest.raises(PictureKindError, match=r"a\.dpx: holds the densities of film or .*; save it as \.exr"):
+            read_image(path)
+    Image.fromarray(np.zeros((6, 8), np.float32)).save(tmp_path / "a.tif")
+    with pytest.raises(PictureKindError, match=r"a\.tif: is neither grey nor RGB in whole numbers.*; save it as \.exr"):
+        read_image(tmp_path / "a.tif")
 
 
 def test_exr_gives_the_display_window(tmp_path: Path) -> None:
@@ -143,7 +238,7 @@ def test_radiance_hdr(tmp_path: Path) -> None:
     np.testing.assert_allclose(image, wanted, rtol=0.02)
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.hdr"])
+@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.hdr", "a.tif", "a.dpx"])
 def test_damaged_and_missing_pictures_are_named(tmp_path: Path, name: str) -> None:
     with pytest.raises(ImageError, match=f"{name}: no such file"):
         read_image(tmp_path / name)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, needs_vdb
+from small_sequence import SCENE, SETTINGS, frame, needs_vdb, write
 
 from smokelift.output import export, vdb
 from smokelift.output.export import ExportSettings, export_sequence
@@ -48,6 +48,21 @@ def test_the_files_of_an_export(sequence: Sequence, tmp_path: Path) -> None:
     assert sum(size for _, size in written) == sum((tmp_path / "out" / name).stat().st_size for name in frames)
     note = json.loads((tmp_path / "out" / "export.json").read_text())
     assert note["complete"] and note["frames"] == [1, 3] and note["medium"]["extinction"] == EXTINCTION
+
+
+@needs_vdb
+def test_an_export_has_the_numbers_of_the_files(tmp_path: Path) -> None:
+    write(tmp_path / "smoke", [1, 2], start_number=1001)
+    exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", proxy=2)
+    files = {path.name for path in (tmp_path / "out").iterdir()}
+    assert files == {
+        "export.json",
+        "smoke.usda",
+        *(f"{kind}_100{n}.vdb" for kind in ("proxy", "smoke") for n in (1, 2)),
+    }
+    assert json.loads((tmp_path / "out" / "export.json").read_text())["frames"] == [1001, 1002]
+    usd = (tmp_path / "out" / "smoke.usda").read_text()
+    assert "startTimeCode = 1001" in usd and "1002: @./smoke_1002.vdb@" in usd
 
 
 @needs_vdb

@@ -36,12 +36,13 @@ def test_a_large_sequence_has_proxies(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 @needs_vdb
-def test_a_small_sequence_has_none_until_they_are_made(tmp_path: Path) -> None:
-    write(tmp_path, [1, 2])
+@pytest.mark.parametrize("start", [1, 1001])
+def test_a_small_sequence_has_none_until_they_are_made(tmp_path: Path, start: int) -> None:
+    write(tmp_path, [1, 2], start_number=start)
     before = {name: (tmp_path / name).read_bytes() for name in names(tmp_path)}
     assert not any(name.startswith("proxy") for name in before)
     assert list(proxy_files.write_proxies(Sequence.open(tmp_path))) == [1, 2]
     assert {name: (tmp_path / name).read_bytes() for name in before} == before
     coarse = np.zeros([-(-n // proxy_files.TIMES) for n in SCENE.domain.resolution], np.float32)
-    vdb.vdb_module().read(str(tmp_path / "proxy_0002.vdb"), gridname="density").copyToArray(coarse)
+    vdb.vdb_module().read(str(tmp_path / f"proxy_{start + 1:04d}.vdb"), gridname="density").copyToArray(coarse)
     assert coarse.sum() * proxy_files.TIMES**3 == pytest.approx(Sequence.open(tmp_path).density(2).sum(), rel=1e-2)

@@ -131,6 +131,34 @@ def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
     assert Sequence.open(tmp_path).frames == (1, 2, 3, 4)
 
 
+def test_files_are_numbered_from_another_start_and_frames_are_not(tmp_path: Path, no_vdb: None) -> None:
+    cut_off(tmp_path, [1, 2], start_number=1001)
+    with pytest.raises(SequenceError, match="start_number was 1001 and is now 1"):
+        write(tmp_path, [3], resume=True)
+    write(tmp_path, [3], resume=True, start_number=1001)
+    assert names(tmp_path) == ["sequence.json", *(f"smoke_{n}.npz" for n in (1001, 1002, 1003))]
+    sequence = Sequence.open(tmp_path)
+    assert (sequence.frames, sequence.start_number, sequence.file_number(3)) == ((1, 2, 3), 1001, 1003)
+    for number in sequence.frames:
+        np.testing.assert_array_equal(sequence.density(number), frame(number)[0])
+    assert sequence.files(2) == {"npz": tmp_path / "smoke_1002.npz"}
+    for start in (-1, 10**7):
+        with pytest.raises(ValueError, match="start_number must be from 0"):
+            SequenceWriter(tmp_path, SCENE, SETTINGS, start_number=start)
+
+
+def test_an_index_without_a_start_number_starts_at_1(tmp_path: Path, no_vdb: None) -> None:
+    write(tmp_path, [1])
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    assert index.pop("start_number") == 1
+    (tmp_path / "sequence.json").write_text(json.dumps(index))
+    assert Sequence.open(tmp_path).files(1) == {"npz": tmp_path / "smoke_0001.npz"}
+    for wrong in (-1, 1.5, "1", 10**9):
+        (tmp_path / "sequence.json").write_text(json.dumps({**index, "start_number": wrong}))
+        with pytest.raises(SequenceError, match="is damaged: start_number"):
+            Sequence.open(tmp_path)
+
+
 def test_resuming_before_the_first_frame_starts(tmp_path: Path, no_vdb: None) -> None:
     cut_off(tmp_path, [])
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:

@@ -139,16 +139,16 @@ def test_more_frames_views_and_smoke_cost_more(monkeypatch) -> None:
 
 
 def test_preparing_takes_as_long_again(monkeypatch) -> None:
-    """A camera that is steadied takes long to prepare; a machine that makes that wait makes the frames wait, too."""
+    """A clip may take long to prepare; how long it waits for a busy machine tells nothing of the run."""
     monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
     quick, slow, busy = (
         estimate_cost(SIZES["cube"], WORK, Spent(seconds, processor)).seconds
         for seconds, processor in ((3.0, 3.0), (50.0, 50.0), (15.0, 3.0))
     )
     assert slow - quick == pytest.approx(47)
-    assert busy == pytest.approx(5 * quick)
+    assert busy == quick
     both_cores = estimate_cost(SIZES["cube"], WORK, Spent(3.0, 5.0)).seconds
-    assert both_cores == pytest.approx(quick), "a core that is free speeds up the timed solve as well"
+    assert both_cores == quick, "two cores work at a time"
 
 
 def test_a_run_takes_the_memory_that_preparing_took(monkeypatch) -> None:

@@ -3,8 +3,11 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
 from smokelift.report.provenance import Provenance, made_up, provenance, record
 from smokelift.report.sentences import sentence
 from smokelift.scene import orbit
@@ -38,6 +41,19 @@ def test_made_up_detail_names_its_settings(shot) -> None:
     other = replace(shot, settings=replace(shot.settings, detail=0.5, seed=3))
     assert parts(other)["fine structure along the rays"].settings == {"detail": 0.5, "seed": 3}
     assert made_up(other) == (parts(other)["fine structure along the rays"].how,)
+
+
+def test_damaged_frames_have_one_number_wherever_they_are_named(shot, tmp_path) -> None:
+    """That of the clip's file from 0, as the range of its frames has it."""
+    for n in range(7):
+        write_image(tmp_path / f"frame_{n}.png", np.full((4, 4, 3), 0.5))
+    (tmp_path / "frame_3.png").write_bytes(b"nothing")
+    (tmp_path / "frame_5.png").unlink()
+    with Clip.open(tmp_path / "frame_#.png", fps=24, frames=(1, 6)) as clip:
+        other = replace(shot, views=(replace(shot.views[0], clip=clip),))
+        said = [remark for remark in clip.remarks() if remark.kind == "damaged frames"]
+        said.append(parts(other)["some pictures"].how)
+        assert [remark.figures["frames"] for remark in said] == ["frames 3 and 5 are"] * 2
 
 
 @pytest.mark.parametrize("settings", [replace(Settings.preset(), detail=0.0), Settings.preset(method="paper")])

@@ -8,15 +8,15 @@ import pytest
 from smokelift.checks import Doubt
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
-from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts
-from smokelift.setup.first_estimate import SmokeSamples, sample_smoke
-from tests.engine.footage.films import coded, puff, wall
+from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, first_remarks
+from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
+from tests.engine.footage.films import coded, film, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True
@@ -161,6 +161,38 @@ def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(grey, rows, miss
     nowhere = np.zeros_like(covered)
     samples = replace(SEEN, covered=covered, unknown=nowhere, colours=seen, behind=seen, gains=gains)
     assert kinds(grey, samples) == ["bars"] * said
+
+
+@pytest.mark.parametrize("bars", [True, False], ids=["bars", "bars cropped off"])
+def test_black_that_no_part_of_the_picture_shows_is_assumed_and_not_found(tmp_path, bars) -> None:
+    """Fog that drifts over all of a picture, which is between black bars or was cropped to what they enclose."""
+    shown = slice(16, -16) if bars else slice(None)
+    random = np.random.default_rng(0)
+    wide = 0.3 + 0.1 * blurred(random.normal(0, 1, (72, 400)).astype(np.float32), 4) / 0.07
+    for n in range(24):
+        picture = np.zeros((72, 56))
+        picture[shown] = np.clip(wide[:, 12 * n :][:, :56], 0.02, 0.95)[shown]
+        write_image(tmp_path / f"fog_{n:02d}.png", picture[..., None].repeat(3, -1))
+    with Clip.open(tmp_path / "fog_##.png", fps=24) as clip:
+        said = [remark.kind for remark in first_remarks(first_estimate(clip, None, None), given=False)]
+    assert said == ["background assumed", "bars" if bars else "background never seen"]
+
+
+@pytest.mark.parametrize("plate", [np.zeros((72, 56, 3)), wall(0.2, 0.5)], ids=["black", "wall"])
+@pytest.mark.parametrize(("inverted", "smoke"), [(False, True), (True, True), (True, False)])
+def test_a_mask_that_hides_all_smoke_is_said(tmp_path, plate, inverted, smoke) -> None:
+    """A mask over smoke on the left half, one over the other half, and this one where there is no smoke at all."""
+    left = np.arange(56) < 28
+
+    def opacity(n: int) -> np.ndarray:
+        return np.roll(puff(n), -14, axis=1) * left * smoke
+
+    clip = film(tmp_path, plate, opacity, 0.6)
+    write_image(tmp_path / "mask.png", np.broadcast_to((left != inverted)[None, :, None], (72, 56, 3)).astype(float))
+    with Clip.open(clip.path, fps=24, mask=tmp_path / "mask.png") as masked:
+        said = [remark.kind for remark in first_remarks(first_estimate(masked, None, None), given=False)]
+    wanted = "smoke behind the mask" if smoke else "no smoke before an estimated background"
+    assert said[1:] == (["no smoke examined", wanted] if inverted else [])
 
 
 def test_how_many_frames_were_examined_is_said(grey) -> None:

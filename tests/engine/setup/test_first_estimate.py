@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.scene import DirectionalLight
+from smokelift.scene import DirectionalLight, Medium
 from smokelift.setup.prepare import prepare_shot
 from tests.engine.setup.shots import burning
 
@@ -24,6 +25,31 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     red, green, blue = with_fire.scene.medium.flame_color
     assert (red, green) == (1, pytest.approx(0.4, abs=0.05)) and blue < 0.2
     assert with_fire.optics.unshadowed_source().max() < 3 * without.optics.unshadowed_source().max()
+
+
+def glowing(number: int, picture: np.ndarray) -> np.ndarray:
+    """A picture with a dim flame, one pixel of which is as bright as white."""
+    rows, columns = np.indices(picture.shape[:2])
+    row, column = np.unravel_index(np.argmax(picture.sum(-1)), rows.shape)
+    away = np.hypot(rows - row, columns - column)[..., None]
+    flame = np.float32((0.75, 0.3, 0.06))
+    return np.where(away < 4, np.where(away == 0, 1.25 * flame, flame), picture)
+
+
+def test_what_may_be_fire_is_said_and_is_fire_where_its_color_is_given(plume, draft, tmp_path) -> None:
+    scene = replace(plume.write(tmp_path, plume.densities, plume.scene), medium=None)
+    given = replace(scene, medium=Medium(flame_color=(1.0, 0.4, 0.1)))
+    with Clip.open(scene.clip) as clip:
+        alone, certain, none = (
+            prepare_shot(each, how, draft)
+            for each, how in ((clip.changed(glowing), scene), (clip.changed(glowing), given), (clip, given))
+        )
+    assert alone.fire is None and "possible fire" in [remark.kind for remark in alone.remarks]
+    assert certain.fire is not None and "possible fire" not in [remark.kind for remark in certain.remarks]
+    assert certain.observe_fire(2).image.max() > 0.5
+    assert certain.scene.medium.flame_color == (1.0, 0.4, 0.1)
+    assert certain.scene.medium.extinction == alone.scene.medium.extinction, "the rest of the medium is not given"
+    assert none.fire is None and "possible fire" not in [remark.kind for remark in none.remarks]
 
 
 def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:

@@ -81,8 +81,9 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
-        f"{counted(frames, 'frame')} of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of "
-        f"memory ({cost.memory_free / 2**30:.1f} are free), up to {cost.disk / 1e6:.0f} MB on disk.{written}",
+        f"{counted(frames, 'frame')} of {voxels} voxels: about {cost.seconds:.0f} s if nothing else runs, "
+        f"{cost.memory / 2**30:.1f} GiB of memory ({cost.memory_free / 2**30:.1f} are free), up to "
+        f"{cost.disk / 1e6:.0f} MB on disk.{written}",
         {
             "frames": frames,
             "scene": scene_to_dict(shot.scene),

@@ -16,6 +16,7 @@ from smokelift.checks import Figures, Remark
 from smokelift.footage.clip import Clip
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
+from smokelift.output.layout import MAX_START_NUMBER
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
@@ -42,6 +43,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.png",
         help="keep a picture of the newest frame beside the clip in this file",
     )
+    parser.add_argument(
+        "--start-number",
+        type=_start_number,
+        default=1,
+        metavar="N",
+        help="number in the name of the first file, 1001 for example (default: 1); frames themselves count from 1",
+    )
     parser.add_argument("--resume", action="store_true", help="go on after the frames that are finished")
 
 
@@ -62,7 +70,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         for remark in (*shot.remarks, *shot.estimates, *made_up(shot)):
             say.note(remark)
         report = _report(shot, options.thumbnail, say)
-        sequence = reconstruction.write(options.out, npz=options.npz, resume=options.resume, on_frame=report)
+        sequence = reconstruction.write(
+            options.out,
+            npz=options.npz,
+            resume=options.resume,
+            start_number=options.start_number,
+            on_frame=report,
+        )
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
         raise ValueError(
@@ -77,6 +91,12 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
     done = Remark("written", result) if fit is None else Remark("reconstructed", {**result, "psnr": fit})
     say.finish(done, {**result, "psnr": fit})
+
+
+def _start_number(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) <= MAX_START_NUMBER):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to {MAX_START_NUMBER}")
+    return int(text)
 
 
 def _report(shot: Shot, thumbnail: Path | None, say: Reporter) -> Callable[[Frame], None]:

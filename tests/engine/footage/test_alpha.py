@@ -1,0 +1,104 @@
+"""Colours beside alpha: straight, premultiplied in linear light, premultiplied in code values; all are read alike."""
+
+from pathlib import Path
+
+import av
+import numpy as np
+import OpenEXR
+import pytest
+
+from smokelift.footage.alpha import association
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+
+STRAIGHT, IN_LIGHT, IN_CODES = "straight", "premultiplied in linear light", "premultiplied in code values"
+COUNT, HEIGHT, WIDTH = 5, 64, 48
+TINT = np.array([1.0, 0.97, 0.93])
+
+
+def opacity(n: int, most: float = 0.9) -> np.ndarray:
+    """The opacity (rows, columns, 1) of a soft puff that rises."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    distance = np.hypot(rows - HEIGHT + 14 + 8 * n, columns - WIDTH / 2)
+    return (most * np.clip(1.4 - distance / 12, 0, 1) * (1 + 0.1 * np.sin(n + rows / 3)))[..., None].clip(0, 1)
+
+
+def stored(held: str, n: int, grey: float, shade: float = 0.0, most: float = 0.9) -> np.ndarray:
+    """Encoded values (rows, columns, rgba) of smoke of a linear grey whose light varies by a share."""
+    alpha, (rows, columns) = opacity(n, most), np.mgrid[:HEIGHT, :WIDTH]
+    own = np.clip(grey * (1 + shade * np.sin(columns / 7 + n) * np.cos(rows / 9))[..., None] * TINT, 0, 1)
+    colours = {
+        STRAIGHT: linear_to_srgb(own) * (alpha > 0),
+        IN_LIGHT: linear_to_srgb(own * alpha),
+        IN_CODES: linear_to_srgb(own) * alpha,
+    }[held]
+    return np.concatenate([colours, alpha], -1)
+
+
+def written(folder: Path, kind: str, pictures: list[np.ndarray]) -> Path:
+    """Write a clip: numbered PNG, TIFF or DPX pictures, or ProRes 4444."""
+    if kind == "mov":
+        encode(folder / "a.mov", "prores_ks", "yuva444p10le", pictures)
+        return folder / "a.mov"
+    pixels = {"png": "rgba64be", "tif": "rgba64le", "dpx": "rgba", "tiff": "rgba"}[kind]
+    for n, picture in enumerate(pictures):
+        encode(folder / f"a{n}.{kind}", {"png": "png", "dpx": "dpx"}.get(kind, "tiff"), pixels, [picture])
+    return folder / f"a#.{kind}"
+
+
+def encode(path: Path, codec: str, pixels: str, pictures: list[np.ndarray]) -> None:
+    form = {} if codec == "prores_ks" else {"format": "image2", "options": {"update": "1"}}
+    with av.open(str(path), "w", **form) as out:
+        stream = out.add_stream(codec, rate=24)
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt = pixels
+        for n, picture in enumerate(pictures):
+            codes = np.rint(picture * 65535).astype(np.uint16)
+            frame = av.VideoFrame.from_ndarray(codes, "rgba64le").reformat(format=pixels)
+            frame.pts = n
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+
+
+@pytest.mark.parametrize("kind", ["png", "tif", "tiff", "dpx", "mov"])
+@pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
+@pytest.mark.parametrize("grey", [0.715, 0.1])
+def test_smoke_is_as_bright_however_a_program_held_it(tmp_path: Path, kind: str, held: str, grey: float) -> None:
+    path = written(tmp_path, kind, [stored(held, n, grey) for n in range(COUNT)])
+    with Clip.open(path, fps=24) as clip:
+        assert clip.backdrop == float(grey < 0.2)
+        for n in range(COUNT):
+            alpha = opacity(n)
+            shown = grey * TINT * alpha + (1 - alpha) * clip.backdrop
+            np.testing.assert_allclose(clip.frame(n), shown, atol=0.012)
+        assert [note.figures.get("held") for note in clip.notes] == ([] if held == STRAIGHT else [held])
+
+
+@pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
+@pytest.mark.parametrize("grey", [0.1, 0.3, 0.7])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_shading_and_grain_do_not_hide_the_convention(held: str, grey: float, noise: float) -> None:
+    random = np.random.default_rng(0)
+    pictures = [stored(held, n, grey, shade=0.5) for n in range(COUNT)]
+    for picture in pictures:
+        picture[..., :3] += random.normal(0, noise, picture[..., :3].shape)
+    assert association([picture.clip(0, 1) for picture in pictures], srgb_to_linear) == held
+
+
+def test_opaque_and_empty_pictures_are_straight() -> None:
+    picture = np.random.default_rng(0).random((8, 8, 4)).astype(np.float32)
+    for alpha in (0.0, 1.0):
+        picture[..., 3] = alpha
+        assert association([picture], srgb_to_linear) == STRAIGHT
+    assert association([], srgb_to_linear) == STRAIGHT
+
+
+def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path: Path) -> None:
+    for n in range(COUNT):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        pixels = stored(IN_CODES, n, 0.715).astype(np.float32)
+        OpenEXR.File(header, {"RGBA": pixels}).write(str(tmp_path / f"a{n}.exr"))
+    with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
+        assert clip.backdrop == 0
+        np.testing.assert_allclose(clip.frame(2), stored(IN_CODES, 2, 0.715)[..., :3], rtol=1e-5)
+        assert clip.notes == ()
