@@ -135,7 +135,7 @@ public:
 private:
     void expand(Values Level::*of);     // into fields_
     void collect_up(Values Level::*of); // from the finest level's values
-    void linearise();
+    void linearise(bool robust);
     void precondition();
     void apply(Values Level::*of, Values Level::*result);
     void solve(int iterations);
@@ -202,7 +202,7 @@ void Pyramid::collect_up(Values Level::*of) {
     }
 }
 
-void Pyramid::linearise() {
+void Pyramid::linearise(bool robust) {
     expand(&Level::coefficients);
     const std::size_t cells = levels_[0].cells();
     for (std::size_t cell = 0; cell < cells; ++cell) {
@@ -238,7 +238,7 @@ void Pyramid::linearise() {
                     matrix[j + 1][k + 1] += slope[c][j] * w[c] * slope[c][k];
             }
         }
-        if (problem_.outlier_freedom > 0) {
+        if (robust && problem_.outlier_freedom > 0) {
             float chi = 0;
             for (int c = 0; c < 3; ++c) {
                 const float left = wd[c] - x[0] * (source[c] * w[c] - wb[c]);
@@ -365,7 +365,8 @@ void Pyramid::solve(int iterations) {
 
 void Pyramid::run(int rounds, int iterations) {
     for (int round = 0; round < rounds; ++round) {
-        linearise();
+        // what does not fit yet is no outlier
+        linearise(2 * round >= rounds);
         precondition();
         solve(iterations);
     }

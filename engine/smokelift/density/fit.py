@@ -23,7 +23,8 @@ from smokelift.density.hull import inside
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
-from smokelift.footage.given_background import background_picture
+from smokelift.extraction import extract_element, usual_source
+from smokelift.footage.given_background import backdrop_colour, background_picture
 from smokelift.footage.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.blas import products_on_one_thread
@@ -232,11 +233,19 @@ def reconstruct_density(
 
 
 def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
-    """The observation, before the scene's background unless it has a plate; a picture's mean for other cameras."""
-    if observation.plate is not BLACK:
-        return observation
+    """The observation, before the scene's background unless it has a plate; a picture's mean for other cameras.
+
+    Before a picture its smoke is extracted.
+    """
     camera = observation.camera
-    return replace(observation, plate=eight_bit_plate(background_picture(scene, camera), camera.size))
+    if observation.plate is BLACK:
+        plate = eight_bit_plate(background_picture(scene, camera), camera.size)
+        observation = replace(observation, plate=plate)
+    picture, plate = observation.image, observation.plate
+    if observation.element is not None or backdrop_colour(plate.image) is not None:
+        return observation
+    source = usual_source([(picture, plate)], np.array(scene.medium.color), camera.size)
+    return replace(observation, element=extract_element(picture, plate, source, camera.size))
 
 
 def empty_density(views: ViewSet) -> FittedDensity:

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
@@ -19,12 +20,16 @@ from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics, Renderer
-from smokelift.scene import Camera, Domain, Inlet
+from smokelift.scene import SHADOWED, Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
 from smokelift.scene.projection import voxel_width
 
 THINNEST_CLEAR = 0.05
 """Lower bound of the transmittance: a brightness does not show an optical depth above 3."""
+
+SHADED, PATCH = 4.0, 3
+"""Noise by which a shaded side of smoke turns away from its source radiance, and pixels along it, at least
+(docs/experiments/bright-background.md)."""
 
 SHADED_DEPTH = 1.5
 """Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
@@ -39,8 +44,8 @@ MIN_CONTRAST = 0.1
 more: in deep shadow noise would be taken for smoke."""
 
 WHITE = 1.5
-"""Brightness of the white that T is shown over, over the smoke's source radiance: with half of it smoke of the plate's
-own brightness is not fitted, twice of it changes no figure (docs/experiments/extraction.md)."""
+"""Brightness of the white that T is shown over, over that of the smoke's source radiance or of its plate: with half of
+it smoke of the plate's own brightness is not fitted, twice of it changes no figure (docs/experiments/extraction.md)."""
 
 MIN_OPACITY = 1e-6
 """Sum of an element's opacity from which on it shows a source radiance."""
@@ -237,17 +242,19 @@ def _against_grid(
     """A picture, faded to its background, against the grid of `optics.domain`."""
     mask = share > 0
     projection = project_voxels(camera, optics.domain)
-    depth = apparent_optical_depth(image, background, mask, optics)
+    depth = apparent_optical_depth(image, background, noise, mask, optics)
     return ObservedView(camera, image, background, noise, share, mask, depth, projection, reached(mask, projection))
 
 
 def apparent_optical_depth(
-    image: Image, background: Image, mask: NDArray[np.bool_], optics: Optics
+    image: Image, background: Image, noise: Image, mask: NDArray[np.bool_], optics: Optics
 ) -> NDArray[np.float32]:
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
     J is the source radiance of smoke in the middle of the domain, B the background. T is the least squares solution
-    over the channels.
+    over the channels. Without a channel for T, no T explains a pixel that the smoke darkens although J is brighter than
+    B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a fit that starts from less
+    thins it out until nothing is left (docs/experiments/bright-background.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
@@ -255,7 +262,13 @@ def apparent_optical_depth(
     source = _in_channels(source, image)
     contrast = background - source
     clear = np.sum((image - source) * contrast, -1) / np.maximum(np.sum(contrast * contrast, -1), 1e-12)
-    return np.where(mask, -np.log(np.clip(clear, THINNEST_CLEAR, 1.0)), 0).astype(np.float32)
+    depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
+    if optics.scattering in SHADOWED and image.shape[-1] == 3:
+        away = np.sum((image - background) * contrast, -1)
+        shaded = (away > SHADED * np.sqrt(np.sum((noise * contrast) ** 2, -1))) & mask
+        # a shaded side is a patch of pixels; single ones are a codec's errors
+        depth[ndimage.binary_opening(shaded, np.ones((PATCH, PATCH)))] = -np.log(THINNEST_CLEAR)
+    return np.where(mask, depth, 0).astype(np.float32)
 
 
 def shadowed_optical_depth(
@@ -284,11 +297,13 @@ def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Ima
     """An element, its background and its noise in four channels: over the plate's mean color, and T over a white.
 
     So a fit asks for S + T B, which the picture shows best, before a plate without detail, and for T. The white is as
-    bright beside the smoke as `WHITE` says. Errors of T are no noise, whatever their size: they do not end a fit.
+    bright beside the smoke and its plate as `WHITE` says. Errors of T are no noise, whatever their size: they do not
+    end a fit.
     """
     color = plate.image.mean((0, 1))
     opacity = 1 - element.transmittance
-    white = WHITE * float(element.radiance.mean(-1).sum()) / max(float(opacity.sum()), MIN_OPACITY)
+    source = float(element.radiance.mean(-1).sum()) / max(float(opacity.sum()), MIN_OPACITY)
+    white = WHITE * max(source, float(color.mean()))
     noise = noise_at(picture, plate)
     image = np.dstack([element.over(color), white * element.transmittance])
     background = np.dstack([np.broadcast_to(color, noise.shape), np.full(opacity.shape, white)])

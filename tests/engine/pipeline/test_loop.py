@@ -398,10 +398,12 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
 
 
 def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
-    blocks = np.random.default_rng(0).uniform(0.05, 0.2, (7, 7, 3)).astype(np.float32)
+    columns, rows = (3 * side for side in tracked.camera.size)
+    tracked = replace(tracked, camera=tracked.camera.resized(columns, rows))
+    blocks = np.random.default_rng(0).uniform(0.05, 0.2, (rows // 8, columns // 8 + 4, 3)).astype(np.float32)
     wide = np.kron(blocks, np.ones((8, 8, 1), np.float32))
     for n, density in enumerate(plume.densities):
-        plate = np.ascontiguousarray(wide[:, 3 * n : 3 * n + 40])
+        plate = np.ascontiguousarray(wide[:rows, 3 * n : 3 * n + columns])
         write_image(tmp_path / f"plate_{n}.exr", plate)
         renderer = scene_renderer(completed(tracked), tracked.camera.at(n), plate)
         write_image(tmp_path / f"frame_{n}.exr", renderer.image(density))
