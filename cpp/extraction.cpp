@@ -126,6 +126,19 @@ void invert(const float *matrix, float *inverse) {
             inverse[4 * i + j] = float(m[i][4 + j]);
 }
 
+constexpr int UPPER[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}; // of the upper triangle of a symmetric matrix
+
+// The inverse of a symmetric positive definite matrix of three rows, by cofactors.
+void invert(const float (&upper)[6], float (&inverse)[3][3]) {
+    const double a = upper[0], b = upper[1], c = upper[2], d = upper[3], e = upper[4], f = upper[5];
+    const double first = d * f - e * e, second = c * e - b * f, third = b * e - c * d;
+    const double scale = 1 / (a * first + b * second + c * third);
+    const double values[6] = {first, second, third, a * f - c * c, b * c - a * e, a * d - b * b};
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            inverse[i][j] = float(scale * values[UPPER[i][j]]);
+}
+
 class Pyramid {
 public:
     Pyramid(const ExtractionProblem &problem);
@@ -206,46 +219,68 @@ void Pyramid::linearise(bool robust) {
     expand(&Level::coefficients);
     const std::size_t cells = levels_[0].cells();
     for (std::size_t cell = 0; cell < cells; ++cell) {
-        const float *const m = problem_.moments + cell * ExtractionProblem::MOMENTS;
-        const float *const w = m, *const wb = m + 3, *const wd = m + 7;
-        const float wbb = m[6], wdb = m[10];
+        const Moments &m = problem_.moments[cell];
         float *const x = fields_.data() + 4 * cell;
-        const float opacity = std::max(std::clamp(x[0], 0.0f, 1.0f), LEAST_OPACITY);
-        float u[3], source[3], slope[3][3];
+        const float clear = 1 - std::clamp(x[0], 0.0f, 1.0f), opacity = std::max(1 - clear, LEAST_OPACITY);
+        float u[3];
         for (int k = 0; k < 3; ++k)
             u[k] = std::clamp(x[k + 1], -MAX_FIELD, MAX_FIELD);
         const float brightness = BRIGHTEST / (1 + std::exp(-2 * u[0]));
+        // of the model I = B + f' x: how x changes it for each channel, but for B itself, which varies within
+        // a cell
+        float source[3], slope[3][3], known[3];
         for (int c = 0; c < 3; ++c) {
             source[c] = problem_.source[c] * brightness * std::exp(BASIS[c][0] * u[1] + BASIS[c][1] * u[2]);
             slope[c][0] = opacity * source[c] * (BRIGHTEST - brightness);
             for (int k = 0; k < 2; ++k)
                 slope[c][k + 1] = opacity * source[c] * BASIS[c][k];
-        }
-        float matrix[4][4] = {}, right[4] = {};
-        matrix[0][0] = wbb;
-        right[0] = -wdb;
-        for (int c = 0; c < 3; ++c) {
-            const float contrast = source[c] * w[c] - wb[c]; // w (J - B)
-            float known = 0;                                 // what the slopes make of u itself
+            known[c] = m.change[c]; // what is to be explained, with what the slopes make of u itself
             for (int k = 0; k < 3; ++k)
-                known += slope[c][k] * u[k];
-            matrix[0][0] += source[c] * (source[c] * w[c] - 2 * wb[c]);
-            right[0] += source[c] * wd[c] + contrast * known;
+                known[c] += slope[c][k] * u[k];
+        }
+        // the inverse covariance of the mean of a cell
+        float covariance[6], w[3][3];
+        for (int k = 0; k < 6; ++k)
+            covariance[k] = clear * clear * m.unknown * problem_.errors[k];
+        for (int c = 0; c < 3; ++c)
+            covariance[UPPER[c][c]] += m.noise[c] / problem_.pixels;
+        invert(covariance, w);
+        // sums over the cell of w B, B' w B, w D and B' w D
+        float wb[3] = {}, wd[3] = {}, bwb = 0, bwd = 0;
+        for (int c = 0; c < 3; ++c)
+            for (int d = 0; d < 3; ++d) {
+                wb[c] += w[c][d] * m.plate[d];
+                wd[c] += w[c][d] * m.change[d];
+                bwb += w[c][d] * m.plates[UPPER[c][d]];
+                bwd += w[c][d] * m.products[3 * d + c];
+            }
+        float matrix[4][4] = {}, right[4] = {};
+        matrix[0][0] = bwb;
+        right[0] = -bwd;
+        for (int c = 0; c < 3; ++c) {
+            float contrast = -wb[c], explained = 0; // w (J - B), and w times what is to be explained
+            for (int d = 0; d < 3; ++d) {
+                contrast += w[c][d] * source[d];
+                explained += w[c][d] * known[d];
+            }
+            matrix[0][0] += source[c] * (contrast - wb[c]);
+            right[0] += source[c] * wd[c] + contrast * (known[c] - m.change[c]);
             for (int k = 0; k < 3; ++k) {
                 matrix[0][k + 1] += contrast * slope[c][k];
-                right[k + 1] += slope[c][k] * (wd[c] + w[c] * known);
+                right[k + 1] += slope[c][k] * explained;
                 for (int j = 0; j < 3; ++j)
-                    matrix[j + 1][k + 1] += slope[c][j] * w[c] * slope[c][k];
+                    for (int d = 0; d < 3; ++d)
+                        matrix[j + 1][k + 1] += slope[c][j] * w[c][d] * slope[d][k];
             }
         }
         if (robust && problem_.outlier_freedom > 0) {
-            float chi = 0;
-            for (int c = 0; c < 3; ++c) {
-                const float left = wd[c] - x[0] * (source[c] * w[c] - wb[c]);
-                chi += left * left / std::max(w[c] * problem_.pixels, 1e-12f);
-            }
-            weight_[cell] = (problem_.outlier_freedom + 3) / (problem_.outlier_freedom + chi);
-            weight_[cell] = std::min(weight_[cell], 1.0f);
+            float left[3], chi = 0;
+            for (int c = 0; c < 3; ++c)
+                left[c] = m.change[c] - x[0] * (source[c] - m.plate[c]);
+            for (int c = 0; c < 3; ++c)
+                for (int d = 0; d < 3; ++d)
+                    chi += left[c] * w[c][d] * left[d] / problem_.pixels;
+            weight_[cell] = std::min((problem_.outlier_freedom + 3) / (problem_.outlier_freedom + chi), 1.0f);
         }
         for (int k = 1; k < 4; ++k)
             matrix[k][0] = matrix[0][k];

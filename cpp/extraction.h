@@ -13,14 +13,19 @@ namespace smokelift {
 // deviations of opacity, and of the brightness and of the two chroma components of ln J.
 using ScaleDeviations = std::vector<std::array<float, 4>>;
 
-struct ExtractionProblem {
-    static constexpr int MOMENTS = 11; // of a cell: w (3), w B (3), w B.B, w D (3), w D.B, with D = I - B
+// The mean over the pixels of a cell of B, B B' (upper triangle), D and D B', with D = I - B; the variance of
+// the noise of each channel, of one pixel; and the probability that B is wrong there.
+struct Moments {
+    float plate[3], plates[6], change[3], products[9], noise[3], unknown;
+};
 
-    const float *moments; // [row][column][MOMENTS], sums over the pixels of each cell
+struct ExtractionProblem {
+    const Moments *moments; // [row][column]
     int rows, columns;
-    std::array<float, 3> source; // J without any deviation
+    std::array<float, 3> source; // J, if its fields are 0
+    std::array<float, 6> errors; // covariance of a wrong plate (upper triangle), the same over a cell
     ScaleDeviations deviations;  // one for each level
-    float outlier_freedom;       // those of the noise; 0: normal noise
+    float outlier_freedom;       // degrees of freedom of the noise's Student t distribution; 0: normal noise
     float pixels;                // in a cell
 };
 

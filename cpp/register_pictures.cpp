@@ -525,12 +525,14 @@ void register_extraction(py::module_ &module) {
 
     module.def(
         "extract",
-        [](const Array &moments, const std::array<float, 3> &source, const ScaleDeviations &deviations,
-           float outlier_freedom, float pixels, int rounds, int iterations) {
+        [](const Array &moments, const std::array<float, 3> &source, const std::array<float, 6> &errors,
+           const ScaleDeviations &deviations, float outlier_freedom, float pixels, int rounds,
+           int iterations) {
             const Shape n = shape_of(moments);
-            require_fit(n[2] == ExtractionProblem::MOMENTS &&
+            require_fit(n[2] * sizeof(float) == sizeof(Moments) &&
                         int(deviations.size()) == pyramid_levels(n[0], n[1]));
-            const ExtractionProblem problem{moments.data(),  n[0],  n[1], source, deviations,
+            const auto *const cells = reinterpret_cast<const Moments *>(moments.data());
+            const ExtractionProblem problem{cells,           n[0],  n[1], source, errors, deviations,
                                             outlier_freedom, pixels};
             Array fields = new_array({n[0], n[1], 4});
             Array deviation({py::ssize_t(n[0]), py::ssize_t(n[1])}),
@@ -543,7 +545,8 @@ void register_extraction(py::module_ &module) {
             }
             return py::make_tuple(fields, deviation, weight);
         },
-        "moments"_a, "source"_a, "deviations"_a, "outlier_freedom"_a, "pixels"_a, "rounds"_a, "iterations"_a);
+        "moments"_a, "source"_a, "errors"_a, "deviations"_a, "outlier_freedom"_a, "pixels"_a, "rounds"_a,
+        "iterations"_a);
 }
 
 } // namespace

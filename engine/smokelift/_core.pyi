@@ -599,16 +599,18 @@ def pyramid_levels(rows: int, columns: int) -> int:
 def extract(
     moments: Array,
     source: Sequence[float],
+    errors: Sequence[float],
     deviations: Sequence[tuple[float, float, float, float]],
     outlier_freedom: float,
     pixels: float,
     rounds: int,
     iterations: int,
 ) -> tuple[Array, Array, Array]:
-    """Opacity and ln J (rows, columns, 4) of smoke before a plate, the deviation of T, and the weight of the data.
+    """Opacity and the fields of J (rows, columns, 4) of smoke before a plate, the deviation of T, the data's weight.
 
-    ``moments`` (rows, columns, 11) are sums over each cell's pixels: w, w B, w B.B, w D and w D.B, with D = I - B and w
-    the inverse variance of the noise. ``source`` (3,) is J without any deviation, ``deviations`` the prior's standard
-    deviations by level, the finest first. ``outlier_freedom`` are the degrees of freedom of the noise, 0 for normal
-    noise; ``pixels`` are in a cell.
+    ``moments`` (rows, columns, 25) are means over each cell's pixels: B, the upper triangle of B B', D and D B', with D
+    = I - B; then the variance of a pixel's noise in each channel and the probability that the plate is wrong. Then it
+    has a covariance of ``errors``, the upper triangle. ``source`` (3,) is J where its fields are 0, ``deviations`` the
+    prior's standard deviations by level, the finest first. ``outlier_freedom`` are the degrees of freedom of the noise,
+    0 for normal noise; ``pixels`` are in a cell.
     """

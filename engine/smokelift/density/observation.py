@@ -300,7 +300,8 @@ def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Ima
     bright beside the smoke and its plate as `WHITE` says. Errors of T are no noise, whatever their size: they do not
     end a fit.
     """
-    color = plate.image.mean((0, 1))
+    known = np.broadcast_to(plate.confidence[..., None] + MIN_OPACITY, plate.image.shape)
+    color = np.average(plate.image, axis=(0, 1), weights=known)
     opacity = 1 - element.transmittance
     source = float(element.radiance.mean(-1).sum()) / max(float(opacity.sum()), MIN_OPACITY)
     white = WHITE * max(source, float(color.mean()))

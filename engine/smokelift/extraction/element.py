@@ -61,6 +61,9 @@ smoke with it (T rms of twelve composed clips at crf 18: .064 with all pixels, .
 WINDOW_BLUR = 2.0
 """Standard deviation, in cells, of the Gaussian that smooths the deviation of T, which is found in windows of four."""
 
+MIN_VARIANCE = 1e-12
+"""Lower bound of the noise's variance (radiance squared), for division."""
+
 MAX_CELLS = 192
 """Cells along the longer side: T and J have no finer detail that a plate could tell."""
 
@@ -102,15 +105,11 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     """
     columns, rows = size
     shrink = max(1.0, max(size) / MAX_CELLS)
-    cells = max(1, round(columns / shrink)), max(1, round(rows / shrink))
-    small, moments, pixels = _moments(picture, plate, cells)
-    fields, deviation, weight = _extracted(moments, pixels, source)
-    behind = plate.image
+    cells = _Cells.of(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
+    fields, deviation, weight = _extracted(cells, source)
     deviation = blurred(deviation, WINDOW_BLUR)
-    if cells != size or picture.shape[1::-1] != size:
-        small, behind = (area_average(each, columns, rows) for each in (picture, plate.image))
-    if cells != size:
-        fields, deviation, weight = (area_average(each, columns, rows) for each in (fields, deviation, weight))
+    small, behind = (area_average(each, columns, rows) for each in (picture, plate.image))
+    fields, deviation, weight = (area_average(each, columns, rows) for each in (fields, deviation, weight))
     clear = 1 - fields[..., 0]
     smooth = fields[..., :1] * source_of(fields, source)
     # what is finer than the cells is the smoke's own
@@ -130,13 +129,13 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size
     Its color (3,) is given, its brightness is first that of the brightest pixels. The pictures are reduced to a
     ``size`` (columns, rows).
     """
-    moments = [_moments(picture, plate, size)[1:] for picture, plate in pictures]
-    brightest = float(np.mean([np.percentile(channel_mean(picture), BRIGHT_PERCENTILE) for picture, _ in pictures]))
+    seen = [_Cells.of(picture, plate, size) for picture, plate in pictures]
+    brightest = float(np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
     source = np.asarray(color, np.float32) / np.mean(color) * np.float32(max(brightest, MIN_SOURCE))
     for _ in range(SOURCE_ROUNDS):
         total = weights = 0.0
-        for sums, pixels in moments:
-            fields, _, weight = _extracted(sums, pixels, source)
+        for cells in seen:
+            fields, _, weight = _extracted(cells, source)
             solid = weight * np.square(fields[..., 0], dtype=np.float64)
             total += float((solid * np.log(source_of(fields, source) / source).mean(-1)).sum())
             weights += float(solid.sum())
@@ -144,11 +143,13 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size
     return source
 
 
-def _extracted(moments: Picture, pixels: float, source: Picture) -> tuple[Picture, Picture, Picture]:
+def _extracted(cells: _Cells, source: Picture) -> tuple[Picture, Picture, Picture]:
     """Opacity and fields of J, deviation of T and weight of the data by cell; see `_core.extract`."""
-    rows, columns = moments.shape[:2]
+    rows, columns = cells.moments.shape[:2]
     deviations = scale_deviations((columns, rows))
-    return _core.extract(moments, source.tolist(), deviations, OUTLIER_FREEDOM, pixels, ROUNDS, ITERATIONS)
+    errors = cells.errors[np.triu_indices(3)].tolist()
+    prior = (errors, deviations, OUTLIER_FREEDOM)
+    return _core.extract(cells.moments, source.tolist(), *prior, cells.pixels, ROUNDS, ITERATIONS)
 
 
 def scale_deviations(cells: tuple[int, int]) -> list[tuple[float, float, float, float]]:
@@ -165,33 +166,29 @@ def scale_deviations(cells: tuple[int, int]) -> list[tuple[float, float, float, 
     return levels
 
 
-def _moments(picture: Picture, plate: Plate, cells: tuple[int, int]) -> tuple[Picture, Picture, float]:
-    """The mean picture of each cell, the moments (rows, columns, 11) that `_core.extract` takes, and a cell's pixels.
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """A picture in cells of so many ``pixels``: their mean, and the moments and errors that `_core.extract` takes."""
 
-    A plate that is continued behind smoke may be wrong: there the light that T lets through is less certain.
-    """
-    columns, rows = cells
-    whole = picture.shape[0] * picture.shape[1]
-    finer = tuple(min(round(FINER * count), whole) for count, whole in zip(cells, picture.shape[1::-1], strict=True))
-    picture = area_average(picture, *finer)
-    plate = plate.through(lambda whole: area_average(whole, *finer), whole / (finer[0] * finer[1]))
-    pixels = finer[0] * finer[1] / (columns * rows)
-    seen, behind, squares, products, known = (
-        area_average(each, columns, rows)
-        for each in (picture, plate.image, np.square(plate.image), picture * plate.image, plate.confidence)
-    )
-    variance = np.square(noise_at(seen, plate)) + np.float32(MODEL_ERROR * float(plate.image.mean())) ** 2
-    if plate.errors.any():
-        variance = variance + (1 - known)[..., None] * np.diag(plate.errors)
-    weight = np.float32(pixels) / np.maximum(variance, 1e-12)
-    moments = np.concatenate(
-        [
-            weight,
-            weight * behind,
-            3 * channel_mean(weight * squares)[..., None],
-            weight * (seen - behind),
-            3 * channel_mean(weight * (products - squares))[..., None],
-        ],
-        -1,
-    )
-    return seen, np.ascontiguousarray(moments, np.float32), pixels
+    seen: Picture
+    moments: Picture
+    errors: Picture
+    pixels: float
+
+    @staticmethod
+    def of(picture: Picture, plate: Plate, size: tuple[int, int]) -> _Cells:
+        """Average a picture and its plate down to a size (columns, rows)."""
+        columns, rows = size
+        whole = picture.shape[1::-1]
+        finer = [min(round(FINER * count), pixels) for count, pixels in zip(size, whole, strict=True)]
+        picture = area_average(picture, *finer)
+        plate = plate.through(lambda part: area_average(part, *finer), whole[0] * whole[1] / (finer[0] * finer[1]))
+        change = picture - plate.image
+        one, other = np.triu_indices(3)
+        pairs = plate.image[..., one] * plate.image[..., other]
+        products = (change[..., :, None] * plate.image[..., None, :]).reshape(*change.shape[:2], 9)
+        means = area_average(np.dstack([plate.image, pairs, change, products, 1 - plate.confidence]), columns, rows)
+        seen = means[..., :3] + means[..., 9:12]
+        noise = np.square(noise_at(seen, plate)) + np.float32(MODEL_ERROR * float(plate.image.mean())) ** 2
+        moments = np.dstack([means[..., :21], np.maximum(noise, MIN_VARIANCE), means[..., 21:]])
+        return _Cells(seen, moments, plate.errors, finer[0] * finer[1] / (columns * rows))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 
 DETAIL = 4.0
 """Standard deviation, in pixels, of the Gaussian that keeps smoke and removes the finer detail of a background."""
@@ -56,11 +56,9 @@ def continuation_errors(image: Picture, known: Mask) -> Picture:
         if left_out.mean() < ISLAND:
             continue
         continued = srgb_to_linear(push_pull(encoded, (known & ~left_out).astype(np.float32)))
-        error = np.where(left_out[..., None], continued - image, 0)
-        share = blurred(left_out.astype(np.float32), DETAIL)[left_out]
-        coarse = blurred(error, DETAIL)[left_out] / share[:, None]
-        total += coarse.T.astype(np.float64) @ coarse
-        count += len(coarse)
+        error = (continued - image)[left_out].astype(np.float64)
+        total += error.T @ error
+        count += len(error)
     return (total / max(count, 1)).astype(np.float32)
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import is_pattern, is_video
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
@@ -40,7 +43,20 @@ def given_plates(background: Background | None, camera: Camera | None, clip: Cli
         return None
     if background.image is not None:
         return known_plate(read_image(background.image), clip)
+    if background.frame is not None:
+        return known_plate(_mean_of_frames(background.frame, clip), clip)
     return None if background.color is None else known_plate(background.color, clip)
+
+
+def _mean_of_frames(numbers: Sequence[int], clip: Clip) -> Picture:
+    """The mean (rows, columns, 3) of frames of a clip's file."""
+    whole = clip.whole()
+    for number in numbers:
+        if number >= len(whole):
+            raise ClipError(
+                f"{clip.path}: has no frame {number} to take the background from; choose one of 0 to {len(whole) - 1}"
+            )
+    return np.asarray(sum(whole.frame(number) for number in numbers) / np.float32(len(numbers)), np.float32)
 
 
 def background_picture(scene: Scene | CompleteScene, camera: Camera | None = None) -> Picture:
