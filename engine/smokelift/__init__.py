@@ -1,13 +1,15 @@
 """Smokelift: one ordinary video of smoke in, a 3D, moving, relightable volume out.
 
-The data flows footage -> setup -> density (render) <-> velocity (transport) -> output; `pipeline` is the loop.
+The data flows footage -> extraction -> setup -> density (render) <-> velocity (transport) -> output; `pipeline` has the
+loop.
 """
 
 from smokelift.density import reconstruct_density
 from smokelift.evaluation import metrics
+from smokelift.extraction import Element
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
-from smokelift.pipeline import Frame, Reconstruction, reconstruct
+from smokelift.pipeline import Extraction, Frame, Reconstruction, extract, reconstruct
 from smokelift.render import render, render_gradient
 from smokelift.scene import (
     Background,
@@ -35,7 +37,9 @@ __all__ = [
     "ClipSource",
     "DirectionalLight",
     "Domain",
+    "Element",
     "EnvironmentLight",
+    "Extraction",
     "Frame",
     "Medium",
     "PointLight",
@@ -47,6 +51,7 @@ __all__ = [
     "Velocity",
     "advect",
     "estimate_velocity",
+    "extract",
     "metrics",
     "prepare_shot",
     "project",

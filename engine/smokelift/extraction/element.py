@@ -50,7 +50,7 @@ ROUNDS, ITERATIONS = 6, 40
 SOURCE_ROUNDS = 4
 """Times that the usual source radiance is found from the smoke, and that from it."""
 
-BRIGHT_PERCENTILE, MIN_SOURCE = 90, 0.01
+BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
 """Percentile of a picture's brightness that the usual source radiance starts from, and its lower bound: a picture
 darker than that shows no light that eight bits could tell."""
 
@@ -95,6 +95,10 @@ class Element:
     def over(self, color: Picture) -> Picture:
         """Return the element over a color (3,) or a picture (rows, columns, 3)."""
         return self.radiance + self.transmittance[..., None] * color
+
+    def rgba(self) -> Picture:
+        """Return the element as premultiplied linear RGBA (rows, columns, 4)."""
+        return np.dstack([np.maximum(self.radiance, 0), 1 - self.transmittance])
 
 
 def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple[int, int]) -> Element:

@@ -24,28 +24,34 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
     """Write a linear picture, (height, width, 3) or (height, width), as EXR or as PNG (8 bit sRGB, clipped to 0..1).
 
     The path ends in ``.exr`` or ``.png``; the file appears whole or not at all. An EXR has 16 bit floats if `half` is
-    true, else 32 bit ones. It raises ImageError if the suffix or the shape is another or a value is not finite, and
-    OSError if the file cannot be written.
+    true, else 32 bit ones. A picture (height, width, 4) has premultiplied alpha; an EXR keeps it so, a PNG has straight
+    colors. It raises ImageError if the suffix or the shape is another or a value is not
+    finite, and OSError if the file cannot be written.
     """
     path = Path(path)
     values = np.asarray(image, np.float32)
     if values.ndim == 2:
         values = np.repeat(values[..., None], 3, axis=2)
-    if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
-        raise ImageError(f"{path}: a picture must have the shape (height, width, 3), not {values.shape}")
+    if values.ndim != 3 or values.shape[2] not in (3, 4) or values.size == 0:
+        raise ImageError(f"{path}: a picture must have the shape (height, width, 3 or 4), not {values.shape}")
     if not np.isfinite(values).all():
         raise ImageError(f"{path}: the picture holds values that are not finite; clamp them first")
     suffix = path.suffix.lower()
     if suffix == ".png":
+        codes = eight_bit(values[..., :3])
+        if values.shape[2] == 4:
+            alpha = np.clip(values[..., 3:], 0, 1)
+            straight = np.divide(values[..., :3], alpha, out=np.zeros_like(values[..., :3]), where=alpha > 0)
+            codes = np.dstack([eight_bit(straight), np.asarray(np.rint(255 * alpha), np.uint8)])
         with atomic_path(path) as aside:
-            Image.fromarray(eight_bit(values)).save(aside, format="PNG")
+            Image.fromarray(codes).save(aside, format="PNG")
     elif suffix == ".exr":
         limit = float(np.finfo(np.float16).max)
         pixels = np.clip(values, -limit, limit).astype(np.float16) if half else values
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         with atomic_path(path) as aside:
             try:
-                OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(str(aside))
+                OpenEXR.File(header, {"RGBA"[: values.shape[2]]: np.ascontiguousarray(pixels)}).write(str(aside))
             except RuntimeError as error:
                 raise _of_system(error) from error
     else:

@@ -11,6 +11,7 @@ from smokelift.app.commands import (
     doctor,
     evaluate,
     export,
+    extract,
     inspect,
     loop,
     preview,
@@ -22,6 +23,7 @@ from smokelift.app.commands import (
 
 COMMANDS = {
     "reconstruct": reconstruct,
+    "extract": extract,
     "batch": batch,
     "inspect": inspect,
     "render": render,

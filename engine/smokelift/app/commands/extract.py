@@ -1,0 +1,118 @@
+"""``smokelift extract``: the smoke of a clip as an element, with alpha, for a compositor."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from smokelift.app.options import frame_range, named_path, require_folder, scene_of
+from smokelift.app.progress import Reporter
+from smokelift.checks import counted
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import Picture
+from smokelift.output.images import write_image
+from smokelift.output.video_file import VIDEO_KINDS, write_video
+from smokelift.pipeline.extraction import ELEMENT_KINDS, Extraction, extract
+
+HELP = "separate the smoke of a clip from what is behind it, as pictures with alpha"
+
+SQUARES = 24
+"""Squares of the checker along the longer side of a preview."""
+
+CHECKER = (0.05, 0.25)
+"""Linear radiance of its squares: both darker than most smoke, so that thin smoke shows, and unlike each other."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
+    parser.add_argument(
+        "--out",
+        type=named_path,
+        required=True,
+        metavar="element_####.exr",
+        help="pictures to write, numbered as the frames of the clip's file: .exr is premultiplied and linear, .png "
+        "straight and sRGB; or a directory",
+    )
+    parser.add_argument(
+        "--frames",
+        type=frame_range,
+        metavar="A:B",
+        help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
+    )
+    parser.add_argument(
+        "--mask",
+        type=named_path,
+        metavar="PATH",
+        help="picture that is white where smoke may be and black where none is, or one for each frame (default: the "
+        "scene's, else none)",
+    )
+    parser.add_argument("--plate", type=named_path, metavar="FILE.exr", help="write the clean plate, .exr or .png")
+    parser.add_argument(
+        "--preview",
+        type=named_path,
+        metavar="FILE",
+        help="write the clip beside its element over a checker: a video (.mp4), or the middle frame (.png)",
+    )
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Write the elements; then, if they are asked for, the plate and the preview."""
+    _check_outputs(options)
+    scene, source = scene_of(options)
+    with Clip.open(source) as clip:
+        extraction = extract(clip, scene)
+        for remark in clip.remarks():
+            say.note(remark)
+        say.start(len(extraction), 0)
+        files, before = [], time.monotonic()
+        for number, file in enumerate(extraction.write(options.out), 1):
+            files.append(str(file))
+            now = time.monotonic()
+            say.frame(number, {"origin": "extracted", "seconds_density": now - before, "seconds_velocity": 0.0})
+            before = now
+        if options.plate is not None:
+            write_image(options.plate, extraction.plate)
+        if options.preview is not None:
+            _write_preview(options.preview, extraction)
+    further = [str(path) for path in (options.plate, options.preview) if path is not None]
+    what = counted(len(files), "element")
+    words = f"{what} written, {files[0]} to {files[-1]}." if len(files) > 1 else f"{files[0]} written."
+    say.finish(words, {"frames": len(files), "files": files + further})
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    require_folder(options.plate)
+    require_folder(options.preview)
+    if options.plate is not None and options.plate.suffix.lower() not in ELEMENT_KINDS:
+        raise ValueError(f"{options.plate}: the plate is written as {' or '.join(ELEMENT_KINDS)}.")
+    kinds = (".png", *VIDEO_KINDS)
+    if options.preview is not None and options.preview.suffix.lower() not in kinds:
+        raise ValueError(f"{options.preview}: the preview is written as {', '.join(kinds)}.")
+    existing = options.out if options.out.is_dir() else options.out.absolute().parent
+    if options.out.exists() and not options.out.is_dir():
+        raise ValueError(f"{options.out}: is a file; give a pattern such as element_####.exr, or a directory.")
+    if existing.exists() and not existing.is_dir():
+        raise ValueError(f"{existing}: is a file; give a pattern in a directory.")
+
+
+def _write_preview(path: Path, extraction: Extraction) -> None:
+    """Write the clip beside its element over a checker."""
+    width, height = extraction.clip.size
+    side = max(1, -(-max(width, height) // SQUARES))
+    rows, columns = np.mgrid[:height, :width] // side
+    checker = np.where((rows + columns) % 2, *CHECKER).astype(np.float32)[..., None]
+
+    def pairs(frames: range) -> Iterator[Picture]:
+        for frame in frames:
+            yield np.hstack([extraction.clip.frame(frame), extraction.element(frame).over(checker)])
+
+    if path.suffix.lower() == ".png":
+        middle = len(extraction) // 2
+        write_image(path, next(pairs(range(middle, middle + 1))))
+    else:
+        write_video(path, pairs(range(len(extraction))), extraction.clip.fps)

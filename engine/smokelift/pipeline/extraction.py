@@ -1,0 +1,136 @@
+"""A clip's smoke as an element: with alpha, apart from what is behind it, before anything is reconstructed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from smokelift.checks import require_kind
+from smokelift.extraction import Element, extract_element, usual_source
+from smokelift.footage.backdrop import find_backdrop
+from smokelift.footage.clip import Clip
+from smokelift.footage.image_sequence import is_pattern
+from smokelift.footage.images import Picture, reduced_size
+from smokelift.footage.plate import Plate, Plates, evened
+from smokelift.output.images import write_image
+from smokelift.scene import Scene
+
+SOURCE_FRAMES, SOURCE_SIDE = 4, 64
+"""Frames, and cells along their longer side, from which the smoke's usual source radiance is found."""
+
+PATTERN = "element_####.exr"
+"""Names of the pictures in a directory."""
+
+ELEMENT_KINDS = (".exr", ".png")
+"""Suffixes of pictures that hold an element."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extraction:
+    """The elements of a clip. Its clip has to stay open while they are computed.
+
+    Iterating over it yields the `Element` of each frame at the clip's own pixels, in its order; every time anew.
+
+    Attributes
+    ----------
+    clip
+        The footage at its plate's exposure.
+    plates
+        What is behind the smoke.
+    source : (3,)
+        The smoke's usual source radiance.
+    """
+
+    clip: Clip
+    plates: Plates
+    source: Picture
+
+    @property
+    def plate(self) -> Picture:
+        """The clean plate (rows, columns, 3) of the first frame, linear."""
+        return self.plates.at(0).image
+
+    def __len__(self) -> int:
+        return len(self.clip)
+
+    def __iter__(self) -> Iterator[Element]:
+        return (self.element(frame) for frame in range(len(self)))
+
+    def element(self, frame: int) -> Element:
+        """Return the element of a frame, counted from 0."""
+        return extract_element(self.clip.frame(frame), self.plates.at(frame), self.source, self.clip.size)
+
+    def write(self, path: str | Path) -> Iterator[Path]:
+        """Write the elements as premultiplied linear RGBA (EXR, half) or straight sRGB (PNG, 8 bit); yield each file.
+
+        Parameters
+        ----------
+        path
+            A directory, or a pattern ``element_####.exr`` whose # stand for the frame's number in the clip's file.
+
+        Raises
+        ------
+        ValueError
+            If the pattern ends in neither .exr nor .png.
+        OSError
+            If a file cannot be written.
+        """
+        pattern = Path(path)
+        if not is_pattern(pattern):
+            pattern = pattern / PATTERN
+        if pattern.suffix.lower() not in ELEMENT_KINDS:
+            raise ValueError(f"{pattern}: elements are written as {' or '.join(ELEMENT_KINDS)}.")
+        pattern.parent.mkdir(parents=True, exist_ok=True)
+        return self._written(pattern)
+
+    def _written(self, pattern: Path) -> Iterator[Path]:
+        digits = pattern.name.count("#")
+        before, after = pattern.name.split("#" * digits)
+        for frame, element in enumerate(self):
+            file = pattern.with_name(f"{before}{self.clip.first + frame:0{digits}d}{after}")
+            write_image(file, element.rgba())
+            yield file
+
+
+def extract(clip: Clip, scene: Scene) -> Extraction:
+    """Separate a clip's smoke from what is behind it: I = S + T B.
+
+    Parameters
+    ----------
+    clip
+        The footage; it has to stay open while elements are computed.
+    scene
+        Whatever is known of the shot; its background and the color of its medium count.
+
+    Returns
+    -------
+    Extraction
+        Iterate over it for elements in memory, or `Extraction.write` pictures.
+
+    Raises
+    ------
+    ValueError
+        For bad input (`SceneError` and `ClipError` are ValueErrors too), or if the camera moves and no background is
+        given.
+
+    Examples
+    --------
+    >>> import smokelift
+    >>> scene = smokelift.Scene.load("examples/plume/scene.toml")
+    >>> with smokelift.Clip.open(scene.clip, frames=(30, 30)) as clip:
+    ...     (element,) = smokelift.extract(clip, scene)
+    >>> bool(element.transmittance.min() < 0.2 and element.transmittance.max() > 0.95)
+    True
+    """
+    require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
+    require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
+    found = find_backdrop(clip, scene.camera, scene.background)
+    exposed = evened(found.clip, found.plates)
+    shown: list[tuple[Picture, Plate]] = [
+        (exposed.frame(frame), found.plates.at(frame)) for frame in exposed.spread(SOURCE_FRAMES)
+    ]
+    color = np.array((1, 1, 1) if scene.medium is None else scene.medium.color, np.float32)
+    return Extraction(exposed, found.plates, usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE)))
