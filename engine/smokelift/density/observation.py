@@ -16,7 +16,7 @@ from smokelift.density.axis import AxisEstimate
 from smokelift.density.hull import Places, Projection, common_hull, project_voxels, reached
 from smokelift.extraction import Element
 from smokelift.footage.images import area_average
-from smokelift.footage.matte import matte
+from smokelift.footage.matte import certainty, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics, Renderer
@@ -46,6 +46,15 @@ more: in deep shadow noise would be taken for smoke."""
 WHITE = 1.5
 """Brightness of the white that T is shown over, over that of the smoke's source radiance or of its plate: with half of
 it smoke of the plate's own brightness is not fitted, twice of it changes no figure (docs/experiments/extraction.md)."""
+
+CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.98, 2.33
+"""Quantile of the opacity that is found in clear air, and the deviations of normal noise's size there."""
+
+MIN_OPACITY_NOISE = 0.01
+"""Smallest such opacity: a step or two of eight bits before a bright plate."""
+
+OPACITY_WIDTH = 2.0
+"""Standard deviation, in pixels, of the Gaussian whose noise is as smooth as that of an opacity."""
 
 MIN_OPACITY = 1e-6
 """Sum of an element's opacity from which on it shows a source radiance."""
@@ -172,6 +181,7 @@ class ObservedView:
             image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
         else:
             image, background, noise = _over_one_color(observation.element, observation.image, plate)
+            share = np.maximum(share, _faint_smoke(observation.element, share == 0))
         return _against_grid(
             camera, background + share[..., None] * (image - background), background, noise, share, optics
         )
@@ -291,6 +301,18 @@ def shadowed_optical_depth(
     known = (fraction > 0) & (view.optical_depth < -0.99 * np.log(THINNEST_CLEAR))  # else as thick as can be shown
     depth = np.where(known, SHADED_DEPTH * np.log1p(np.maximum(fraction, 0)), view.optical_depth)
     return np.where(view.mask, depth, 0).astype(np.float32)
+
+
+def _faint_smoke(element: Element, clear: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Probability (rows, columns) that an element shows smoke, where the opacity that is found in clear air is noise.
+
+    Smoke of the plate's own brightness hardly changes the picture, but it hides the plate's detail.
+    """
+    if not clear.any():
+        return np.ones(clear.shape, np.float32)
+    opacity = 1 - element.transmittance
+    noise = max(float(np.quantile(opacity[clear], CLEAR_QUANTILE)), MIN_OPACITY_NOISE) / CLEAR_DEVIATIONS
+    return certainty(opacity / np.float32(noise), OPACITY_WIDTH)
 
 
 def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Image, Image, Image]:

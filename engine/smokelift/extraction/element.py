@@ -1,8 +1,8 @@
 """The smoke of one picture without what is behind it: I = S + T B + n, maximum a posteriori.
 
 S is the radiance that smoke sends, T its transmittance, B the clean plate. Smoke varies slowly over a picture, a wall
-does not. So where B has detail, T is told by how much of it is left, whatever the light; where B is flat, by its color
-and brightness. S = (1 - T) J, with the source radiance J of smoke in a light: its brightness varies by shadows, its
+does not. So where B has detail, how much of it is left shows T, whatever the light; where B is flat, its color and
+brightness do. S = (1 - T) J, with the source radiance J of smoke in a light: its brightness varies by shadows, its
 color hardly. The opacity 1 - T and ln J are sums over the levels of a pyramid, whose coefficients are independent
 (`cpp/extraction.cpp` solves for them). What does not fit, such as a hand before the smoke, counts less: it is an
 outlier of the noise. Figures: docs/experiments/extraction.md.
@@ -52,7 +52,7 @@ SOURCE_ROUNDS = 4
 
 BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
 """Percentile of a picture's brightness that the usual source radiance starts from, and its lower bound: a picture
-darker than that shows no light that eight bits could tell."""
+darker than that shows no light in eight bits."""
 
 FINER = 1.5
 """Pixels along a cell whose detail is compared: a codec takes the finest detail of a plate away, and that of thin
@@ -65,7 +65,7 @@ MIN_VARIANCE = 1e-12
 """Lower bound of the noise's variance (radiance squared), for division."""
 
 MAX_CELLS = 192
-"""Cells along the longer side: T and J have no finer detail that a plate could tell."""
+"""Cells along the longer side: T and J have no finer detail that a plate could show."""
 
 CHROMA_BASIS = np.array([[1.5**0.5, 0.5**0.5], [0, -(2**0.5)], [-(1.5**0.5), 0.5**0.5]], np.float32)
 """Two components of chroma by channel, as in `cpp/extraction.cpp`."""

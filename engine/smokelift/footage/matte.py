@@ -81,9 +81,17 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     smooth = blurred(difference, width)
     deviation = np.sqrt(channel_mean(smooth**2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
-    share = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
-    share[~_meaningful(deviation, 4 * np.pi * smoothing(plate.noise) ** 2)] = 0
-    return Matte(deviation, share)
+    return Matte(deviation, certainty(deviation, smoothing(plate.noise)))
+
+
+def certainty(deviation: Picture, width: float) -> Picture:
+    """Return the probability (rows, columns) that a pixel shows smoke, by its deviation in units of noise.
+
+    ``width`` is the standard deviation, in pixels, of the Gaussian that smoothed the deviation.
+    """
+    share: Picture = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
+    share[~_meaningful(deviation, 4 * np.pi * width**2)] = 0
+    return share
 
 
 def _meaningful(deviation: Picture, sample: float) -> npt.NDArray[np.bool_]:
