@@ -15,7 +15,7 @@ from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.hull import Places, Projection, common_hull, project_voxels, reached
 from smokelift.extraction import Element
-from smokelift.footage.images import area_average
+from smokelift.footage.images import area_average, channel_mean
 from smokelift.footage.matte import certainty, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
@@ -44,8 +44,9 @@ MIN_CONTRAST = 0.1
 more: in deep shadow noise would be taken for smoke."""
 
 WHITE = 1.5
-"""Brightness of the white that T is shown over, over that of the smoke's source radiance or of its plate: with half of
-it smoke of the plate's own brightness is not fitted, twice of it changes no figure (docs/experiments/extraction.md)."""
+"""Brightness of the white that T is shown over, over that of the plate or of what the smoke sends, whichever is
+brighter: with half of it smoke of the plate's own brightness is not fitted, with twice of it errors of T are fitted
+rather than the picture (docs/experiments/extraction.md)."""
 
 CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.98, 2.33
 """Quantile of the opacity that is found in clear air, and the deviations of normal noise's size there."""
@@ -56,8 +57,8 @@ MIN_OPACITY_NOISE = 0.01
 OPACITY_WIDTH = 2.0
 """Standard deviation, in pixels, of the Gaussian whose noise is as smooth as that of an opacity."""
 
-MIN_OPACITY = 1e-6
-"""Sum of an element's opacity from which on it shows a source radiance."""
+MIN_WEIGHT = 1e-6
+"""Weight of a plate that is not known at all in its mean color, and smallest sum of an opacity that is divided by."""
 
 
 def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
@@ -319,17 +320,17 @@ def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Ima
     """An element, its background and its noise in four channels: over the plate's mean color, and T over a white.
 
     So a fit asks for S + T B, which the picture shows best, before a plate without detail, and for T. The white is as
-    bright beside the smoke and its plate as `WHITE` says. Errors of T are no noise, whatever their size: they do not
+    bright beside the plate and the smoke as `WHITE` says. Errors of T are no noise, whatever their size: they do not
     end a fit.
     """
-    known = np.broadcast_to(plate.confidence[..., None] + MIN_OPACITY, plate.image.shape)
+    known = np.broadcast_to(plate.confidence[..., None] + MIN_WEIGHT, plate.image.shape)
     color = np.average(plate.image, axis=(0, 1), weights=known)
     opacity = 1 - element.transmittance
-    source = float(element.radiance.mean(-1).sum()) / max(float(opacity.sum()), MIN_OPACITY)
-    white = WHITE * max(source, float(color.mean()))
+    sent = float((opacity * channel_mean(element.radiance)).sum()) / max(float(opacity.sum()), MIN_WEIGHT)
+    white = np.full_like(opacity, WHITE * max(sent, float(color.mean())))
     noise = noise_at(picture, plate)
     image = np.dstack([element.over(color), white * element.transmittance])
-    background = np.dstack([np.broadcast_to(color, noise.shape), np.full(opacity.shape, white)])
+    background = np.dstack([np.broadcast_to(color, noise.shape), white])
     return image.astype(np.float32), background.astype(np.float32), np.dstack([noise, noise.mean(-1)])
 
 

@@ -39,7 +39,8 @@ MEAN_OPACITY, MEAN_BRIGHTNESS = 1.0, 1.0
 """Standard deviations of the means of the opacity and of ln J over the picture: neither is known."""
 
 MODEL_ERROR = 0.05
-"""Standard deviation of what no T and J that are even over a cell explain, over the mean radiance of the plate."""
+"""Standard deviation of what no T and J that are even over a cell explain, over the mean radiance of the plate
+and what the smoke changes in the picture."""
 
 OUTLIER_FREEDOM = 5.0
 """Degrees of freedom of the noise's Student t distribution: outliers of more than three deviations hardly count."""
@@ -130,12 +131,13 @@ def source_of(fields: Picture, source: Picture) -> Picture:
 def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size: tuple[int, int]) -> Picture:
     """Return the usual J (3,) of a clip's smoke from some of its pictures: the mean, by opacity squared, of ln J.
 
-    Its color (3,) is given, its brightness is first that of the brightest pixels. The pictures are reduced to a
-    ``size`` (columns, rows).
+    Its color (3,) is given, its brightness is first, and at most, that of the brightest pixels: where smoke is thin
+    everywhere, nothing shows how much brighter it is. The pictures are reduced to a ``size`` (columns, rows).
     """
     seen = [_Cells.of(picture, plate, size) for picture, plate in pictures]
-    brightest = float(np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
-    source = np.asarray(color, np.float32) / np.mean(color) * np.float32(max(brightest, MIN_SOURCE))
+    percentile = np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen])
+    brightest = np.asarray(color, np.float32) / np.float32(np.mean(color)) * np.float32(max(percentile, MIN_SOURCE))
+    source = brightest
     for _ in range(SOURCE_ROUNDS):
         total = weights = 0.0
         for cells in seen:
@@ -143,7 +145,7 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size
             solid = weight * np.square(fields[..., 0], dtype=np.float64)
             total += float((solid * np.log(source_of(fields, source) / source).mean(-1)).sum())
             weights += float(solid.sum())
-        source = source * np.float32(np.exp(total / max(weights, 1e-12)))
+        source = np.minimum(source * np.float32(np.exp(total / max(weights, 1e-12))), brightest)
     return source
 
 
@@ -193,6 +195,7 @@ class _Cells:
         products = (change[..., :, None] * plate.image[..., None, :]).reshape(*change.shape[:2], 9)
         means = area_average(np.dstack([plate.image, pairs, change, products, 1 - plate.confidence]), columns, rows)
         seen = means[..., :3] + means[..., 9:12]
-        noise = np.square(noise_at(seen, plate)) + np.float32(MODEL_ERROR * float(plate.image.mean())) ** 2
-        moments = np.dstack([means[..., :21], np.maximum(noise, MIN_VARIANCE), means[..., 21:]])
+        model = np.abs(means[..., 9:12]).mean(-1, keepdims=True) + float(plate.image.mean())
+        noise = np.maximum(np.square(noise_at(seen, plate)) + np.square(MODEL_ERROR * model), MIN_VARIANCE)
+        moments = np.dstack([means[..., :21], noise, means[..., 21:]])
         return _Cells(seen, moments, plate.errors, finer[0] * finer[1] / (columns * rows))

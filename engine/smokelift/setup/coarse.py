@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from smokelift.checks.array_types import Doubles
 from smokelift.density import DensitySettings, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
+from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.footage.working_picture import CameraError, working_picture
@@ -37,6 +38,9 @@ SHORTEST = 4
 PIXELS = 2.0
 """Smallest number of the clip's pixels along a voxel: each half of the chequerboard shows every voxel."""
 
+FINER = 3
+"""Cells of the extraction along a coarse pixel: about as many as a fit at full resolution has."""
+
 MIN_CHANNEL_POWER = 1e-3
 """Power of a channel's light over the brightest one's, below which 8 bits lose it: it gets no strength of its own."""
 
@@ -46,7 +50,7 @@ class CoarseView:
     """One camera's small picture of one moment, with its camera and plate.
 
     ``picture``, ``fitted`` and ``held_out`` (rows, columns, 3) are linear radiance: of all pixels of the clip, and of
-    either colour of their chequerboard.
+    either colour of their chequerboard. Before a picture the smoke is shown before its mean color instead.
     """
 
     camera: Camera
@@ -119,7 +123,16 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
     halves = view.clip.stored(number).cut(working.part).chequered(*working.camera.size, first)
     plate = view.plates.at(number).through(working.cut, working.pixels)
-    return CoarseView(working.camera, plate, working.of(view.clip, number), *halves)
+    pictures = (working.of(view.clip, number), *halves)
+    columns, rows = working.camera.size
+    element = view.element(number, working.resized(FINER * columns, FINER * rows))
+    if element is None:
+        return CoarseView(working.camera, plate, *pictures)
+    # before one color the plate's detail is not taken for smoke, whatever the model
+    color = plate.image.mean((0, 1))
+    detail = area_average(element.transmittance, columns, rows)[..., None] * (plate.image - color)
+    even = replace(plate, image=np.broadcast_to(color, plate.image.shape).copy())
+    return CoarseView(working.camera, even, *(picture - detail for picture in pictures))
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,11 @@ SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and pixels along their longer side, from which the smoke's usual source radiance is found."""
 
 
+SHADOWED_SOURCE = 0.5
+"""Usual source radiance of smoke over that without shadows: .52 and .55 of two baked scenes, within the factor of two
+that an extraction needs."""
+
+
 def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
     """Complete a scene from its clip.
 
@@ -76,7 +81,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         closed=scene.closed,
         inlets=scene.inlets,
     )
-    first = with_source(ShotView.before(domain, estimate.clip, camera, plates), samples.smoky, complete)
+    first = with_source(
+        ShotView.before(domain, estimate.clip, camera, plates), samples.smoky, complete, bool(scene.lights)
+    )
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
     of_scattering: tuple[Estimate[str], ...] = ()
     if coarse and asked is not None:
@@ -119,11 +126,16 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
 
 
-def with_source(view: ShotView, smoky: Sequence[int], scene: CompleteScene) -> ShotView:
-    """Return a view with the usual source radiance of its smoke in some frames, if it stands before a picture."""
+def with_source(view: ShotView, smoky: Sequence[int], scene: CompleteScene, lit: bool) -> ShotView:
+    """Return a view with the usual source radiance of its smoke, if it stands before a picture.
+
+    The light shows it where it is given (``lit``), else some of the smoky frames do.
+    """
     frames = sorted(smoky[:SOURCE_FRAMES])
     if not frames or backdrop_colour(view.plates.at(frames[0]).image) is not None:
         return view
+    if lit:
+        return replace(view, source=SHADOWED_SOURCE * scene_optics(scene).unshadowed_source().astype(np.float32))
     shown = []
     for frame in frames:
         working = view.working_at(frame, scene.domain)
