@@ -26,11 +26,11 @@ typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
 constexpr float R2 = 1.22474487f, R6 = 0.70710678f; // sqrt(3 / 2), sqrt(3 / 6)
 constexpr float BASIS[3][2] = {{R2, R6}, {0, -2 * R6}, {-R2, R6}};
-constexpr float LEAST_OPACITY = 0.03f; // at which J is linearised, so that J can move where no smoke is yet
-constexpr float BRIGHTEST = 2;         // largest g
-constexpr float MAX_FIELD = 3;         // bound of the fields of J where they are linearised
-constexpr float ENOUGH = 1e-3f;        // residual, as a share of the first, where a solve ends
-constexpr int WINDOW = 2;              // level whose cells tell how certain T is: four cells wide
+constexpr float MIN_OPACITY = 0.03f; // at which J is linearised, so that J can move where no smoke is yet
+constexpr float BRIGHTEST = 2;       // largest g
+constexpr float MAX_FIELD = 3;       // bound of the fields of J where they are linearised
+constexpr float ENOUGH = 1e-3f;      // residual, as a share of the first, where a solve ends
+constexpr int WINDOW = 2;            // level whose cells tell how certain T is: four cells wide
 constexpr float SPREAD = 0.4f; // of the sum over a coefficient's cells, the energy of its bilinear weights
 
 SMOKELIFT_INLINE Four load(const float *p) { return *reinterpret_cast<const Four *>(p); }
@@ -251,7 +251,7 @@ void Pyramid::linearise(bool robust) {
     for (std::size_t cell = 0; cell < cells; ++cell) {
         const Moments &m = problem_.moments[cell];
         float *const x = fields_.data() + 4 * cell;
-        const float clear = 1 - std::clamp(x[0], 0.0f, 1.0f), opacity = std::max(1 - clear, LEAST_OPACITY);
+        const float clear = 1 - std::clamp(x[0], 0.0f, 1.0f), opacity = std::max(1 - clear, MIN_OPACITY);
         float u[3];
         for (int k = 0; k < 3; ++k)
             u[k] = std::clamp(x[k + 1], -MAX_FIELD, MAX_FIELD);

@@ -1,8 +1,8 @@
 """The smoke of one picture without what is behind it: I = S + T B + n, maximum a posteriori.
 
 S is the radiance that smoke sends, T its transmittance, B the clean plate. Smoke varies slowly over a picture, a wall
-does not. So where B has detail, T is told by how much of it is left, whatever the light; where B is flat, by its color
-and brightness. S = (1 - T) J, with the source radiance J of smoke in a light: its brightness varies by shadows, its
+does not. So where B has detail, T is how much of it is left, whatever the light; where B is flat, its color and
+brightness show T. S = (1 - T) J, with the source radiance J of smoke in a light: its brightness varies by shadows, its
 color hardly. The opacity 1 - T and ln J are sums over the levels of a pyramid, whose coefficients are independent
 (`cpp/extraction.cpp` solves for them). What does not fit, such as a hand before the smoke, counts less: it is an
 outlier of the noise. Figures: docs/experiments/extraction.md.
