@@ -33,19 +33,22 @@ constexpr float ENOUGH = 1e-3f;      // residual, as a share of the first, where
 constexpr int WINDOW = 2;            // level whose cells tell how certain T is: four cells wide
 constexpr float SPREAD = 0.4f; // of the sum over a coefficient's cells, the energy of its bilinear weights
 
-Four load(const float *p) { return *reinterpret_cast<const Four *>(p); }
-void store(float *p, Four x) { *reinterpret_cast<Four *>(p) = x; }
+SMOKELIFT_INLINE Four load(const float *p) { return *reinterpret_cast<const Four *>(p); }
+SMOKELIFT_INLINE void store(float *p, Four x) { *reinterpret_cast<Four *>(p) = x; }
+
+typedef double FourDoubles __attribute__((vector_size(32)));
 
 struct Level {
     int rows, columns;
     Values coefficients, residual, direction, product, preconditioned;
-    Values precision; // of the prior, for each coefficient
-    Values system;    // the cells' 4 x 4 matrices, added up
-    Values inverse;   // of system and precision
+    Four precision; // of the prior
+    Values system;  // the cells' 4 x 4 matrices, added up
+    Values inverse; // of system and precision
     std::size_t cells() const { return std::size_t(rows) * columns; }
 };
 
-// Bilinear: a fine cell has 3/4 of the coarse cell that it lies in and 1/4 of the next one on its side.
+// Bilinear: a fine cell has 3/4 of the coarse cell that it lies in and 1/4 of the next one on its side;
+// beyond the edge that is the same one. A `line` of coarse cells has one more at each end.
 struct Mix {
     int near, next;
 };
@@ -54,21 +57,31 @@ Mix mix(int fine, int coarse_count) {
     return {near, std::clamp(near + (fine % 2 ? 1 : -1), 0, coarse_count - 1)};
 }
 
-// fine += coarse, interpolated.
+// sum = fine + coarse, interpolated.
 SMOKELIFT_CLONES
-void add_expanded(const float *coarse, int coarse_rows, int coarse_columns, float *fine, int rows,
-                  int columns, float *line) {
+void add_expanded(const float *coarse, int coarse_rows, int coarse_columns, const float *fine, int rows,
+                  int columns, float *line, float *sum) {
+    float *const inside = line + 4;
     for (int row = 0; row < rows; ++row) {
         const auto [near, next] = mix(row, coarse_rows);
         const float *const a = coarse + std::size_t(near) * coarse_columns * 4;
         const float *const b = coarse + std::size_t(next) * coarse_columns * 4;
         for (int n = 0; n < 4 * coarse_columns; ++n)
-            line[n] = 0.75f * a[n] + 0.25f * b[n];
-        float *const out = fine + std::size_t(row) * columns * 4;
-        for (int column = 0; column < columns; ++column) {
-            const auto [left, right] = mix(column, coarse_columns);
-            store(out + 4 * column,
-                  load(out + 4 * column) + 0.75f * load(line + 4 * left) + 0.25f * load(line + 4 * right));
+            inside[n] = 0.75f * a[n] + 0.25f * b[n];
+        store(line, load(inside));
+        store(inside + 4 * coarse_columns, load(inside + 4 * coarse_columns - 4));
+        const float *const in = fine + std::size_t(row) * columns * 4;
+        float *const out = sum + std::size_t(row) * columns * 4;
+        for (int n = 0; n < columns / 2; ++n) {
+            const float *const at = inside + 4 * n;
+            const Four most = 0.75f * load(at);
+            store(out + 8 * n, load(in + 8 * n) + most + 0.25f * load(at - 4));
+            store(out + 8 * n + 4, load(in + 8 * n + 4) + most + 0.25f * load(at + 4));
+        }
+        if (columns % 2) {
+            const float *const at = inside + 4 * (coarse_columns - 1);
+            const int last = 4 * (columns - 1);
+            store(out + last, load(in + last) + 0.75f * load(at) + 0.25f * load(at - 4));
         }
     }
 }
@@ -77,23 +90,35 @@ void add_expanded(const float *coarse, int coarse_rows, int coarse_columns, floa
 SMOKELIFT_CLONES
 void collect(const float *fine, int rows, int columns, float *coarse, int coarse_rows, int coarse_columns,
              float *line) {
+    float *const inside = line + 4;
     std::fill_n(coarse, std::size_t(coarse_rows) * coarse_columns * 4, 0.0f);
     for (int row = 0; row < rows; ++row) {
-        std::fill_n(line, 4 * coarse_columns, 0.0f);
         const float *const in = fine + std::size_t(row) * columns * 4;
-        for (int column = 0; column < columns; ++column) {
-            const auto [left, right] = mix(column, coarse_columns);
-            const Four value = load(in + 4 * column);
-            store(line + 4 * left, load(line + 4 * left) + 0.75f * value);
-            store(line + 4 * right, load(line + 4 * right) + 0.25f * value);
+        std::fill_n(line, 8, 0.0f);
+        for (int n = 0; n < columns / 2; ++n) {
+            const Four one = load(in + 8 * n), other = load(in + 8 * n + 4);
+            float *const at = inside + 4 * n;
+            store(at - 4, load(at - 4) + 0.25f * one);
+            store(at, load(at) + 0.75f * (one + other));
+            store(at + 4, 0.25f * other);
         }
+        if (columns % 2) {
+            const Four last = load(in + 4 * (columns - 1));
+            float *const at = inside + 4 * (coarse_columns - 1);
+            store(at - 4, load(at - 4) + 0.25f * last);
+            store(at, load(at) + 0.75f * last);
+            store(at + 4, Four{});
+        }
+        store(inside, load(inside) + load(line));
+        float *const end = inside + 4 * (coarse_columns - 1);
+        store(end, load(end) + load(end + 4));
         const auto [near, next] = mix(row, coarse_rows);
         float *const a = coarse + std::size_t(near) * coarse_columns * 4;
         float *const b = coarse + std::size_t(next) * coarse_columns * 4;
         for (int n = 0; n < 4 * coarse_columns; ++n)
-            a[n] += 0.75f * line[n];
+            a[n] += 0.75f * inside[n];
         for (int n = 0; n < 4 * coarse_columns; ++n)
-            b[n] += 0.25f * line[n];
+            b[n] += 0.25f * inside[n];
     }
 }
 
@@ -101,29 +126,36 @@ SMOKELIFT_INLINE Four times(const float *matrix, Four x) {
     return load(matrix) * x[0] + load(matrix + 4) * x[1] + load(matrix + 8) * x[2] + load(matrix + 12) * x[3];
 }
 
-// The inverse of a symmetric positive definite matrix of four rows, by elimination.
+// The inverse of a symmetric positive definite matrix of four rows, by blocks of two.
 void invert(const float *matrix, float *inverse) {
-    double m[4][8] = {};
-    for (int i = 0; i < 4; ++i) {
-        for (int j = 0; j < 4; ++j)
-            m[i][j] = matrix[4 * i + j];
-        m[i][4 + i] = 1;
-    }
-    for (int i = 0; i < 4; ++i) {
-        const double scale = 1 / m[i][i];
-        for (int j = 0; j < 8; ++j)
-            m[i][j] *= scale;
-        for (int k = 0; k < 4; ++k) {
-            if (k == i)
-                continue;
-            const double factor = m[k][i];
-            for (int j = 0; j < 8; ++j)
-                m[k][j] -= factor * m[i][j];
-        }
-    }
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j)
-            inverse[4 * i + j] = float(m[i][4 + j]);
+    const auto m = [matrix](int row, int column) { return double(matrix[4 * row + column]); };
+    const double first = 1 / (m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1));
+    const double a = first * m(1, 1), b = -first * m(0, 1), c = first * m(0, 0); // of the upper left block
+    // that times the upper right block, then the inverse of what it leaves of the lower right one
+    const double p = a * m(0, 2) + b * m(1, 2), q = a * m(0, 3) + b * m(1, 3);
+    const double r = b * m(0, 2) + c * m(1, 2), s = b * m(0, 3) + c * m(1, 3);
+    const double d = m(2, 2) - m(0, 2) * p - m(1, 2) * r, e = m(2, 3) - m(0, 2) * q - m(1, 2) * s,
+                 f = m(3, 3) - m(0, 3) * q - m(1, 3) * s;
+    const double second = 1 / (d * f - e * e);
+    const double x = second * f, y = -second * e, z = second * d;
+    const double t = p * x + q * y, u = p * y + q * z, v = r * x + s * y, w = r * y + s * z;
+    const double values[16] = {a + t * p + u * q,
+                               b + t * r + u * s,
+                               -t,
+                               -u, //
+                               b + t * r + u * s,
+                               c + v * r + w * s,
+                               -v,
+                               -w, //
+                               -t,
+                               -v,
+                               x,
+                               y, //
+                               -u,
+                               -w,
+                               y,
+                               z};
+    std::copy_n(values, 16, inverse);
 }
 
 constexpr int UPPER[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}; // of the upper triangle of a symmetric matrix
@@ -150,10 +182,9 @@ private:
     void collect_up(Values Level::*of); // from the finest level's values
     void linearise(bool robust);
     void precondition();
-    void apply(Values Level::*of, Values Level::*result);
+    double apply(Values Level::*of, Values Level::*result);
+    double step(float size);
     void solve(int iterations);
-    double scalar(Values Level::*a, Values Level::*b) const;
-    void add(float factor, Values Level::*from, Values Level::*to);
 
     const ExtractionProblem &problem_;
     std::vector<Level> levels_;
@@ -167,15 +198,15 @@ Pyramid::Pyramid(const ExtractionProblem &problem) : problem_(problem) {
         Level level{rows, columns, {}, {}, {}, {}, {}, {}, {}, {}};
         const std::size_t values = 4 * level.cells();
         for (Values Level::*each : {&Level::coefficients, &Level::residual, &Level::direction,
-                                    &Level::product, &Level::preconditioned, &Level::precision}) {
+                                    &Level::product, &Level::preconditioned}) {
             level.*each = Values(values);
             std::fill_n((level.*each).data(), values, 0.0f);
         }
         level.system = Values(4 * values);
         level.inverse = Values(4 * values);
         const auto &deviation = problem.deviations[n];
-        for (std::size_t at = 0; at < values; ++at)
-            level.precision[at] = 1 / (deviation[at % 4] * deviation[at % 4]);
+        for (int k = 0; k < 4; ++k)
+            level.precision[k] = 1 / (deviation[k] * deviation[k]);
         levels_.push_back(std::move(level));
         rows = (rows + 1) / 2;
         columns = (columns + 1) / 2;
@@ -185,7 +216,7 @@ Pyramid::Pyramid(const ExtractionProblem &problem) : problem_(problem) {
         levels_.back().coefficients[4 * cell] = 0.2f;
     fields_ = Values(4 * levels_[0].cells());
     right_ = Values(4 * levels_[0].cells());
-    line_ = Values(4 * std::size_t(problem.columns));
+    line_ = Values(4 * (std::size_t(problem.columns) + 2));
     weight_ = Values(levels_[0].cells());
     std::fill_n(weight_.data(), levels_[0].cells(), 1.0f);
 }
@@ -197,9 +228,8 @@ void Pyramid::expand(Values Level::*of) {
     for (std::size_t n = levels_.size() - 1; n-- > 0;) {
         Level &level = levels_[n];
         float *const sum = n == 0 ? fields_.data() : level.product.data();
-        std::copy_n((level.*of).data(), 4 * level.cells(), sum);
-        add_expanded(coarse, levels_[n + 1].rows, levels_[n + 1].columns, sum, level.rows, level.columns,
-                     line_.data());
+        add_expanded(coarse, levels_[n + 1].rows, levels_[n + 1].columns, (level.*of).data(), level.rows,
+                     level.columns, line_.data(), sum);
         coarse = sum;
     }
     if (levels_.size() == 1)
@@ -316,84 +346,101 @@ void Pyramid::precondition() {
             for (int k = 0; k < 16; ++k)
                 matrix[k] = scale * level.system[16 * cell + k];
             for (int k = 0; k < 4; ++k)
-                matrix[5 * k] += level.precision[4 * cell + k];
+                matrix[5 * k] += level.precision[k];
             invert(matrix, level.inverse.data() + 16 * cell);
         }
     }
 }
 
-// result = (prior + collect system expand) of
+// y = matrix x, cell by cell.
 SMOKELIFT_CLONES
-static void apply_system(const float *system, const float *x, float *y, std::size_t cells) {
+void apply_system(const float *matrix, const float *x, float *y, std::size_t cells) {
     for (std::size_t cell = 0; cell < cells; ++cell)
-        store(y + 4 * cell, times(system + 16 * cell, load(x + 4 * cell)));
+        store(y + 4 * cell, times(matrix + 16 * cell, load(x + 4 * cell)));
 }
 
-void Pyramid::apply(Values Level::*of, Values Level::*result) {
+// sum += x y
+SMOKELIFT_INLINE void add_products(Four x, Four y, FourDoubles &sum) {
+    sum += __builtin_convertvector(x, FourDoubles) * __builtin_convertvector(y, FourDoubles);
+}
+SMOKELIFT_INLINE double total(const FourDoubles &sum) { return (sum[0] + sum[1]) + (sum[2] + sum[3]); }
+
+// y += precision x; their scalar product.
+SMOKELIFT_CLONES
+double add_prior(Four precision, const float *x, float *y, std::size_t cells) {
+    FourDoubles sum = {};
+    for (std::size_t cell = 0; cell < cells; ++cell) {
+        const Four at = load(x + 4 * cell), result = load(y + 4 * cell) + precision * at;
+        store(y + 4 * cell, result);
+        add_products(at, result, sum);
+    }
+    return total(sum);
+}
+
+// A step along the direction; the scalar product of the residual there and the preconditioned one.
+SMOKELIFT_CLONES
+double step_along(float step, const Level &level, float *coefficients, float *residual,
+                  float *preconditioned) {
+    const float *const direction = level.direction.data(), *const product = level.product.data();
+    const float *const inverse = level.inverse.data();
+    const std::size_t cells = level.cells();
+    FourDoubles sum = {};
+    for (std::size_t cell = 0; cell < cells; ++cell) {
+        const std::size_t at = 4 * cell;
+        store(coefficients + at, load(coefficients + at) + step * load(direction + at));
+        const Four left = load(residual + at) - step * load(product + at);
+        const Four conditioned = times(inverse + 4 * at, left);
+        store(residual + at, left);
+        store(preconditioned + at, conditioned);
+        add_products(left, conditioned, sum);
+    }
+    return total(sum);
+}
+
+// y = x + factor y.
+SMOKELIFT_CLONES
+void add_scaled(const float *x, float factor, float *y, std::size_t count) {
+    for (std::size_t at = 0; at < count; ++at)
+        y[at] = x[at] + factor * y[at];
+}
+
+// result = (prior + collect system expand) of; their scalar product.
+double Pyramid::apply(Values Level::*of, Values Level::*result) {
     expand(of);
     apply_system(levels_[0].system.data(), fields_.data(), (levels_[0].*result).data(), levels_[0].cells());
     collect_up(result);
-    for (Level &level : levels_) {
-        const float *const precision = level.precision.data(), *const x = (level.*of).data();
-        float *const y = (level.*result).data();
-        for (std::size_t at = 0; at < 4 * level.cells(); ++at)
-            y[at] += precision[at] * x[at];
-    }
-}
-
-double Pyramid::scalar(Values Level::*a, Values Level::*b) const {
     double sum = 0;
-    for (const Level &level : levels_) {
-        const float *const x = (level.*a).data(), *const y = (level.*b).data();
-        double part[4] = {};
-        for (std::size_t at = 0; at < 4 * level.cells(); at += 4)
-            for (int k = 0; k < 4; ++k)
-                part[k] += double(x[at + k]) * y[at + k];
-        sum += (part[0] + part[1]) + (part[2] + part[3]);
-    }
+    for (Level &level : levels_)
+        sum += add_prior(level.precision, (level.*of).data(), (level.*result).data(), level.cells());
     return sum;
 }
 
-void Pyramid::add(float factor, Values Level::*from, Values Level::*to) {
-    for (Level &level : levels_) {
-        const float *const x = (level.*from).data();
-        float *const y = (level.*to).data();
-        for (std::size_t at = 0; at < 4 * level.cells(); ++at)
-            y[at] += factor * x[at];
-    }
+// A step of conjugate gradients; the scalar product of the residual and the preconditioned one after it.
+double Pyramid::step(float size) {
+    double sum = 0;
+    for (Level &level : levels_)
+        sum += step_along(size, level, level.coefficients.data(), level.residual.data(),
+                          level.preconditioned.data());
+    return sum;
 }
 
 void Pyramid::solve(int iterations) {
-    const auto condition = [&] {
-        for (Level &level : levels_)
-            apply_system(level.inverse.data(), level.residual.data(), level.preconditioned.data(),
-                         level.cells());
-    };
-    apply(&Level::coefficients, &Level::residual);
-    std::copy_n(right_.data(), 4 * levels_[0].cells(), levels_[0].preconditioned.data());
-    collect_up(&Level::preconditioned);
-    for (Level &level : levels_)
-        for (std::size_t at = 0; at < 4 * level.cells(); ++at)
-            level.residual[at] = level.preconditioned[at] - level.residual[at];
-    condition();
-    for (Level &level : levels_)
-        std::copy_n(level.preconditioned.data(), 4 * level.cells(), level.direction.data());
-    double now = scalar(&Level::residual, &Level::preconditioned);
+    apply(&Level::coefficients, &Level::product);
+    std::copy_n(right_.data(), 4 * levels_[0].cells(), levels_[0].residual.data());
+    collect_up(&Level::residual);
+    for (Level &level : levels_) // a step of 1 along 0 takes the product off
+        std::fill_n(level.direction.data(), 4 * level.cells(), 0.0f);
+    double now = step(1);
     const double first = now;
+    float factor = 0;
     for (int n = 0; n < iterations && now > double(ENOUGH) * ENOUGH * first; ++n) {
-        apply(&Level::direction, &Level::product);
-        const double curvature = scalar(&Level::direction, &Level::product);
+        for (Level &level : levels_)
+            add_scaled(level.preconditioned.data(), factor, level.direction.data(), 4 * level.cells());
+        const double curvature = apply(&Level::direction, &Level::product);
         if (!(curvature > 0))
             break;
-        const float step = float(now / curvature);
-        add(step, &Level::direction, &Level::coefficients);
-        add(-step, &Level::product, &Level::residual);
-        condition();
-        const double next = scalar(&Level::residual, &Level::preconditioned);
-        const float factor = float(next / now);
-        for (Level &level : levels_)
-            for (std::size_t at = 0; at < 4 * level.cells(); ++at)
-                level.direction[at] = level.preconditioned[at] + factor * level.direction[at];
+        const double next = step(float(now / curvature));
+        factor = float(next / now);
         now = next;
     }
 }

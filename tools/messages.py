@@ -28,7 +28,7 @@ MIN_WORDS = 4
 
 TOPICS = {
     "Command line": ("engine/smokelift/app", "engine/smokelift_command"),
-    "Clip and background": ("engine/smokelift/footage",),
+    "Clip and background": ("engine/smokelift/footage", "engine/smokelift/extraction"),
     "Scene file": ("engine/smokelift/checks", "engine/smokelift/scene"),
     "Shot and result": ("engine/smokelift/report",),
     "Set-up of the shot": ("engine/smokelift/setup",),

@@ -133,6 +133,42 @@ def check_gradient(density, wall, cameras, depth, lights):
     assert resolved >= 5
 
 
+@pytest.mark.parametrize("scattering", ["multiple", *MODELS])
+def test_a_fourth_channel_shows_the_transmittance(density, wall, scattering):
+    """Smoke is black there, and the colors are what they are without it."""
+    camera, medium = make_camera(EYES["along a diagonal"]), replace(medium_of_depth(density, 3), anisotropy=0.0)
+    white = np.linspace(0.5, 1.5, wall.shape[1], dtype=np.float32) * np.ones(wall.shape[:2], np.float32)
+    colors = Renderer(camera, DOMAIN, medium, (SUN,), wall, scattering)
+    both = Renderer(camera, DOMAIN, medium, (SUN,), np.dstack([wall, white]), scattering)
+    image = both.image(density)
+    assert image.shape == (22, 20, 4)
+    np.testing.assert_allclose(image[..., :3], colors.image(density), rtol=1e-6)
+    np.testing.assert_allclose(image[..., 3], both.transmittance * white, rtol=1e-6)
+    assert both.transmittance.min() < 0.2
+
+
+@pytest.mark.parametrize("scattering", MODELS)
+def test_gradient_of_four_channels_equals_finite_differences(density, wall, scattering):
+    camera, medium = make_camera(EYES["along a diagonal"]), medium_of_depth(density, 3)
+    background = np.array((0.3, 0.2, 0.4, 0.9), np.float32)
+    target = np.dstack([wall, wall.mean(-1)])
+    renderer = Renderer(camera, DOMAIN, medium, (SUN,), background, scattering)
+    image = renderer.image(density, keep_record=True)
+    gradient = renderer.gradient(2 * (image - target))
+
+    def loss(values):
+        scene = (values, camera, DOMAIN, medium, (SUN,))
+        colors = reference.render(*scene, background[:3].astype(np.float64), scattering)
+        # smoke in no light before a white is its transmittance
+        clear = reference.render(*scene, np.ones(3), "absorption")[..., :1]
+        return np.sum((np.concatenate([colors, clear * float(background[3])], -1) - target) ** 2)
+
+    for voxel in voxels_of_three_kinds(density, camera, medium):
+        changed = density.astype(complex)
+        changed[voxel] += 1e-30j
+        assert gradient[voxel] == pytest.approx(loss(changed).imag / 1e-30, rel=1e-3, abs=0)
+
+
 def voxels_of_three_kinds(density, camera, medium):
     """Random voxels of smoke, three each: lit, behind other smoke as the camera sees it, in its shadow."""
     kappa = medium.extinction * density.astype(np.float64)

@@ -1,0 +1,338 @@
+"""Smoke without its plate: a blob whose transmittance and light are known, before plates of all kinds."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smokelift.extraction import Element, extract_element, usual_source
+from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise
+from smokelift.footage.plate import Plate, noise_at
+
+ROWS, COLUMNS = 72, 96
+SOURCE = np.array([0.35, 0.3325, 0.315], np.float32)
+"""Radiance of the blob where no side is turned to or from the light."""
+
+BOX = (slice(30, 44), slice(50, 66))
+"""Where a hand is held before the smoke."""
+
+
+def blob() -> tuple[Picture, Picture]:
+    """T (rows, columns) and J (rows, columns, 3) of smoke with wisps, which a light from the right shades."""
+    y, x = np.meshgrid(np.linspace(-1, 1, ROWS), np.linspace(-1, 1, COLUMNS), indexing="ij")
+    wisps = 1 + 0.25 * np.sin(7 * x + 2) * np.cos(6 * y)
+    depth = 1.6 * np.exp(-1.5 * ((x / 0.45) ** 2 + (y / 0.55) ** 2)) * wisps
+    shade = 1 + 0.35 * np.tanh(2 * x) + 0.15 * y
+    return np.exp(-depth).astype(np.float32), (shade[..., None] * SOURCE).astype(np.float32)
+
+
+def wall(mean: float = 0.3) -> Picture:
+    """Colored detail of half its mean, as fine as the eye sees."""
+    detail = blurred(np.random.default_rng(1).standard_normal((ROWS, COLUMNS, 3)).astype(np.float32), 1.5)
+    return (mean * np.maximum(1 + 0.45 * detail / detail.std(), 0.05)).astype(np.float32)
+
+
+def sky() -> Picture:
+    """One hue, brighter toward the ground."""
+    y, x = np.meshgrid(np.linspace(0, 1, ROWS), np.linspace(0, 1, COLUMNS), indexing="ij")
+    return ((0.8 + 0.3 * y + 0.1 * x)[..., None] * np.array([0.15, 0.3, 0.7])).astype(np.float32)
+
+
+TRANSMITTANCE, RADIANCE = blob()
+PLATES = {"wall": wall(), "sky": sky()}
+
+
+def plate_of(image: Picture, confidence: float = 1.0) -> Plate:
+    """A plate in noise of one code."""
+    return Plate(image, np.full(image.shape[:2], confidence, np.float32), EIGHT_BIT_NOISE)
+
+
+def clear_picture(plate: Picture) -> Picture:
+    """The blob before a plate, without noise."""
+    clear = TRANSMITTANCE[..., None]
+    return np.asarray((1 - clear) * RADIANCE + clear * plate)
+
+
+def filmed(picture: Picture) -> Picture:
+    """A picture in noise of one code."""
+    noise = np.random.default_rng(0).normal(0, 1 / 255, picture.shape)
+    return np.maximum(srgb_to_linear(linear_to_srgb(picture) + noise), 0).astype(np.float32)
+
+
+def extracted(picture: Picture, plate: Plate, source: Picture = SOURCE, size: tuple[int, int] | None = None) -> Element:
+    """The element, at the picture's own pixels unless a ``size`` (columns, rows) is given."""
+    rows, columns = picture.shape[:2]
+    return extract_element(picture, plate, source, size or (columns, rows))
+
+
+def rms(values: Picture) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values, dtype=np.float64))))
+
+
+def detail(picture: Picture) -> Picture:
+    """What is finer than some pixels."""
+    return picture - blurred(picture, 3.0)
+
+
+def fields_of(element: Element) -> tuple[Picture, ...]:
+    """Everything that an element holds."""
+    return element.radiance, element.transmittance, element.deviation, element.weight
+
+
+# what is found
+
+
+@pytest.mark.parametrize("plate", PLATES.values(), ids=PLATES.keys())
+@pytest.mark.parametrize("size", [(96, 72), (64, 48), (31, 23)], ids=str)
+def test_a_blob_is_found_before_a_plate(plate: Picture, size: tuple[int, int]) -> None:
+    """By the plate's detail, or by its color, to .015 in T, and to .02 in what smoke sends."""
+    found = extracted(filmed(clear_picture(plate)), plate_of(plate), size=size)
+    true = area_average(TRANSMITTANCE, *size)
+    sent = area_average((1 - TRANSMITTANCE)[..., None] * RADIANCE, *size)
+    assert rms(found.transmittance - true) < 0.015
+    assert rms(found.radiance - sent) < 0.015
+    assert found.weight.mean() > 0.99
+    assert found.radiance.dtype == found.transmittance.dtype == np.float32
+
+
+def test_smoke_is_found_whatever_its_light() -> None:
+    """A source of twice or half the smoke's radiance changes T little: detail tells it, not brightness."""
+    picture = filmed(clear_picture(PLATES["wall"]))
+    for wrong in (0.5, 2.0):
+        found = extracted(picture, plate_of(PLATES["wall"]), SOURCE * np.float32(wrong))
+        assert rms(found.transmittance - TRANSMITTANCE) < 0.04
+
+
+def test_the_plate_leaves_no_imprint() -> None:
+    plate = PLATES["wall"]
+    found = extracted(filmed(clear_picture(plate)), plate_of(plate))
+    smoky = TRANSMITTANCE < 0.8
+    behind = detail(plate.mean(-1))[smoky]
+    sent = (1 - TRANSMITTANCE)[..., None] * RADIANCE
+    for error in (found.transmittance - TRANSMITTANCE, (found.radiance - sent).mean(-1)):
+        assert abs(np.corrcoef(detail(error)[smoky], behind)[0, 1]) < 0.15
+
+
+def test_clear_air_sends_nothing() -> None:
+    plate = PLATES["wall"]
+    found = extracted(filmed(plate), plate_of(plate))
+    assert found.transmittance.mean() > 0.98
+    assert np.abs(found.radiance.mean((0, 1))).max() < 0.01
+
+
+@pytest.mark.parametrize("plate", PLATES.values(), ids=PLATES.keys())
+@pytest.mark.parametrize("size", [(96, 72), (48, 36)], ids=str)
+def test_the_element_over_its_plate_is_the_picture(plate: Picture, size: tuple[int, int]) -> None:
+    picture = filmed(clear_picture(plate))
+    found = extracted(picture, plate_of(plate), size=size)
+    seen = area_average(picture, *size)
+    left = np.abs(found.over(area_average(plate, *size)) - seen)
+    assert (left <= noise_at(seen, plate_of(plate)))[found.weight == 1].all()
+
+
+def test_over_takes_a_color_and_a_picture() -> None:
+    one = Element(np.full((2, 3, 3), 0.1), np.full((2, 3), 0.5), np.zeros((2, 3)), np.ones((2, 3)))
+    np.testing.assert_allclose(one.over(np.array([1.0, 2.0, 4.0])), np.broadcast_to([0.6, 1.1, 2.1], (2, 3, 3)))
+    picture = np.random.default_rng(0).random((2, 3, 3))
+    np.testing.assert_allclose(one.over(picture), 0.1 + 0.5 * picture)
+
+
+def test_before_black_the_picture_is_what_smoke_sends() -> None:
+    """The middle of the wall is black: T is not seen there, and its deviation says so."""
+    plate = wall()
+    plate[:, 24:72] = 0
+    picture = filmed(clear_picture(plate))
+    found = extracted(picture, plate_of(plate))
+    seen = extracted(filmed(clear_picture(wall())), plate_of(wall()))
+    dark = np.zeros((ROWS, COLUMNS), np.bool_)
+    dark[:, 28:68] = True
+    fits = dark & (found.weight == 1)
+    assert fits.sum() > 0.95 * dark.sum()
+    np.testing.assert_allclose(found.radiance[fits], picture[fits], atol=1e-6)
+    smoky = dark & (TRANSMITTANCE < 0.6)
+    assert np.median(found.deviation[smoky]) > 1.5 * np.median(seen.deviation[smoky])
+    assert rms((found.transmittance - TRANSMITTANCE)[smoky]) < 1.5 * rms(found.deviation[smoky])
+
+
+# what does not fit
+
+
+@pytest.mark.parametrize("color", [(0.9, 0.05, 0.02), (0.02, 0.6, 0.05)], ids=["red", "green"])
+def test_a_hand_before_smoke_is_an_outlier(color: tuple[float, float, float]) -> None:
+    plate = PLATES["wall"]
+    clean = filmed(clear_picture(plate))
+    covered = clean.copy()
+    covered[BOX] = color
+    before, after = extracted(clean, plate_of(plate)), extracted(covered, plate_of(plate))
+    hidden, around = np.zeros((2, ROWS, COLUMNS), np.bool_)
+    hidden[BOX] = True
+    around[26:48, 46:70] = True
+    assert after.weight[hidden].mean() < 0.05
+    assert after.weight[~hidden].mean() > 0.98
+    change = after.transmittance - before.transmittance
+    assert rms(change[around & ~hidden]) < 0.05
+    assert rms(change[~around]) < 0.005
+    # it is no smoke: its own radiance is not sent by the element
+    assert (np.abs(after.radiance[hidden] - np.asarray(color)).max(-1) > 0.15).mean() > 0.95
+
+
+def test_a_wrong_plate_counts_less_where_it_is_said_to_be_wrong() -> None:
+    """The wall's brightness is wrong by 20 % in patches, its colors are right."""
+    plate = PLATES["wall"]
+    patches = blurred(np.random.default_rng(5).standard_normal((ROWS, COLUMNS, 1)).astype(np.float32), 6.0)
+    wrong = np.maximum(plate * (1 + 0.2 * patches / patches.std()), 0.01).astype(np.float32)
+    error = (wrong - plate).reshape(-1, 3)
+    covariance = error.T @ error / np.float32(len(error))
+    picture = filmed(clear_picture(plate))
+    trusted = extracted(picture, plate_of(wrong))
+    doubted = extracted(picture, replace(plate_of(wrong, 0.0), errors=covariance))
+    channels_apart = replace(plate_of(wrong, 0.0), errors=np.diag(np.diag(covariance)))
+    diagonal = extracted(picture, channels_apart)
+    missed = [rms(found.transmittance - TRANSMITTANCE) for found in (trusted, doubted, diagonal)]
+    assert np.median(doubted.deviation) > 1.5 * np.median(trusted.deviation)
+    assert doubted.weight.mean() > trusted.weight.mean() + 0.05
+    assert missed[1] < 0.95 * min(missed[0], missed[2])  # what the colors tell still counts
+
+
+def test_confidence_says_where_errors_count() -> None:
+    plate = PLATES["wall"]
+    picture = filmed(clear_picture(plate))
+    errors = np.eye(3, dtype=np.float32) * np.float32(0.1**2)
+    known = extracted(picture, plate_of(plate))
+    np.testing.assert_array_equal(
+        extracted(picture, replace(plate_of(plate), errors=errors)).transmittance, known.transmittance
+    )
+    confidence = np.ones((ROWS, COLUMNS), np.float32)
+    confidence[:, 48:] = 0
+    partly = extracted(picture, replace(plate_of(plate), errors=errors, confidence=confidence))
+    clear = TRANSMITTANCE > 0.8
+    raised = partly.deviation / known.deviation
+    left, right = clear & (np.arange(96) < 36), clear & (np.arange(96) >= 60)
+    assert raised[left].max() < 1.1
+    assert raised[right].min() > 1.3
+
+
+# invariance
+
+
+@settings(max_examples=12, deadline=None, derandomize=True)
+@given(st.floats(-3, 3))
+def test_exposure_scales_the_radiance_alone(stops: float) -> None:
+    """Of a picture without noise; the noise is even in code values, not in light."""
+    gain = np.float32(2.0**stops)
+    plate, size = PLATES["wall"], (48, 36)
+    silent = Plate(plate, np.ones((ROWS, COLUMNS), np.float32), lasting_noise(0.0))
+    picture = clear_picture(plate)
+    one = extracted(picture, silent, size=size)
+    other = extracted(picture * gain, replace(silent, image=plate * gain), SOURCE * gain, size)
+    assert np.abs(other.transmittance - one.transmittance).max() < 2e-3
+    np.testing.assert_allclose(other.radiance, gain * one.radiance, atol=1e-3 * gain)
+
+
+FLIPS: dict[str, Callable[[Picture], Picture]] = {
+    "mirrored": lambda picture: picture[:, ::-1],
+    "upside down": lambda picture: picture[::-1],
+    "transposed": lambda picture: np.swapaxes(picture, 0, 1),
+}
+
+
+@pytest.mark.parametrize("flip", FLIPS.values(), ids=FLIPS.keys())
+def test_a_flipped_picture_has_a_flipped_element(flip: Callable[[Picture], Picture]) -> None:
+    """The pyramid has its odd cells at the other end, and the rounds end before all digits are found."""
+
+    def turned(picture: Picture) -> Picture:
+        return np.ascontiguousarray(flip(picture))
+
+    plate = PLATES["wall"]
+    picture = filmed(clear_picture(plate))
+    straight = extracted(picture, plate_of(plate))
+    flipped = extracted(turned(picture), plate_of(turned(plate)))
+    assert rms(flipped.transmittance - turned(straight.transmittance)) < 1e-3
+    assert rms(flipped.radiance - turned(straight.radiance)) < 1e-3
+    assert rms(flipped.deviation / turned(straight.deviation) - 1) < 0.02
+
+
+def test_the_result_is_that_of_any_number_of_threads(set_threads: Callable[[int], None]) -> None:
+    picture = filmed(clear_picture(PLATES["wall"]))
+    found = []
+    for count in (1, 2, 1):
+        set_threads(count)
+        found.append(extracted(picture, plate_of(PLATES["wall"])))
+    for other in found[1:]:
+        for one, same in zip(fields_of(found[0]), fields_of(other), strict=True):
+            np.testing.assert_array_equal(one, same)
+
+
+# any picture
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 1), (2, 2), (7, 5), (31, 17), (3, 96)], ids=str)
+def test_any_size_is_taken(shape: tuple[int, int]) -> None:
+    rows, columns = shape
+    part = slice(24, 24 + rows), slice(0 if columns == 96 else 40, columns if columns == 96 else 40 + columns)
+    plate = PLATES["wall"][part]
+    picture = clear_picture(PLATES["wall"])[part]
+    for size in {(columns, rows), (max(1, columns // 2), max(1, rows // 2)), (1, 1)}:
+        found = extracted(picture, plate_of(plate), size=size)
+        assert found.radiance.shape == (size[1], size[0], 3)
+        for each in fields_of(found):
+            assert each.shape[:2] == size[::-1]
+            assert np.isfinite(each).all()
+
+
+def test_the_longest_pictures_have_coarser_cells() -> None:
+    """Cells end at 192 along a side, the element does not; what is finer is still the picture's."""
+    wide = np.tile(PLATES["wall"][:8], (1, 3, 1))
+    clear = np.tile(TRANSMITTANCE[32:40], (1, 3))
+    picture = (1 - clear)[..., None] * SOURCE + clear[..., None] * wide
+    found = extracted(picture, plate_of(wide))
+    np.testing.assert_allclose(found.over(wide), picture, atol=0.01)
+    assert found.transmittance.shape == (8, 288)
+
+
+@pytest.mark.parametrize("picture", [0.0, 0.3, 1.0, 1e4, 1e8])
+@pytest.mark.parametrize("plate", [0.0, 0.3, 1e8])
+def test_no_brightness_makes_nan(picture: float, plate: float) -> None:
+    for source in (0.01, 1e4):
+        found = extracted(
+            np.full((12, 18, 3), picture, np.float32),
+            plate_of(np.full((12, 18, 3), plate, np.float32)),
+            np.full(3, source, np.float32),
+        )
+        assert all(np.isfinite(each).all() for each in fields_of(found))
+        for each in (found.transmittance, found.weight):
+            assert 0 <= each.min() <= each.max() <= 1
+
+
+# the source
+
+
+@pytest.mark.parametrize("brightness", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize("plate", PLATES.values(), ids=PLATES.keys())
+def test_the_source_is_found_from_the_pictures(brightness: float, plate: Picture) -> None:
+    """Within 20 %, of dim smoke as of smoke that is brighter than its plate; its color is given."""
+    clear = TRANSMITTANCE[..., None]
+    picture = filmed((1 - clear) * RADIANCE * brightness + clear * plate)
+    found = usual_source([(picture, plate_of(plate)), (picture[::-1], plate_of(plate[::-1]))], SOURCE, (48, 36))
+    np.testing.assert_allclose(found / found.mean(), SOURCE / SOURCE.mean(), rtol=1e-5)
+    assert found.mean() == pytest.approx(SOURCE.mean() * brightness, rel=0.2)
+
+
+def test_smoke_counts_by_its_weight_in_the_source() -> None:
+    """A clip's clear frames say nothing of the light."""
+    plate = PLATES["wall"]
+    smoky, empty = (filmed(clear_picture(plate)), plate_of(plate)), (filmed(plate), plate_of(plate))
+    alone = usual_source([smoky], SOURCE, (48, 36))
+    np.testing.assert_allclose(usual_source([smoky, empty, empty], SOURCE, (48, 36)), alone, rtol=0.05)
+
+
+def test_nothing_seen_has_a_source() -> None:
+    dark = plate_of(np.zeros((ROWS, COLUMNS, 3), np.float32))
+    found = usual_source([(dark.image, dark)], np.ones(3, np.float32), (24, 18))
+    assert np.isfinite(found).all()
+    assert (found > 0).all()
