@@ -79,6 +79,10 @@ SENTENCES: Mapping[str, str] = {
         "there is filled in from around it, so how thick the smoke is there is undetermined. Give a clean plate as "
         "background to show it."
     ),
+    "strokes": (
+        "Strokes: of the picture {smoke:.1%} is painted as smoke, {other:.1%} as not smoke, and {behind:.1%} as "
+        "background."
+    ),
     "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is matched to the background.",
     "background of one frame": (
         "One frame alone does not show what moves: the color around it counts as background, and every other color as "

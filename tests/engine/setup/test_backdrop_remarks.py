@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.checks import Doubt
+from smokelift.checks import Doubt, Remark
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
+from smokelift.footage.strokes import Strokes
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, first_remarks
@@ -61,6 +62,16 @@ def test_smoke_that_may_be_in_the_plate_is_said(grey, unknown_rows, said) -> Non
     unknown[:unknown_rows] = True
     found = doubts(grey, replace(SEEN, unknown=unknown), given=False)
     assert found == (Doubt("smoke in the background", {"share": 0.75}),) * said
+
+
+def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(grey) -> None:
+    unknown = np.zeros_like(COVERED)
+    unknown[:60] = True
+    smoke, nothing = np.zeros((2, 24, 32), np.bool_)
+    smoke[:12] = True
+    found = replace(grey, strokes=Strokes(smoke, nothing, ~smoke))
+    assert backdrop_remarks(found)[-1] == Remark("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
+    assert doubts(found, replace(SEEN, unknown=unknown), given=False) == ()
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
