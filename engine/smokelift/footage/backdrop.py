@@ -114,13 +114,15 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     """Find what stands behind the smoke of a clip, given what the scene says of it.
 
     ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves and the
-    background is neither given nor of one colour, or strokes are given.
+    background is neither given for every frame nor of one colour, or strokes are given.
     """
     grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
-    behind = grey or background
+    behind, moves = grey or background, camera is not None and camera.moves
+    if moves and behind is not None and behind.frame is not None:
+        raise ValueError(MOVING_CAMERA)
     plates = given_plates(behind, camera, clip)
     if plates is None:
-        found = _estimated(clip, camera is not None and camera.moves)
+        found = _estimated(clip, moves)
     else:
         quiet = without_noise_light(clip, plates.noise)
         if quiet is not clip:
@@ -132,7 +134,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     found = replace(found, clip=cleared(found.clip, shown), plates=shown)
     if background is None or background.strokes is None or grey is not None:
         return found
-    return _with_strokes(found, background, background.strokes, camera is not None and camera.moves)
+    return _with_strokes(found, background, background.strokes, moves)
 
 
 def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bool) -> Backdrop:
