@@ -105,6 +105,10 @@ SENTENCES: Mapping[str, str] = {
         "The background may hold most of the smoke: {share:.0%} of the area where smoke may be is never free of it. "
         "Smoke that stays there all the time is missing from the result. Give a clean plate or a color as background."
     ),
+    "clearest frame": (
+        "Frame {frame} (counted from 0) shows more of the background than the others: if it is free of smoke, give it "
+        "as background."
+    ),
     "bars": (
         "Only bars beside the picture never change, so everything between them counts as smoke. Crop the bars off, or "
         "give a clean plate as background."

@@ -37,9 +37,17 @@ def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
         *backdrop_remarks(found, not given and _between_bars(samples)),
         *((Remark("background unused"),) if found.source == "alpha" and given else ()),
         *doubts(found, samples, given),
+        *_clearest(found, samples),
         *(() if change == 0 else (Remark("exposure", {"change": change}),)),
         *_possible_fire(estimate),
     )
+
+
+def _clearest(found: Backdrop, samples: SmokeSamples) -> tuple[Remark, ...]:
+    """The frame that shows most of a background of which a part is unknown, by its number in the file."""
+    if found.source != "picture" or samples.clearest is None or not samples.unknown.any():
+        return ()
+    return (Remark("clearest frame", {"frame": found.clip.first + samples.clearest}),)
 
 
 def _possible_fire(estimate: FirstEstimate) -> tuple[Doubt, ...]:

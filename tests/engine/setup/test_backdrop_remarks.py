@@ -64,6 +64,22 @@ def test_smoke_that_may_be_in_the_plate_is_said(grey, unknown_rows, said) -> Non
     assert found == (Doubt("smoke in the background", {"share": 0.75}),) * said
 
 
+def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
+    """Smoke that flickers in its place, with a puff that rises beside it, and none of them in one frame."""
+    random = np.random.default_rng(0)
+    tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
+    across = np.abs(np.arange(56) - 40)
+    for n in range(12):
+        smoke = np.where(across < 6, random.uniform(0.4, 0.9), np.roll(puff(2 * n + 1), -16, axis=1)) * (n != 5)
+        write_image(tmp_path / f"frame_{n:02d}.png", tiles * (1 - smoke) + 0.6 * smoke)
+    with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(2, 11)) as clip:
+        said = first_remarks(first_estimate(clip, None, None), given=False)
+    assert Remark("clearest frame", {"frame": 5}) in said
+    with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(6, 11)) as clip:
+        said = first_remarks(first_estimate(clip, None, None), given=False)
+    assert "clearest frame" not in [remark.kind for remark in said]
+
+
 def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(grey) -> None:
     unknown = np.zeros_like(COVERED)
     unknown[:60] = True
