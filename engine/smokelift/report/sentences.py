@@ -125,7 +125,7 @@ SENTENCES: Mapping[str, str] = {
     ),
     "no smoke before an estimated background": (
         "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is "
-        "not seen: give a clean plate or a color as background."
+        "not seen: paint strokes over the smoke, or give a clean plate or a color as background."
     ),
     "smoke of several colours": (
         "The smoke has more than one color, but one is assumed for all of it: on average its light is {degrees:.0f} "
