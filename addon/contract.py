@@ -14,7 +14,8 @@ MADE_UP = "made up"
 """Origin, in the sequence's provenance, of what no camera shows and clips do not determine."""
 
 FRAME_FILE = "smoke_{:04d}.vdb"
-"""File of a frame in a sequence's directory, by its number from 1."""
+"""File of a frame in a sequence's directory, by the number of its file: frame 1 has ``start_number``, which is 1 at
+first."""
 
 PROXY_FILE = "proxy_{:04d}.vdb"
 """There too, and in a folder with an export: the coarse copy of a frame."""

@@ -46,7 +46,7 @@ def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
 
 
 def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
-    """Give a smoke a proxy if its take has the files of one, else none. Whether it is on show stays."""
+    """Give a smoke a proxy if its take has files of one with these numbers, else none. Whether it is on show stays."""
     if {PROXY_FILE.format(number) for number in numbers} <= {file.name for file in take.directory.iterdir()}:
         _PROXY.add(smoke).show_render = False
     else:

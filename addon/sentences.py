@@ -19,6 +19,10 @@ SENTENCES = {
         "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
         "Report shows what counts as smoke. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
     ),
+    "clearest frame": (
+        "Frame {frame} shows more of the background than the others: if it is free of smoke, go to it and press Plate "
+        "from This Frame."
+    ),
     "cut": (
         "The picture changes at once between frames {before} and {after}, as at a cut, so no single background fits "
         "both sides. Choose Frames {first} to {before} or {after} to {last}."
@@ -26,7 +30,7 @@ SENTENCES = {
 }
 """Sentences by kind, with the figures that the engine gives."""
 
-FRAME_NUMBERS = ("before", "after", "first", "last")
+FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
 """Figures that the engine counts from 0, and the panel from 1."""
 
 

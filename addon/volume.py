@@ -191,9 +191,14 @@ def _numbers(index: dict[str, Any]) -> list[int]:
     return sorted(int(number) for number in index["frames"])
 
 
+def _file_numbers(index: dict[str, Any]) -> list[int]:
+    """The numbers in the names of the finished frames' files; the engine of earlier versions counts from 1."""
+    return [number + index.get("start_number", 1) - 1 for number in _numbers(index)]
+
+
 def _play(smoke: bpy.types.Object, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
     """Make a smoke, and its proxy if the take has one, read the take's files and play when its clip does."""
-    numbers = _numbers(index)
+    numbers = _file_numbers(index)
     _set_file(smoke.data, take.directory / FRAME_FILE.format(numbers[0]), index)
     fit_proxy(smoke, take, numbers)
     for volume, name in ((proxy_of(smoke), PROXY_FILE), (next_of(smoke), FRAME_FILE)):
@@ -218,7 +223,7 @@ def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> No
 
 def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     """Make a smoke, its proxy and what it needs for frames between play when its clip does, at the pace on trial."""
-    settings, numbers, ratio = smoke.smokelift, _numbers(index), _ratio(smoke, scene, index)
+    settings, numbers, ratio = smoke.smokelift, _file_numbers(index), _ratio(smoke, scene, index)
     real = _real_time(smoke, ratio, index)
     direction = index.get("settings", {}).get("direct", {}).get("job")
     live = settings.directing.live and direction != "retime" and not _tracked(index)

@@ -3,13 +3,15 @@
 The first of these that applies: what an alpha channel says; what the scene gives; one colour, if the whole file makes
 it the likeliest (`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show
 next to nothing. Before a picture the camera must stand still (`camera_motion`); one colour is the same wherever it
-points. The clip's noise is measured first, on what cannot be smoke (`noise`).
+points. The clip's noise is measured first, on what cannot be smoke (`noise`). Strokes of the scene change what was
+found (`strokes`); an alpha channel leaves nothing for them to say.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -33,6 +35,7 @@ from smokelift.footage.noise import (
 )
 from smokelift.footage.plate import Plate, Plates, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import Proxy
+from smokelift.footage.strokes import Strokes, stroked_plate, without_others
 from smokelift.footage.video import median_quantiser
 from smokelift.scene import Background, Camera
 
@@ -62,6 +65,12 @@ MOVING_CAMERA = (
 )
 """Message that refuses a clip."""
 
+STROKES_OVER_ONE_FRAME = (
+    "Strokes are painted over one frame, but what is behind the smoke changes from frame to frame. Leave them out, or "
+    "stabilize the clip and give one picture as background."
+)
+"""Message that refuses strokes."""
+
 Source = Literal["alpha", "given", "colour", "colour around one frame", "black for want of a picture", "picture"]
 
 
@@ -74,17 +83,21 @@ class Backdrop:
     source
         Where it comes from.
     clip
-        The footage without the light that noise adds, with the background in place of what a mask hides.
+        The footage without the light that noise adds, with the background in place of what a mask hides and of what is
+        painted as no smoke.
     plates
         Backgrounds at full size.
     background
-        The background as a scene gives it; None where it was estimated, unless the camera is known to move.
+        The background as a scene gives it, with its strokes; None where it was estimated from the clip alone, unless
+        the camera is known to move.
     frames
         Number of the file's frames, up to the next cut, that it was estimated from.
     quantiser
         The file's median quantiser, if known; only for an estimated picture.
     cut
         Frames of the file before and after a cut within the clip, if there is one.
+    strokes
+        What was painted over a frame, if that was used.
     """
 
     source: Source
@@ -94,19 +107,22 @@ class Backdrop:
     frames: int = 0
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
+    strokes: Strokes | None = None
 
 
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
     """Find what stands behind the smoke of a clip, given what the scene says of it.
 
-    ClipError is raised if a frame cannot be read, ValueError if the camera moves and the background is neither given
-    nor of one colour.
+    ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves and the
+    background is neither given for every frame nor of one colour, or strokes are given.
     """
     grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
-    behind = grey or background
+    behind, moves = grey or background, camera is not None and camera.moves
+    if moves and behind is not None and behind.frame is not None:
+        raise ValueError(MOVING_CAMERA)
     plates = given_plates(behind, camera, clip)
     if plates is None:
-        found = _estimated(clip, camera is not None and camera.moves)
+        found = _estimated(clip, moves)
     else:
         quiet = without_noise_light(clip, plates.noise)
         if quiet is not clip:
@@ -115,7 +131,22 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             plates = replace(again, noise=plates.noise)
         found = Backdrop("alpha" if grey else "given", quiet, plates, behind)
     shown = uncovered(found.plates, found.clip)
-    return replace(found, clip=cleared(found.clip, shown), plates=shown)
+    found = replace(found, clip=cleared(found.clip, shown), plates=shown)
+    if background is None or background.strokes is None or grey is not None:
+        return found
+    return _with_strokes(found, background, background.strokes, moves)
+
+
+def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bool) -> Backdrop:
+    """A background with what strokes say of it."""
+    if moves or not isinstance(found.plates, Plate):
+        raise ValueError(STROKES_OVER_ONE_FRAME)
+    strokes, clip = Strokes.read(path, found.clip.size), found.clip
+    one_color = background.color is not None or (background.estimated and found.source != "picture")
+    plate = stroked_plate(strokes, found.plates, clip, one_color)
+    return replace(
+        found, clip=without_others(strokes, clip, plate), plates=plate, background=background, strokes=strokes
+    )
 
 
 def _estimated(clip: Clip, moves: bool) -> Backdrop:

@@ -212,14 +212,16 @@ def without_noise_light(clip: Clip, noise: Noise) -> Clip:
 
 def cleared(clip: Clip, plates: Plates) -> Clip:
     """Return a clip that shows its background, at each frame's exposure, where a mask hides it."""
-    if clip.mask is None:
-        return clip
+    return clip if clip.mask is None else shown_behind(clip, plates, clip.as_seen)
+
+
+def shown_behind(clip: Clip, plates: Plates, visible: Callable[[int, Picture], Picture]) -> Clip:
+    """Return a clip that shows its background, at each frame's exposure, where ``visible`` makes it not a number."""
     gains_of = exposures(plates)
 
     def change(number: int, picture: Picture) -> Picture:
-        visible = clip.as_seen(number, picture)
-        hidden = np.isnan(visible)
-        return np.where(hidden, plates.at(number).image * gains_of(number, small(visible)), picture)
+        shown = visible(number, picture)
+        return np.where(np.isnan(shown), plates.at(number).image * gains_of(number, small(shown)), picture)
 
     return clip.changed(change)
 

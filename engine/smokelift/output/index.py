@@ -32,7 +32,7 @@ is simulated outgrows the clip's."""
 SAME_SIZE = 1e-3
 """Relative difference below which two sizes of voxels are the same: files hold their edges with so many digits."""
 
-FILES = ("path", "image")
+FILES = ("path", "image", "mask", "strokes")
 """Keys of a scene that hold paths."""
 
 
@@ -77,7 +77,8 @@ class Index:
     provenance
         What of the result is measured, estimated, assumed and made up. Not compared either.
     sources
-        Size and content of the files that the run reads, by their table in a scene file.
+        Size and content of the files that the run reads, and frames that it takes the background from, by their table
+        in a scene file.
     frames
         The figures of every finished frame, by its number as text.
     checksums

@@ -68,7 +68,7 @@ class SequenceWriter:
     resume
         Whether to go on from the finished frames in the directory. An empty directory starts a new run.
     background : (rows, columns, 3), optional
-        An estimated background of the scene's picture, kept as `background.exr`.
+        A background of the scene's picture that was found in the clip, kept as `background.exr`.
     start_number
         Number in the names of the files of frame 1, from 0 to `MAX_START_NUMBER`.
     choices, provenance, sources

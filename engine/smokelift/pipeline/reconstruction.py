@@ -90,7 +90,7 @@ class Reconstruction:
             {**shot.settings.as_dict(), **({"parts": others} if others else {})},
             npz=npz,
             resume=resume,
-            background=shot.estimated_background,
+            background=shot.found_background,
             start_number=start_number,
             choices=[record(estimate) for estimate in shot.estimates],
             provenance=[part.as_dict() for part in provenance(shot)],

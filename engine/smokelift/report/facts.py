@@ -94,7 +94,7 @@ def _given_or_undetermined(what: str, value: str, is_given: bool, how: str) -> F
 
 
 def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
-    if given.background is not None:
+    if given.background is not None and not given.background.estimated:
         return Fact("background", "as given", "given")
     unknown = float(unknown_part(plate, shot.clip, 0).mean())
     colour = plate.image[0, 0]

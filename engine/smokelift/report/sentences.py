@@ -79,6 +79,10 @@ SENTENCES: Mapping[str, str] = {
         "there is filled in from around it, so how thick the smoke is there is undetermined. Give a clean plate as "
         "background to show it."
     ),
+    "strokes": (
+        "Strokes: of the picture {smoke:.1%} is painted as smoke, {other:.1%} as not smoke, and {behind:.1%} as "
+        "background."
+    ),
     "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is matched to the background.",
     "background of one frame": (
         "One frame alone does not show what moves: the color around it counts as background, and every other color as "
@@ -101,6 +105,10 @@ SENTENCES: Mapping[str, str] = {
         "The background may hold most of the smoke: {share:.0%} of the area where smoke may be is never free of it. "
         "Smoke that stays there all the time is missing from the result. Give a clean plate or a color as background."
     ),
+    "clearest frame": (
+        "Frame {frame} (counted from 0) shows more of the background than the others: if it is free of smoke, give it "
+        "as background."
+    ),
     "bars": (
         "Only bars beside the picture never change, so everything between them counts as smoke. Crop the bars off, or "
         "give a clean plate as background."
@@ -117,7 +125,7 @@ SENTENCES: Mapping[str, str] = {
     ),
     "no smoke before an estimated background": (
         "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is "
-        "not seen: give a clean plate or a color as background."
+        "not seen: paint strokes over the smoke, or give a clean plate or a color as background."
     ),
     "smoke of several colours": (
         "The smoke has more than one color, but one is assumed for all of it: on average its light is {degrees:.0f} "

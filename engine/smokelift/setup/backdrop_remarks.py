@@ -7,6 +7,7 @@ import numpy as np
 from smokelift.checks import Doubt, Remark
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average
 from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, sample_smoke, unknown_part
 
 BLACK = 0.001
@@ -36,9 +37,17 @@ def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:
         *backdrop_remarks(found, not given and _between_bars(samples)),
         *((Remark("background unused"),) if found.source == "alpha" and given else ()),
         *doubts(found, samples, given),
+        *_clearest(found, samples),
         *(() if change == 0 else (Remark("exposure", {"change": change}),)),
         *_possible_fire(estimate),
     )
+
+
+def _clearest(found: Backdrop, samples: SmokeSamples) -> tuple[Remark, ...]:
+    """The frame that shows most of a background of which a part is unknown, by its number in the file."""
+    if found.source != "picture" or samples.clearest is None or not samples.unknown.any():
+        return ()
+    return (Remark("clearest frame", {"frame": found.clip.first + samples.clearest}),)
 
 
 def _possible_fire(estimate: FirstEstimate) -> tuple[Doubt, ...]:
@@ -52,26 +61,37 @@ def _possible_fire(estimate: FirstEstimate) -> tuple[Doubt, ...]:
 def backdrop_remarks(found: Backdrop, bars: bool = False) -> tuple[Remark, ...]:
     """Return how a background was found, and what stands before it if it has one colour, not that of ``bars``."""
     clip, plates = found.clip, found.plates
+    painted = _painted(found)
     if found.source == "alpha":
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
     if found.source == "given":
-        return ()
+        return painted
     if found.source == "picture":
         unknown = float(unknown_part(plates, clip, 0).mean())
-        return (Remark("background partly seen", {"unknown": unknown}) if unknown else Remark("background seen"),)
+        seen = Remark("background partly seen", {"unknown": unknown}) if unknown else Remark("background seen")
+        return seen, *painted
     image = plates.at(0).image
     colour = image[0, 0]
     if not (image == colour).all():
         colour = np.median(image.reshape(-1, 3), axis=0)
     red, green, blue = map(float, colour)
     if bars or found.source == "black for want of a picture":
-        return (Remark("background assumed", {"color": (red, green, blue)}),)
+        return Remark("background assumed", {"color": (red, green, blue)}), *painted
     other = float((image != colour).any(-1).mean())
     black = max(red, green, blue) < BLACK
     return (
         Remark("black background") if black else Remark("background of one colour", {"color": (red, green, blue)}),
         *((Remark("background with objects", {"share": other}),) if other else ()),
+        *painted,
     )
+
+
+def _painted(found: Backdrop) -> tuple[Remark, ...]:
+    """That strokes were used, and how much of the picture each covers."""
+    if found.strokes is None:
+        return ()
+    strokes = {"smoke": found.strokes.smoke, "other": found.strokes.other, "behind": found.strokes.behind}
+    return (Remark("strokes", {name: float(painted.mean()) for name, painted in strokes.items()}),)
 
 
 def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, ...]:
@@ -92,7 +112,10 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
         said.append(Doubt("background of few frames", {"frames": found.frames}))
     if found.quantiser is not None and found.quantiser >= COARSE_QUANTISER:
         said.append(Doubt("strong compression", {"quantiser": found.quantiser}))
-    in_plate = samples.unknown.sum() / max((samples.unknown | samples.covered).sum(), 1)
+    unknown = samples.unknown
+    if found.strokes is not None:  # what is painted as smoke is none of the background
+        unknown = unknown & (area_average(found.strokes.smoke, *unknown.shape[::-1]) < MOSTLY)
+    in_plate = unknown.sum() / max((unknown | samples.covered).sum(), 1)
     if in_plate >= MOSTLY:
         said.append(Doubt("smoke in the background", {"share": float(in_plate)}))
     if not given and _between_bars(samples):

@@ -26,6 +26,11 @@ to a voxel of a draft."""
 UNKNOWN = 0.5
 """Confidence of a plate below which a background is unknown: it is as likely smoke as not."""
 
+CLEARER = 0.5
+"""Area of smoke before a known background in a frame, over the median of all examined ones, below which the frame has
+much less smoke than most: set by hand. Before an unknown background a frame without smoke differs from the plate, too.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class SmokeSamples:
@@ -47,6 +52,8 @@ class SmokeSamples:
         Sums of `seen_texture` for each sample with smoke.
     amounts
         Numbers of smoke pixels of these samples, in the order of ``colours``.
+    over_known
+        Numbers of smoke pixels before a known background in each sample, in the order of ``gains``.
     """
 
     scale: float
@@ -58,11 +65,20 @@ class SmokeSamples:
     gains: Mapping[int, NDArray[np.float32]]
     textures: tuple[NDArray[np.float64], ...] = ()
     amounts: tuple[int, ...] = ()
+    over_known: tuple[int, ...] = ()
 
     @property
     def typical(self) -> tuple[int, ...]:
         """Numbers of the frames that models are tried on: those with the most smoke and with the median amount."""
         return tuple(dict.fromkeys((*self.smoky[:1], *self.smoky[len(self.smoky) // 2 :][:1])))
+
+    @property
+    def clearest(self) -> int | None:
+        """Number of the frame with the least smoke before a known background; None if none is much clearer."""
+        if not self.over_known:
+            return None
+        number, least = min(zip(self.gains, self.over_known, strict=True), key=lambda pair: pair[1])
+        return number if least < CLEARER * np.median(self.over_known) else None
 
     @property
     def exposure(self) -> float:
@@ -136,7 +152,7 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = (max(1, round(side / scale)) for side in (width, height))
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
-    colours, behind, textures = [], [], []
+    colours, behind, textures, over_known = [], [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
@@ -148,7 +164,9 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
         picture = seen / gains[number]
         mask = matte(picture, plate).mask
         covered |= mask
-        unknown |= unknown_part(reduced, clip, number)
+        hidden = unknown_part(reduced, clip, number)
+        unknown |= hidden
+        over_known.append(int((mask & ~hidden).sum()))
         colours.append(picture[mask])
         behind.append(plate.image[mask])
         if mask.any():
@@ -157,4 +175,4 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
     radiance = np.concatenate(colours), np.concatenate(behind)
     found = tuple(textures), tuple(amounts.values())
-    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, *found)
+    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, *found, tuple(over_known))

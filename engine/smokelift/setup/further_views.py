@@ -94,7 +94,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         )
     camera, background = fitting(view.camera, opened), view.background
     if background is None and scene.background.color is not None:
-        background = scene.background
+        background = replace(scene.background, strokes=None)
     found = find_backdrop(opened, camera, background)
     try:
         shown = ShotView.before(scene.domain, evened(found.clip, found.plates), camera, found.plates)

@@ -21,7 +21,7 @@ from smokelift.scene import Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_remarks import first_remarks
 from smokelift.setup.coarse import coarse_frame, coarse_frames
 from smokelift.setup.estimate import UNDETERMINED, Estimate
-from smokelift.setup.first_estimate import first_estimate
+from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.illumination import find_scattering, first_light, light_doubts
@@ -108,7 +108,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         settings=settings,
         remarks=(
             *clip.remarks(),
-            *first_remarks(estimate, scene.background is not None),
+            *first_remarks(estimate, _given(scene.background, estimate)),
             *geometry.remarks,
             *medium_remarks,
             *light_remarks,
@@ -176,6 +176,11 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
     figures = {"voxels": float(longest)}
     return Estimate(what, figures, what=what, value=coarsening, source="measured", tolerance=finest)
+
+
+def _given(background: Background | None, estimate: FirstEstimate) -> bool:
+    """Whether a scene says what is behind the smoke; strokes do where an alpha channel leaves nothing to estimate."""
+    return background is not None and (not background.estimated or estimate.found.source == "alpha")
 
 
 def _check(length: int, scene: Scene, settings: Settings) -> None:

@@ -85,7 +85,7 @@ class Shot:
     Attributes
     ----------
     scene
-        With the camera of the clip's full pictures. Its background stays empty where it was estimated.
+        With the camera of the clip's full pictures. Its background names no picture where it was found in the clip.
     optics
         How light travels through the domain.
     views
@@ -124,10 +124,11 @@ class Shot:
         return self.views[0].clip
 
     @property
-    def estimated_background(self) -> Image | None:
-        """Full picture (rows, columns, 3) behind the smoke; None where the scene has one, or one for every frame."""
-        plates = self.views[0].plates
-        return plates.image if self.scene.background.estimated and isinstance(plates, Plate) else None
+    def found_background(self) -> Image | None:
+        """Full picture (rows, columns, 3) behind the smoke; None where the scene has it, or one for every frame."""
+        plates, background = self.views[0].plates, self.scene.background
+        given = background.image is not None or background.color is not None
+        return plates.image if isinstance(plates, Plate) and (not given or background.strokes is not None) else None
 
     @property
     def inlets(self) -> tuple[Inlet, ...]:

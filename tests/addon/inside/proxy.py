@@ -8,7 +8,7 @@ import pytest
 
 from addon import proxy, volume
 from addon.take import Take
-from conftest import FRAMES, made, rendered
+from conftest import FRAMES, changed, made, rendered
 from smokelift.output.proxy_files import write_proxy
 from smokelift.scene import Domain
 from tests.example_shot import add_camera, smoke
@@ -77,6 +77,28 @@ def test_it_has_a_switch(obj, tmp_path) -> None:
     proxy.modifier_of(obj).show_viewport = True
     assert in_viewport(obj, 3) == "proxy_0003.vdb"
     assert proxy.in_viewport(obj) == proxy.proxy_of(obj)
+
+
+@pytest.mark.parametrize("speed", ["FRAMES", "REAL"])
+def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, speed) -> None:
+    """From the first used frame of the clip's own numbers, say; the frames themselves count from 1."""
+    take = with_proxy(tmp_path)
+    for kind in ("smoke", "proxy"):
+        for n in range(FRAMES, 0, -1):
+            (take.directory / f"{kind}_{n:04d}.vdb").rename(take.directory / f"{kind}_{n + 1000}.vdb")
+    with changed(take) as index:
+        index["start_number"] = 1001
+    scene.render.fps, smoke(scene).smokelift.speed = 24, speed
+    obj = volume.show(smoke(scene), take)
+    assert [in_viewport(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_1001.vdb", "proxy_1003.vdb", ""]
+    proxy.modifier_of(obj).show_viewport = False
+    assert [in_viewport(obj, frame) for frame in (1, 3)] == ["smoke_1001.vdb", "smoke_1003.vdb"]
+    assert volume.shown_numbers(obj) == list(range(1, FRAMES + 1))
+    assert volume.number_at(obj, 3) == 3
+    scene.render.fps = 48
+    volume.keep_step()
+    later = "smoke_1002.vdb" if speed == "REAL" else "smoke_1003.vdb"
+    assert in_viewport(obj, 3) == later
 
 
 def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:

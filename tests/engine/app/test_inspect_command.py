@@ -11,7 +11,7 @@ from command_line import QUICK, command, events, refused
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
-from smokelift.scene import Scene
+from smokelift.scene import Background, Scene
 from smokelift.setup.settings import QUALITIES
 
 
@@ -121,6 +121,10 @@ def test_a_background_that_is_a_picture_is_found_again(tmp_path) -> None:
     words = ("--frames", "6:6", "--detail", "0", *QUICK)
     assert command("inspect", clip, "--write", scene, *words) == 0
     assert Scene.load(scene).background is None
+    given = tmp_path / "given.toml"
+    given.write_text(f'[clip]\npath = "{clip}"\n[background]\nframe = 15\n', encoding="utf-8")
+    assert command("inspect", given, "--write", tmp_path / "found.toml", *words) == 0
+    assert Scene.load(tmp_path / "found.toml").background == Background(frame=(15,))
     text = scene.read_text(encoding="utf-8")
     assert "of it unknown (estimated)" in text
     assert "scene_background.exr shows it" in text

@@ -234,14 +234,24 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, cou
 
 
 @pytest.mark.parametrize(
-    ("replaced", "file"), [("clip", "clip/frame_0004.png"), ("background", "plate.png"), ("mask", "mask.png")]
+    ("replaced", "file"),
+    [
+        ("clip", "clip/frame_0004.png"),
+        ("background", "plate.png"),
+        ("mask", "mask.png"),
+        ("strokes", "strokes.png"),
+    ],
 )
 def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path, replaced, file) -> None:
     scene = plume.write(tmp_path / "clip", plume.densities)
     write_image(tmp_path / "plate.png", np.zeros((56, 40, 3)))
     write_image(tmp_path / "mask.png", np.ones((56, 40, 3)))
+    behind = np.zeros((56, 40, 3))
+    behind[:4, :4, 2] = 1
+    write_image(tmp_path / "strokes.png", behind)
     clip = replace(scene.clip, mask=tmp_path / "mask.png")
-    scene = replace(scene, clip=clip, background=Background(image=tmp_path / "plate.png"))
+    background = Background(image=tmp_path / "plate.png", strokes=tmp_path / "strokes.png")
+    scene = replace(scene, clip=clip, background=background)
     cut_off(scene, draft, tmp_path / "out", 2)
     changed = tmp_path / file
     picture = read_image(changed)
@@ -266,6 +276,20 @@ def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> No
     for frame in whole:
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
     assert render(sequence.density(4), sequence.scene).shape == (56, 40, 3)
+
+
+def test_frames_that_are_the_background_are_kept_as_its_picture(plume, draft, tmp_path) -> None:
+    """The sequence shows it, and goes on with no other frames."""
+    clear = np.zeros_like(plume.densities[0])
+    scene = plume.write(tmp_path / "clip", [clear, clear, *plume.densities])
+    scene = replace(scene, background=Background(frame=0))
+    cut_off(scene, draft, tmp_path / "out", 2)
+    sequence = Sequence.open(tmp_path / "out")
+    assert sequence.scene.background == Background(image=tmp_path / "out" / "background.exr")
+    with Clip.open(scene.clip) as opened:
+        np.testing.assert_allclose(read_image(sequence.scene.background.image), opened.frame(0), atol=1e-3)
+    with pytest.raises(SequenceError, match=r"sources\.background\.frame\[0\] was 0 and is now 1"):
+        frames_written(replace(scene, background=Background(frame=1)), draft, tmp_path / "out", resume=True)
 
 
 def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.checks import Doubt
+from smokelift.checks import Doubt, Remark
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
+from smokelift.footage.strokes import Strokes
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, first_remarks
@@ -61,6 +62,32 @@ def test_smoke_that_may_be_in_the_plate_is_said(grey, unknown_rows, said) -> Non
     unknown[:unknown_rows] = True
     found = doubts(grey, replace(SEEN, unknown=unknown), given=False)
     assert found == (Doubt("smoke in the background", {"share": 0.75}),) * said
+
+
+def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
+    """Smoke that flickers in its place, with a puff that rises beside it, and none of them in one frame."""
+    random = np.random.default_rng(0)
+    tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
+    across = np.abs(np.arange(56) - 40)
+    for n in range(12):
+        smoke = np.where(across < 6, random.uniform(0.4, 0.9), np.roll(puff(2 * n + 1), -16, axis=1)) * (n != 5)
+        write_image(tmp_path / f"frame_{n:02d}.png", tiles * (1 - smoke) + 0.6 * smoke)
+    with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(2, 11)) as clip:
+        said = first_remarks(first_estimate(clip, None, None), given=False)
+    assert Remark("clearest frame", {"frame": 5}) in said
+    with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(6, 11)) as clip:
+        said = first_remarks(first_estimate(clip, None, None), given=False)
+    assert "clearest frame" not in [remark.kind for remark in said]
+
+
+def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(grey) -> None:
+    unknown = np.zeros_like(COVERED)
+    unknown[:60] = True
+    smoke, nothing = np.zeros((2, 24, 32), np.bool_)
+    smoke[:12] = True
+    found = replace(grey, strokes=Strokes(smoke, nothing, ~smoke))
+    assert backdrop_remarks(found)[-1] == Remark("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
+    assert doubts(found, replace(SEEN, unknown=unknown), given=False) == ()
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:

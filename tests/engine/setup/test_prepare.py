@@ -168,7 +168,7 @@ def test_a_frame_that_shows_nothing_of_the_domain(tracked, draft) -> None:
 def test_one_colour_behind_a_moving_camera_is_found(tracked, draft) -> None:
     shot = shot_of(replace(tracked, background=None), draft)
     assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
-    assert shot.estimated_background is None
+    assert shot.found_background is None
     assert "black background" in [remark.kind for remark in shot.remarks]
 
 
@@ -180,6 +180,8 @@ def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None
     scene = replace(tracked, clip=ClipSource(tmp_path / "wall_#.png", fps=24), background=None)
     with pytest.raises(ValueError, match="give a clean plate with a picture for every frame"):
         shot_of(scene, draft)
+    with pytest.raises(ValueError, match="give a clean plate with a picture for every frame"):
+        shot_of(replace(scene, background=Background(frame=0)), draft)
     write_image(tmp_path / "plate.png", stripes)
     with pytest.raises(ValueError, match=r"plate\.png: has 1 of the frames 0 to 4 that are needed; give a clean plate"):
         shot_of(replace(scene, background=Background(image=tmp_path / "plate.png")), draft)

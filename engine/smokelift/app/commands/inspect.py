@@ -111,7 +111,8 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, .
     picture does not say which of its parts are unknown or how wrong they may be. It is written beside the file for
     those who want to mend it. A file that is there already is a ValueError.
     """
-    scene, plate = Scene(**vars(shot.scene)), shot.estimated_background
+    scene, given = Scene(**vars(shot.scene)), shot.scene.background
+    plate = shot.found_background if given.estimated else None
     picture = path.with_name(f"{path.stem}_background.exr")
     said = [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"]
     colour = None if plate is None else plate[0, 0]
@@ -122,10 +123,10 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, .
             raise ValueError(f"{file}: is there already; nothing was overwritten, give another name.")
     if colour is not None and one_colour:
         red, green, blue = map(float, colour)
-        scene = replace(scene, background=Background(color=(red, green, blue)))
+        scene = replace(scene, background=Background(color=(red, green, blue), strokes=given.strokes))
     elif plate is not None:
         write_image(picture, plate, half=False)
-        scene = replace(scene, background=None)
+        scene = replace(scene, background=None if given.strokes is None else given)
         said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it as background.")
     scene.save(path, said)
     return files

@@ -79,10 +79,11 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         )
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
+        given = scene.background is not None and not scene.background.estimated
         raise ValueError(
             f"No smoke found: nothing differs from the background by more than the clip's noise does, so all frames "
             f"in {options.out} are empty. "
-            f"{sentence(what_helps(shot.clip, scene.background is not None))}"
+            f"{sentence(what_helps(shot.clip, given))}"
         )
     for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)

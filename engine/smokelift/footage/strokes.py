@@ -1,0 +1,105 @@
+"""Strokes painted over one frame: where smoke is, where none ever is, and where the background shows as it is.
+
+They add to what the clip shows, wherever the background came from. What is smoke is unknown of the plate, which is
+continued there from around it. What is not smoke, and what is behind it, is known: the clip's own median over time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from smokelift.checks.array_types import Mask
+from smokelift.footage.behind_smoke import continuation_errors, push_pull
+from smokelift.footage.clip import Clip
+from smokelift.footage.exposure import small
+from smokelift.footage.frame_source import ClipError
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_layer, srgb_to_linear
+from smokelift.footage.plate import Plate, exposures, shown_behind
+
+PAINTED = 0.5
+"""Alpha, difference of a stroke's channels, and fraction of a pixel's area, from which on a pixel is painted: nearer to
+a pure color than to none."""
+
+MEDIAN_FRAMES = 15
+"""Number of frames whose median is the background: what smoke passes in fewer than half of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Where a picture is painted green (``smoke``), red (``other``) and blue (``behind``), (rows, columns) each."""
+
+    smoke: Mask
+    other: Mask
+    behind: Mask
+
+    @staticmethod
+    def read(path: Path, size: tuple[int, int]) -> Strokes:
+        """Read strokes over a picture of a size (width, height).
+
+        ImageError is raised if the file cannot be read, ClipError if it has another shape, or no stroke.
+        """
+        values, alpha = read_layer(path, "linear")
+        (width, height), (rows, columns) = size, values.shape[:2]
+        # either may be a resized copy, whose sides are right to a pixel
+        if abs(columns * height - rows * width) > columns + rows + width + height:
+            raise ClipError(
+                f"{path}: these strokes are {columns} x {rows} pixels, another shape than the clip's {width} x "
+                f"{height}; paint them over a frame of the clip."
+            )
+        opaque = np.ones((rows, columns), np.bool_) if alpha is None else alpha >= PAINTED
+        if not opaque.any():
+            raise ClipError(f"{path}: nothing is painted there; paint strokes, or leave them out.")
+        painted = opaque & (np.ptp(values, axis=-1) >= PAINTED)
+        if not painted.any():
+            raise ClipError(f"{path}: no stroke is green (smoke), red (not smoke) or blue (behind); use pure colors.")
+        nearest = values.argmax(-1)
+        red, green, blue = (area_average(painted & (nearest == n), width, height) >= PAINTED for n in range(3))
+        return Strokes(green, red, blue)
+
+    @property
+    def all(self) -> Mask:
+        """Where anything is painted."""
+        return self.smoke | self.other | self.behind
+
+
+def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> Plate:
+    """Return a plate with what strokes say of it; behind smoke before ``one_color`` is that color for certain.
+
+    ClipError is raised if a frame cannot be read, or if nothing is left that is not smoke.
+    """
+    image, confidence, seen = plate.image.copy(), plate.confidence.copy(), strokes.other | strokes.behind
+    if seen.any():
+        image[seen], confidence[seen] = _median(clip, plate, seen), 1
+    if one_color:
+        image[strokes.smoke] = np.median(plate.image.reshape(-1, 3), axis=0)
+        return replace(plate, image=image, confidence=confidence)
+    confidence[strokes.smoke] = 0
+    if not confidence.any():
+        raise ClipError("The strokes leave nothing that is not smoke; leave free, or paint blue, what is behind it.")
+    # a stroke says nothing of what is unknown elsewhere, which may have detail of its own
+    patches, _ = ndimage.label((confidence == 0) | seen, structure=np.ones((3, 3)))
+    unknown = (confidence == 0) & np.isin(patches, patches[strokes.all])
+    image[unknown] = srgb_to_linear(push_pull(linear_to_srgb(image), confidence))[unknown]
+    errors = plate.errors if plate.errors.any() else continuation_errors(image, confidence > 0)
+    return Plate(image, confidence, plate.noise, errors)
+
+
+def without_others(strokes: Strokes, clip: Clip, plate: Plate) -> Clip:
+    """Return a clip that shows its plate, at each frame's exposure, where it is painted as no smoke."""
+    if not strokes.other.any():
+        return clip
+    other = strokes.other[..., None]
+    return shown_behind(clip, plate, lambda _, picture: np.where(other, np.float32(np.nan), picture))
+
+
+def _median(clip: Clip, plate: Plate, where: Mask) -> Picture:
+    """The median (n, 3) over time of pixels, at the plate's exposure."""
+    gains_of, shown = exposures(plate), []
+    for number in clip.spread(MEDIAN_FRAMES):
+        picture = clip.frame(number)
+        shown.append(picture[where] / gains_of(number, small(clip.as_seen(number, picture))))
+    return np.asarray(np.median(shown, axis=0), np.float32)

@@ -1,0 +1,171 @@
+"""What strokes over a frame say of the background and of the smoke."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
+from PIL import Image
+
+from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
+from smokelift.footage.images import ImageError, srgb_to_linear
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plate
+from smokelift.output.images import write_image
+from smokelift.scene import Background
+
+ROWS, COLUMNS = np.mgrid[:HEIGHT, :WIDTH]
+GRADIENT = srgb_to_linear(np.stack([0.2 + 0.3 * COLUMNS / WIDTH, 0.25 + 0.2 * ROWS / HEIGHT, 0 * ROWS + 0.4], -1))
+PLUME = 0.6 * np.clip(1.8 - np.abs(COLUMNS - 28) / 5, 0, 1) * (ROWS > 12)
+"""Opacity of smoke that stands still."""
+
+GREEN, RED, BLUE = (0, 255, 0, 255), (255, 0, 0, 255), (0, 0, 255, 255)
+
+
+def strokes(folder: Path, *painted: tuple[np.ndarray, tuple[int, ...]]) -> Path:
+    """Paint over nothing."""
+    pixels = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
+    for where, color in painted:
+        pixels[where] = color
+    Image.fromarray(pixels).save(folder / "strokes.png")
+    return folder / "strokes.png"
+
+
+def painted(clip: Clip, *lines: tuple[np.ndarray, tuple[int, ...]], **given: object) -> tuple[Backdrop, Plate]:
+    found = find_backdrop(clip, None, Background(strokes=strokes(clip.path.parent, *lines), **given))
+    assert isinstance(found.plates, Plate)
+    return found, found.plates
+
+
+def opacity_errors(found: Backdrop, smoke: np.ndarray, truth: np.ndarray, number: int = 12) -> float:
+    """The root mean square error of the opacity of white smoke, by what it changes of the plate that was found."""
+    plate = found.plates.at(number).image
+    shown = ((found.clip.frame(number) - plate) / (1 - plate)).mean(-1)
+    return float(np.sqrt(np.mean(np.square(shown - smoke)[truth])))
+
+
+def test_one_green_stroke_finds_smoke_that_stands_still(tmp_path: Path) -> None:
+    """Without it the plume is the plate's, and none of the smoke is found."""
+    clip, there = film(tmp_path, GRADIENT, lambda _: PLUME, 1.0), PLUME > 0
+    without = find_backdrop(clip, None, None)
+    found, plate = painted(clip, (there, GREEN))
+    assert opacity_errors(without, PLUME, there) > 0.4
+    assert opacity_errors(found, PLUME, there) < 0.01
+    assert (plate.confidence == ~there).all()
+    assert codes_apart(plate.image, GRADIENT).max() < 5
+    assert 0.001 < np.sqrt(plate.errors[0, 0]) < 0.05
+    thick = PLUME > 0.3
+    assert matte(without.clip.frame(5), without.plates.at(0)).mask[thick].mean() < 0.01
+    assert matte(found.clip.frame(5), plate).mask[thick].all()
+
+
+def test_strokes_of_another_size_are_scaled(tmp_path: Path) -> None:
+    clip = film(tmp_path, GRADIENT, lambda _: PLUME, 1.0)
+    drawn = strokes(tmp_path, (PLUME > 0, GREEN))
+    with Image.open(drawn) as picture:
+        picture.resize((WIDTH * 3, HEIGHT * 3)).save(drawn)
+    found = find_backdrop(clip, None, Background(strokes=drawn))
+    assert ((found.plates.at(0).confidence == 0) == (PLUME > 0)).all()
+
+
+def test_nothing_that_is_painted_red_is_smoke(tmp_path: Path) -> None:
+    """A ball that swings before a wall, beside a puff that rises; the clip's exposure stays."""
+    tiles, box = wall(0.2, 0.5), (COLUMNS > 40) & (ROWS < 30)
+
+    def opacity(n: int) -> np.ndarray:
+        ball = np.hypot(ROWS - 15, COLUMNS - 48 - 3 * np.sin(n)) < 5
+        return np.where(box, ball, np.roll(puff(n), -14, axis=1))
+
+    clip = film(tmp_path, tiles, opacity, 0.8)
+    found, plate = painted(clip, (box, RED))
+    assert (plate.confidence[box] == 1).all()
+    median = np.median([clip.frame(number) for number in clip.spread(15)], axis=0)
+    assert codes_apart(plate.image, median)[box].max() < 0.1
+    without = find_backdrop(clip, None, None)
+    for number in (3, 12):
+        masks = [matte(each.clip.frame(number), each.plates.at(0)).mask for each in (found, without)]
+        assert not masks[0][box].any() and masks[1][box].any()
+        np.testing.assert_array_equal(masks[0][:, :28], masks[1][:, :28])
+
+
+def test_what_is_painted_blue_is_behind_and_continued(tmp_path: Path) -> None:
+    """Smoke that stands before a bright stripe of its width, and leaves a gap in most of the frames."""
+    stripe = GRADIENT + 0.2 * np.exp(-(((COLUMNS - 28) / 6) ** 2))[..., None]
+    gap = (PLUME > 0) & (ROWS > 30) & (ROWS < 40)
+    clip = film(tmp_path, stripe, lambda n: np.where(gap & (n % 5 > 0), 0, PLUME), 1.0)
+    green = (PLUME > 0) & ~gap
+    _, alone = painted(clip, (PLUME > 0, GREEN))
+    _, plate = painted(clip, (green, GREEN), (gap, BLUE))
+    assert (plate.confidence[gap] == 1).all() and (plate.confidence[green] == 0).all()
+    assert codes_apart(plate.image, stripe)[gap].max() < 3
+    near = green & (np.abs(ROWS - 35) < 9)
+    assert codes_apart(plate.image, stripe)[near].mean() < 0.6 * codes_apart(alone.image, stripe)[near].mean()
+
+
+def test_a_given_plate_is_changed_in_the_strokes_alone(tmp_path: Path) -> None:
+    clip = film(tmp_path, GRADIENT, puff, 1.0)
+    moved = (ROWS < 12) & (COLUMNS < 12)
+    plate = np.where(moved[..., None], 0.9, GRADIENT)
+    write_image(tmp_path / "plate.exr", plate, half=False)
+    found, mended = painted(clip, (moved, BLUE), image=tmp_path / "plate.exr")
+    assert codes_apart(mended.image, GRADIENT)[moved].max() < 2
+    np.testing.assert_allclose(mended.image[~moved], plate[~moved], rtol=1e-6)
+    assert found.source == "given" and (mended.confidence == 1).all()
+
+
+def test_a_stroke_says_nothing_of_what_is_unknown_elsewhere(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    flicker = [random.uniform(0.4, 0.9) for _ in range(COUNT)]
+    restless = np.abs(COLUMNS - 10) < 5
+    clip = film(tmp_path, wall(0.2, 0.5), lambda n: np.where(restless, flicker[n], 0), 0.7)
+    before = plate_of(clip)
+    unknown = before.confidence == 0
+    assert unknown[:, 8:12].all() and not unknown[:, 30:].any()
+    _, plate = painted(clip, ((COLUMNS > 40) & (ROWS > 40), GREEN))
+    np.testing.assert_array_equal(plate.image[unknown], before.image[unknown])
+
+
+@pytest.mark.parametrize("given", [None, (0.0, 0.0, 0.0)])
+def test_green_before_black_is_before_black(tmp_path: Path, given: tuple[float, ...] | None) -> None:
+    """Also where smoke stands still, which is an object before black without the stroke."""
+    clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3)), lambda n: np.where(ROWS > 60, PLUME, puff(n)), 0.6, noise=0)
+    _, plate = painted(clip, (np.ones((HEIGHT, WIDTH), np.bool_), GREEN), color=given)
+    assert (plate.confidence == 1).all() and (plate.image == plate.image[0, 0]).all()
+    assert plate.image.max() < 1e-3
+
+
+def test_an_alpha_channel_leaves_nothing_to_strokes(tmp_path: Path) -> None:
+    for n in range(4):
+        grey = np.full((HEIGHT, WIDTH), 128)
+        pixels = np.stack([grey, grey, grey, 255 * PLUME], -1).astype(np.uint8)
+        Image.fromarray(pixels).save(tmp_path / f"smoke_{n}.png")
+    with Clip.open(tmp_path / "smoke_#.png", fps=24) as clip:
+        found = find_backdrop(clip, None, Background(strokes=tmp_path / "no.png"))
+    assert (found.source, found.strokes) == ("alpha", None)
+
+
+def refusal(clip: Clip, file: Path) -> str:
+    with pytest.raises((ClipError, ImageError)) as caught:
+        find_backdrop(clip, None, Background(strokes=file))
+    return str(caught.value)
+
+
+def test_strokes_that_say_nothing_are_refused(tmp_path: Path) -> None:
+    clip = film(tmp_path, GRADIENT, puff, 1.0)
+    assert "no such file" in refusal(clip, tmp_path / "no.png")
+    assert "nothing is painted" in refusal(clip, strokes(tmp_path))
+    white = strokes(tmp_path, (ROWS < 20, (255, 255, 255, 255)))
+    assert "no stroke is green" in refusal(clip, white)
+    with Image.open(white) as picture:
+        picture.resize((WIDTH * 2, HEIGHT)).save(white)
+    assert f"{2 * WIDTH} x {HEIGHT} pixels, another shape" in refusal(clip, white)
+    assert "leave nothing that is not smoke" in refusal(clip, strokes(tmp_path, (ROWS >= 0, GREEN)))
+
+
+def test_strokes_need_a_plate_that_stays(tmp_path: Path) -> None:
+    clip = film(tmp_path, GRADIENT, puff, 1.0)
+    drawn = strokes(tmp_path, (PLUME > 0, GREEN))
+    with pytest.raises(ValueError, match="painted over one frame"):
+        find_backdrop(clip, None, Background(image=clip.path, strokes=drawn))
