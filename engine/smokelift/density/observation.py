@@ -48,6 +48,9 @@ WHITE = 1.5
 brighter: with half of it smoke of the plate's own brightness is not fitted, with twice of it errors of T are fitted
 rather than the picture (docs/experiments/extraction.md)."""
 
+USEFUL_DEVIATION = 0.2
+"""Deviation of T beyond which it shows little: smoke is clear air or not, by one and a half of it to either side."""
+
 CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.98, 2.33
 """Quantile of the opacity that is found in clear air, and the deviations of normal noise's size there."""
 
@@ -327,7 +330,7 @@ def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Ima
     color = np.average(plate.image, axis=(0, 1), weights=known)
     opacity = 1 - element.transmittance
     sent = float((opacity * channel_mean(element.radiance)).sum()) / max(float(opacity.sum()), MIN_WEIGHT)
-    white = np.full_like(opacity, WHITE * max(sent, float(color.mean())))
+    white = WHITE * max(sent, float(color.mean())) / np.hypot(1, element.deviation / USEFUL_DEVIATION)
     noise = noise_at(picture, plate)
     image = np.dstack([element.over(color), white * element.transmittance])
     background = np.dstack([np.broadcast_to(color, noise.shape), white])
