@@ -51,6 +51,10 @@ ROUNDS, ITERATIONS = 6, 40
 SOURCE_ROUNDS = 4
 """Times that the usual source radiance is found from the smoke, and that from it."""
 
+OWN_LIGHT, PRIOR_SMOKE = 8, 10.0
+"""Power of the fraction of a cell's light that is the smoke's own by which the cell shows the smoke's color: half at
+.92; and the number of opaque cells that the color given first counts as."""
+
 BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
 """Percentile of a picture's brightness that the usual source radiance starts from, and its lower bound: a picture
 darker than that shows no light in eight bits."""
@@ -131,8 +135,9 @@ def source_of(fields: Picture, source: Picture) -> Picture:
 def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size: tuple[int, int]) -> Picture:
     """Return the usual J (3,) of a clip's smoke from some of its pictures: the mean, by opacity squared, of ln J.
 
-    Its color (3,) is given, its brightness is first, and at most, that of the brightest pixels: where smoke is thin
-    everywhere, nothing shows how much brighter it is. The pictures are reduced to a ``size`` (columns, rows).
+    Its color (3,) is first the given one, then that of cells in which hardly any light is the plate's. Its brightness
+    is first, and at most, that of the brightest pixels: where smoke is thin everywhere, nothing shows how much brighter
+    it is. The pictures are reduced to a ``size`` (columns, rows).
     """
     seen = [_Cells.of(picture, plate, size) for picture, plate in pictures]
     percentile = np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen])
@@ -140,12 +145,19 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size
     source = brightest
     for _ in range(SOURCE_ROUNDS):
         total = weights = 0.0
+        shown = np.asarray(PRIOR_SMOKE * source, np.float64)
         for cells in seen:
             fields, _, weight = _extracted(cells, source)
-            solid = weight * np.square(fields[..., 0], dtype=np.float64)
+            opacity = fields[..., 0]
+            solid = weight * np.square(opacity, dtype=np.float64)
             total += float((solid * np.log(source_of(fields, source) / source).mean(-1)).sum())
             weights += float(solid.sum())
-        source = np.minimum(source * np.float32(np.exp(total / max(weights, 1e-12))), brightest)
+            sent = cells.seen - (1 - opacity[..., None]) * cells.moments[..., :3]
+            own = np.clip(channel_mean(sent) / np.maximum(channel_mean(cells.seen), MIN_SOURCE), 0, 1)
+            shown += np.einsum("ij,ijc->c", opacity * own**OWN_LIGHT, sent)
+        color = np.maximum(shown, 0) / shown.mean()
+        brightness = source.mean() * np.exp(total / max(weights, 1e-12))
+        source = np.asarray(color * min(brightness, brightest.mean()), np.float32)
     return source
 
 
