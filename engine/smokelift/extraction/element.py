@@ -138,7 +138,8 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size
     It is first of a ``color`` (3,), and as bright as the brightest pixels. The pictures are reduced to a ``size``
     (columns, rows).
     """
-    seen = [_Cells.of(picture, plate, size) for picture, plate in pictures]
+    finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail tells as much as in an element, if it is in fewer cells
+    seen = [_Cells.of(picture, plate, size, finer) for picture, plate in pictures]
     brightest = float(np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
     source = _bounded(np.asarray(color, np.float64) / np.mean(color) * max(brightest, MIN_SOURCE))
     for _ in range(SOURCE_ROUNDS):
@@ -193,11 +194,11 @@ class _Cells:
     pixels: float
 
     @staticmethod
-    def of(picture: Picture, plate: Plate, size: tuple[int, int]) -> _Cells:
-        """Average a picture and its plate down to a size (columns, rows)."""
+    def of(picture: Picture, plate: Plate, size: tuple[int, int], pixels: float = FINER) -> _Cells:
+        """Average a picture and its plate down to a size (columns, rows), by so many pixels along a cell."""
         columns, rows = size
         whole = picture.shape[1::-1]
-        finer = [min(round(FINER * count), pixels) for count, pixels in zip(size, whole, strict=True)]
+        finer = [min(round(pixels * count), most) for count, most in zip(size, whole, strict=True)]
         picture = area_average(picture, *finer)
         plate = plate.through(lambda part: area_average(part, *finer), whole[0] * whole[1] / (finer[0] * finer[1]))
         change = picture - plate.image
