@@ -1,11 +1,11 @@
-"""What is found of baked smoke whose colour and thickness are known, before several backgrounds.
+"""What is found of baked smoke whose colour and source radiance are known, before several backgrounds.
 
-    python -m benchmarks.background.probes colour | thickness SCENES/plume-1 SCENES/jet-2 ... [--every 2]
+    python -m benchmarks.background.probes colour | source SCENES/plume-1 SCENES/jet-2 ... [--every 2]
 
 A scene is a folder that `benchmarks.truth.picture` filled. Its radiance is multiplied by the colours of light and
 smoke, as single scattering does. *Colour*: scenes where the smoke's own colour was found, and the mean angle between it
-and the true one in degrees. *Thickness*: source radiance over the true one, as texture shows it, as it is taken, and as
-it would be without texture; thin smoke has 0.3 of its optical depth.
+and the true one in degrees. *Source*: source radiance over the true one, as the extraction finds it, and as the smoke's
+brightness alone would show it; thin smoke has 0.3 of its optical depth.
 """
 
 import argparse
@@ -22,9 +22,8 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
 from smokelift.setup.estimate import UNDETERMINED
-from smokelift.setup.first_estimate import sample_smoke
+from smokelift.setup.first_estimate import picture_source, sample_smoke
 from smokelift.setup.medium import smoke_colour, source_radiance
-from smokelift.setup.thickness import smoke_thickness
 
 Plates = Mapping[str, Picture]
 
@@ -101,8 +100,8 @@ def _filmed(smoke: Smoke, colour: Doubles, plate: Picture) -> Clip:
     return filmed(np.clip(exposed(pictures, np.ones(len(pictures))), 0, 1), "baked")
 
 
-def _thickness(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
-    yield ["scene", "smoke", "behind", "found", "taken", "without"]
+def _source(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
+    yield ["scene", "smoke", "behind", "extracted", "by brightness"]
     for name, baked in smokes.items():
         for kind, share in (("as baked", 1.0), ("thin", THIN)):
             smoke = baked.thinned(share)
@@ -112,17 +111,16 @@ def _thickness(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str
 
 
 def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
-    """Source radiance over the true one, three times."""
+    """Source radiance over the true one, as it is found in two ways."""
     true = float(smoke.radiance.sum() / (1 - smoke.transmittance).sum())
     clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
     plates = known_plate(plate, clip) if given else find_backdrop(clip, None, None).plates
     samples = sample_smoke(clip, plates)
-    source, _ = smoke_thickness(samples.textures)
-    taken = [float(source_radiance(samples, each).mean()) / true for each in (source, None)]
-    return ["undetermined" if source is None else f"{source.mean() / true:.2f}", *(f"{each:.2f}" for each in taken)]
+    source, bright = picture_source(clip, plates, samples.smoky, None), source_radiance(samples)
+    return ["undetermined" if source is None else f"{source.mean() / true:.2f}", f"{bright.mean() / true:.2f}"]
 
 
-PROBES = {"colour": _colour, "thickness": _thickness}
+PROBES = {"colour": _colour, "source": _source}
 
 if __name__ == "__main__":
     main()

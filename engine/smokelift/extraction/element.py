@@ -48,8 +48,12 @@ OUTLIER_FREEDOM = 5.0
 ROUNDS, ITERATIONS = 6, 40
 """Linearisations of ln J, and steps of conjugate gradients for each: twice as many of both change T by .003."""
 
-SOURCE_ROUNDS = 4
-"""Times that the usual source radiance is found from the smoke, and that from it."""
+SOURCE_ROUNDS = 6
+"""Times that the usual source radiance is found from the smoke, and that from it: six leave T rms within .01 of what
+nine do, in 36 composed clips in white, warm and cold light."""
+
+MIN_CHROMA = 0.01
+"""Lower bound of a channel of the usual source radiance over its mean, for logarithms."""
 
 OWN_LIGHT, PRIOR_SMOKE = 8, 10.0
 """Power of the fraction of a cell's light that is the smoke's own by which the cell shows the smoke's color: half at
@@ -133,31 +137,31 @@ def source_of(fields: Picture, source: Picture) -> Picture:
 
 
 def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size: tuple[int, int]) -> Picture:
-    """Return the usual J (3,) of a clip's smoke from some of its pictures: the mean, by opacity squared, of ln J.
+    """Return the usual J (3,) of a clip's smoke from some of its pictures: S over opacity, by least squares.
 
     Its color (3,) is first the given one, then that of cells in which hardly any light is the plate's. Its brightness
     is first, and at most, that of the brightest pixels: where smoke is thin everywhere, nothing shows how much brighter
     it is. The pictures are reduced to a ``size`` (columns, rows).
     """
-    seen = [_Cells.of(picture, plate, size) for picture, plate in pictures]
-    percentile = np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen])
-    brightest = np.asarray(color, np.float32) / np.float32(np.mean(color)) * np.float32(max(percentile, MIN_SOURCE))
-    source = brightest
+    finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
+    seen = [_Cells.of(picture, plate, size, finer) for picture, plate in pictures]
+    percentile = float(np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
+    brightest = max(percentile, MIN_SOURCE)
+    source = np.asarray(np.asarray(color, np.float64) / np.mean(color) * brightest, np.float32)
     for _ in range(SOURCE_ROUNDS):
-        total = weights = 0.0
         shown = np.asarray(PRIOR_SMOKE * source, np.float64)
+        total = squares = 0.0
         for cells in seen:
             fields, _, weight = _extracted(cells, source)
-            opacity = fields[..., 0]
-            solid = weight * np.square(opacity, dtype=np.float64)
-            total += float((solid * np.log(source_of(fields, source) / source).mean(-1)).sum())
-            weights += float(solid.sum())
-            sent = cells.seen - (1 - opacity[..., None]) * cells.moments[..., :3]
+            opacity = fields[..., 0].astype(np.float64)
+            sent = cells.seen - (1 - opacity)[..., None] * cells.behind
             own = np.clip(channel_mean(sent) / np.maximum(channel_mean(cells.seen), MIN_SOURCE), 0, 1)
-            shown += np.einsum("ij,ijc->c", opacity * own**OWN_LIGHT, sent)
-        color = np.maximum(shown, 0) / shown.mean()
-        brightness = source.mean() * np.exp(total / max(weights, 1e-12))
-        source = np.asarray(color * min(brightness, brightest.mean()), np.float32)
+            shown += np.einsum("ij,ijc->c", weight * opacity * own**OWN_LIGHT, sent)
+            total += float(np.sum(weight * opacity * channel_mean(sent)))
+            squares += float(np.sum(weight * opacity**2))
+        brightness = np.clip(total / max(squares, MIN_SOURCE), MIN_SOURCE, brightest)
+        shown = np.maximum(shown, MIN_CHROMA * shown.mean())
+        source = np.asarray(shown / shown.mean() * brightness, np.float32)
     return source
 
 
@@ -186,19 +190,20 @@ def scale_deviations(cells: tuple[int, int]) -> list[tuple[float, float, float, 
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
-    """A picture in cells of so many ``pixels``: their mean, and the moments and errors that `_core.extract` takes."""
+    """A picture in cells of so many ``pixels``: their mean, the plate's, and what `_core.extract` takes."""
 
     seen: Picture
+    behind: Picture
     moments: Picture
     errors: Picture
     pixels: float
 
     @staticmethod
-    def of(picture: Picture, plate: Plate, size: tuple[int, int]) -> _Cells:
-        """Average a picture and its plate down to a size (columns, rows)."""
+    def of(picture: Picture, plate: Plate, size: tuple[int, int], pixels: float = FINER) -> _Cells:
+        """Average a picture and its plate down to a size (columns, rows), by so many pixels along a cell."""
         columns, rows = size
         whole = picture.shape[1::-1]
-        finer = [min(round(FINER * count), pixels) for count, pixels in zip(size, whole, strict=True)]
+        finer = [min(round(pixels * count), most) for count, most in zip(size, whole, strict=True)]
         picture = area_average(picture, *finer)
         plate = plate.through(lambda part: area_average(part, *finer), whole[0] * whole[1] / (finer[0] * finer[1]))
         change = picture - plate.image
@@ -210,4 +215,4 @@ class _Cells:
         model = np.abs(means[..., 9:12]).mean(-1, keepdims=True) + float(plate.image.mean())
         noise = np.maximum(np.square(noise_at(seen, plate)) + np.square(MODEL_ERROR * model), MIN_VARIANCE)
         moments = np.dstack([means[..., :21], noise, means[..., 21:]])
-        return _Cells(seen, moments, plate.errors, finer[0] * finer[1] / (columns * rows))
+        return _Cells(seen, means[..., :3], moments, plate.errors, finer[0] * finer[1] / (columns * rows))

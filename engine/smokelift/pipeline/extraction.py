@@ -6,20 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from smokelift.checks import require_kind
-from smokelift.extraction import Element, extract_element, usual_source
+from smokelift.extraction import Element, clip_source, extract_element
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern
-from smokelift.footage.images import Picture, reduced_size
-from smokelift.footage.plate import Plate, Plates, evened
+from smokelift.footage.images import Picture
+from smokelift.footage.plate import Plates, evened
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
-
-SOURCE_FRAMES, SOURCE_SIDE = 4, 64
-"""Frames, and cells along their longer side, from which the smoke's usual source radiance is found."""
+from smokelift.setup.first_estimate import sample_smoke
 
 PATTERN = "element_####.exr"
 """Names of the pictures in a directory."""
@@ -129,8 +125,5 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     found = find_backdrop(clip, scene.camera, scene.background)
     exposed = evened(found.clip, found.plates)
-    shown: list[tuple[Picture, Plate]] = [
-        (exposed.frame(frame), found.plates.at(frame)) for frame in exposed.spread(SOURCE_FRAMES)
-    ]
-    color = np.array((1, 1, 1) if scene.medium is None else scene.medium.color, np.float32)
-    return Extraction(exposed, found.plates, usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE)))
+    smoky = sample_smoke(found.clip, found.plates).smoky or range(len(clip))
+    return Extraction(exposed, found.plates, clip_source(exposed, found.plates, smoky, scene.medium))

@@ -141,16 +141,11 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     """The facts about the light: how strong it is, and what one picture does not show of it."""
     if shot.scene.scattering == "absorption":
         return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
-    thickness = _estimate(shot, "smoke thickness")
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    if given.lights or thickness is None:
+    if given.lights or _estimate(shot, "source radiance") is None:
         return (Fact("light", "as given", "given"),)
-    hides, origin = "as the light asks for", UNDETERMINED
-    if thickness.source == "measured":
-        hides, origin = f"hides {thickness.figures['hidden']:.0%} of what it covers", "measured"
     return (
-        Fact("light strength", f"smoke of radiance {colour}", origin, _said(shot, "assumed light")),
-        _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
+        _chosen(shot, "source radiance", "light strength", f"smoke of radiance {colour}", False),
         Fact("sun's direction", "no sun", UNDETERMINED, "Suns from many sides look the same. Give the lights."),
         Fact("sun's colour", "that of all light", UNDETERMINED),
         Fact("ambient share", "all light is from everywhere", UNDETERMINED),

@@ -210,14 +210,13 @@ SENTENCES: Mapping[str, str] = {
         "contrast is left unexplained, so how thick the smoke near the fire is may be wrong. Hide the fire by a mask, "
         "or use frames with less fire."
     ),
-    "smoke thickness": (
-        "Smoke thickness: the texture behind the smoke shows that it hides {hidden:.0%} of what it covers, right to "
-        "{spread:.0%}. The light is as strong as that asks for."
+    "source radiance": (
+        "Source radiance: {value} (red, green, blue), as what is left of the picture behind the smoke shows. The light "
+        "is as strong as that asks for."
     ),
-    "uncertain smoke thickness": (
-        "Smoke thickness: undetermined, because the texture behind it, if any, shows it only to {spread:.0%} "
-        "({tolerance:.0%} or less is needed). Thinner smoke in stronger light looks the same. Give the lights if you "
-        "know them."
+    "undetermined source radiance": (
+        "Source radiance: undetermined, because nothing behind the smoke has the detail that shows how much it hides. "
+        "Thinner smoke in stronger light looks the same. Give the lights if you know them."
     ),
     "scattering": "Scattering: {value}.",
     "compared scattering": (

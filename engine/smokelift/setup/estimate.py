@@ -21,13 +21,13 @@ class Estimate(Remark, Generic[Value]):
     ----------
     what
         ``"scattering"``, ``"resolution"``, ``"velocity grid coarsening"``, ``"axis depth"``, ``"smoke colour"``,
-        ``"smoke thickness"``, ``"gain of view 1"`` or ``"fire"``.
+        ``"source radiance"``, ``"gain of view 1"`` or ``"fire"``.
     value
         What will be used, or `UNDETERMINED`.
     source
         The user gives it, the clip shows it, or nothing decides it and it is assumed.
     spread
-        Standard deviation: metres of an axis depth, a share of a smoke thickness, None of others.
+        Standard deviation: metres of an axis depth, None of others.
     tolerance
         What the deciding figure was compared with.
     """

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.extraction import clip_source
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
 from smokelift.footage.fire import HotPixels, fire_colour, firelight, hot_pixels, without_fire
-from smokelift.footage.images import area_average
+from smokelift.footage.given_background import backdrop_colour
+from smokelift.footage.images import Picture, area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates, evened, exposures
-from smokelift.scene import Background, Camera
+from smokelift.scene import Background, Camera, Medium
 from smokelift.scene.checks import Vector
-from smokelift.setup.thickness import seen_texture
 
 SAMPLE_FRAMES, SAMPLE_SIDE = 16, 320
 """Frames that are examined, so that smoke in a sixteenth of the clip is seen; and pixels along their longer side, five
@@ -48,10 +49,8 @@ class SmokeSamples:
         Numbers of the frames with smoke, those with the most first.
     gains
         Exposure (3,) of each sample over its background's, by frame number; the samples are divided by it.
-    textures
-        Sums of `seen_texture` for each sample with smoke.
     amounts
-        Numbers of smoke pixels of these samples, in the order of ``colours``.
+        Numbers of smoke pixels of the samples with smoke, in the order of ``colours``.
     over_known
         Numbers of smoke pixels before a known background in each sample, in the order of ``gains``.
     """
@@ -63,7 +62,6 @@ class SmokeSamples:
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
-    textures: tuple[NDArray[np.float64], ...] = ()
     amounts: tuple[int, ...] = ()
     over_known: tuple[int, ...] = ()
 
@@ -110,7 +108,8 @@ class FirstEstimate:
     """What a clip shows: its background, its smoke, and its fire if any burns.
 
     ``clip`` is the footage at its background's exposure, without fire and without the brightness that noise adds.
-    ``hot`` are the pixels that may be fire.
+    ``hot`` are the pixels that may be fire. ``source`` (3,) is the usual source radiance of the smoke before a picture;
+    None before black or one color, and without smoke.
     """
 
     clip: Clip
@@ -118,15 +117,17 @@ class FirstEstimate:
     samples: SmokeSamples
     fire: Fire | None
     hot: HotPixels
+    source: Picture | None
 
 
 def first_estimate(
-    clip: Clip, camera: Camera | None, background: Background | None, flame_color: Vector | None = None
+    clip: Clip, camera: Camera | None, background: Background | None, medium: Medium | None = None
 ) -> FirstEstimate:
-    """Estimate what a clip shows; parameters and errors as of `find_backdrop`.
+    """Estimate what a clip shows; other parameters and errors as of `find_backdrop`.
 
-    Where a ``flame_color`` is given there is fire, however little of it is certain.
+    Where the ``medium`` that is given has a color of its flame there is fire, however little of it is certain.
     """
+    flame_color = None if medium is None else medium.flame_color
     found = find_backdrop(clip, camera, background)
     samples = sample_smoke(found.clip, found.plates)
     exposed = evened(found.clip, found.plates, samples.gains)
@@ -136,7 +137,19 @@ def first_estimate(
         light = firelight(exposed, doused)
         fire, exposed = Fire(hot.share, light, flame_color or fire_colour(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
-    return FirstEstimate(exposed, found, samples, fire, hot)
+    return FirstEstimate(
+        exposed, found, samples, fire, hot, picture_source(exposed, found.plates, samples.smoky, medium)
+    )
+
+
+def picture_source(clip: Clip, plates: Plates, smoky: Sequence[int], medium: Medium | None) -> Picture | None:
+    """Return the usual source radiance (3,) of smoke before a picture; None before black or one color.
+
+    ``smoky`` are frames with smoke, those with the most first; without any the answer is None.
+    """
+    if not smoky or backdrop_colour(plates.at(smoky[0]).image) is not None:
+        return None
+    return clip_source(clip, plates, smoky, medium)
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
@@ -152,7 +165,7 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = (max(1, round(side / scale)) for side in (width, height))
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
-    colours, behind, textures, over_known = [], [], [], []
+    colours, behind, over_known = [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
@@ -171,8 +184,6 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
         behind.append(plate.image[mask])
         if mask.any():
             amounts[number] = int(mask.sum())
-            textures.append(seen_texture(picture, plate, mask))
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
     radiance = np.concatenate(colours), np.concatenate(behind)
-    found = tuple(textures), tuple(amounts.values())
-    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, *found, tuple(over_known))
+    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, tuple(amounts.values()), tuple(over_known))

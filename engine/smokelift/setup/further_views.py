@@ -26,6 +26,7 @@ from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_remarks import backdrop_remarks
 from smokelift.setup.coarse import HeldOut, coarse_frames, held_out
 from smokelift.setup.estimate import Estimate
+from smokelift.setup.first_estimate import picture_source, sample_smoke
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -98,6 +99,8 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     found = find_backdrop(opened, camera, background)
     try:
         shown = ShotView.before(scene.domain, evened(found.clip, found.plates), camera, found.plates)
+        smoky = sample_smoke(found.clip, found.plates).smoky
+        shown = replace(shown, source=picture_source(shown.clip, found.plates, smoky, scene.medium))
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
@@ -161,6 +164,8 @@ def _evened(
     named = ", ".join(f"{value:.2f}" for value in gain)
     figures: Figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
     clip = view.clip.changed(lambda _, picture: picture / gain)
-    view = replace(view, clip=clip, plates=view.plates.through(lambda part: part / gain if part.ndim == 3 else part))
+    source = None if view.source is None else view.source / gain
+    plates = view.plates.through(lambda part: part / gain if part.ndim == 3 else part)
+    view = replace(view, clip=clip, plates=plates, source=source)
     what = f"gain of view {number}"
     return view, (Estimate("gain of a view", figures, what=what, value=named, source="measured", tolerance=tolerance),)

@@ -14,16 +14,17 @@ from dataclasses import replace
 import numpy as np
 
 from smokelift.checks import Doubt, Figures, Remark
+from smokelift.extraction import tells_source
+from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.environment_count import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import CoarseFrame, held_out
-from smokelift.setup.estimate import Estimate
-from smokelift.setup.first_estimate import SmokeSamples
+from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
-from smokelift.setup.thickness import smoke_thickness
 
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
 """Models of scattering, from the cheapest to the richest."""
@@ -49,12 +50,16 @@ MAX_QUIET_NOISE = 2 / 255
 
 
 def first_light(
-    lights: tuple[Light, ...], scattering: Scattering | None, geometry: Geometry, medium: Medium, samples: SmokeSamples
+    lights: tuple[Light, ...],
+    scattering: Scattering | None,
+    geometry: Geometry,
+    medium: Medium,
+    estimate: FirstEstimate,
 ) -> tuple[tuple[Light, ...], Scattering, tuple[Estimate[str], ...], tuple[Remark, ...]]:
     """Return the lights of a scene, or one from everywhere without shadows, as strong as the clip shows.
 
     An environment gets the number of directions that stand for it. Returned next is the given model of scattering, or
-    the richest that the lights allow. Where light is needed but not given, the smoke's thickness and a remark follow.
+    the richest that the lights allow. Where light is needed but not given, the source radiance and a remark follow.
     Shadows without a light to cast them are a ValueError.
     """
     if scattering in SHADOWED and not lights:
@@ -64,11 +69,29 @@ def first_light(
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
         return tuple(_countable(each, geometry, medium) for each in lights), richest, (), ()
-    source, thickness = smoke_thickness(samples.textures)
+    found = _shown_source(estimate)
+    source = source_radiance(estimate.samples) if found is None else found
     share = np.array(medium.albedos) / (4 * np.pi)
-    red, green, blue = np.divide(source_radiance(samples, source), share, out=np.zeros(3), where=share > 0).tolist()
+    red, green, blue = np.divide(source, share, out=np.zeros(3), where=share > 0).tolist()
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
-    return (light,), richest, (thickness,), (Remark("assumed light", {"irradiance": light.irradiance}),)
+    return (light,), richest, (_measured(found),), (Remark("assumed light", {"irradiance": light.irradiance}),)
+
+
+def _shown_source(estimate: FirstEstimate) -> Picture | None:
+    """The source radiance (3,) of the smoke; None where what is behind it hardly shows it."""
+    if estimate.source is None or not tells_source(estimate.found.plates.at(estimate.samples.smoky[0]).image):
+        return None
+    return estimate.source
+
+
+def _measured(source: Picture | None) -> Estimate[str]:
+    """The source radiance (3,) of the smoke as an estimate; undetermined if nothing but its brightness shows it."""
+    what = "source radiance"
+    if source is None:
+        return Estimate("undetermined source radiance", what=what, value=UNDETERMINED, source="assumed")
+    red, green, blue = map(float, source)
+    figures = {"red": red, "green": green, "blue": blue}
+    return Estimate(what, figures, what=what, value=f"{red:.2g}, {green:.2g}, {blue:.2g}", source="measured")
 
 
 def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:

@@ -79,20 +79,14 @@ def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, gre
     return source / source.max() if source.max() > 0 else np.ones(3)
 
 
-def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> Doubles:
-    """Return the source radiance (3,) of the smoke; white if the clip shows none.
+def source_radiance(samples: SmokeSamples) -> Doubles:
+    """Return the source radiance (3,) of the smoke by its brightness; white if the clip shows none.
 
-    Thick smoke shows it: the brightest if smoke brightens its background, the darkest if it darkens it. ``measured``
-    (3,) is the mean that a texture behind the smoke shows; brighter or darker smoke moves it, so that it can be fitted.
+    Thick smoke shows it: the brightest if smoke brightens its background, the darkest if it darkens it.
     """
     if len(samples.colours) == 0:
         return np.ones(3)
-    brightens = samples.brightens
-    if measured is not None:
-        changes = np.sum(samples.colours - samples.behind, -1) >= 0
-        bound = np.percentile(samples.colours[changes == brightens], 99 if brightens else 1, axis=0)
-        return np.maximum(measured, bound) if brightens else np.minimum(measured, bound)
-    if not brightens:
+    if not samples.brightens:
         return np.asarray((1 - SOURCE_EXCESS) * np.percentile(samples.colours, 1, axis=0))
     # on the line of colours: the channels' maxima may be of different smoke, and together a colour that none shows
     colours, behind = samples.colours.astype(np.float64), samples.behind.astype(np.float64)

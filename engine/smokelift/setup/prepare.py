@@ -5,7 +5,6 @@ What is open is estimated from the clip or defaulted; remarks and estimates say 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -13,9 +12,7 @@ import numpy as np
 
 from smokelift.checks import counted, require_kind
 from smokelift.density import AxisEstimate, clip_axis
-from smokelift.extraction import usual_source
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import backdrop_colour
 from smokelift.render import scene_optics
 from smokelift.scene import Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_remarks import first_remarks
@@ -28,10 +25,6 @@ from smokelift.setup.illumination import find_scattering, first_light, light_dou
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-
-SOURCE_FRAMES, SOURCE_SIDE = 4, 64
-"""Frames, and pixels along their longer side, from which the smoke's usual source radiance is found."""
-
 
 SHADOWED_SOURCE = 0.5
 """Usual source radiance of smoke over that without shadows: .52 and .55 of two baked scenes, within the factor of two
@@ -60,15 +53,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
-    estimate = first_estimate(
-        clip, scene.camera, scene.background, None if scene.medium is None else scene.medium.flame_color
-    )
+    estimate = first_estimate(clip, scene.camera, scene.background, scene.medium)
     plates, samples = estimate.found.plates, estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium, medium_remarks = find_medium(scene, estimate, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    lights, richest, thickness, light_remarks = first_light(scene.lights, asked, geometry, medium, samples)
+    lights, richest, brightness, light_remarks = first_light(scene.lights, asked, geometry, medium, estimate)
     complete = CompleteScene(
         camera=camera,
         domain=domain,
@@ -81,9 +72,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         closed=scene.closed,
         inlets=scene.inlets,
     )
-    first = with_source(
-        ShotView.before(domain, estimate.clip, camera, plates), samples.smoky, complete, bool(scene.lights)
-    )
+    first = replace(ShotView.before(domain, estimate.clip, camera, plates), source=estimate.source)
+    if estimate.source is not None and scene.lights:
+        lit = scene_optics(complete).unshadowed_source().astype(np.float32)
+        first = replace(first, source=SHADOWED_SOURCE * lit)
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
     of_scattering: tuple[Estimate[str], ...] = ()
     if coarse and asked is not None:
@@ -92,10 +84,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         finer = partial(coarse_frame, (first,), coarse[0].number, complete, times=2)
         scattering, chosen = find_scattering(coarse, finer, settings)
         complete, of_scattering = replace(complete, scattering=scattering), (chosen,)
-        if thickness:
+        if brightness:
             light_remarks += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
     if complete.scattering == "absorption":
-        thickness = ()
+        brightness = ()
     others, gains, view_remarks = open_views(first, complete, samples.typical, bool(scene.lights), settings)
     coarsening: tuple[Estimate[int], ...] = ()
     if settings.selection.measure:
@@ -114,7 +106,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
             *light_remarks,
             *view_remarks,
         ),
-        estimates=(geometry.resolution, *of_medium, *of_scattering, *thickness, *coarsening, *gains),
+        estimates=(geometry.resolution, *of_medium, *of_scattering, *brightness, *coarsening, *gains),
         qualities=geometry.qualities,
         smoky=samples.smoky,
         place=None,
@@ -124,30 +116,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         return replace(shot, remarks=(*shot.remarks, *disagreement(shot)))
     place = clip_axis(shot, settings.distance) if settings.method == "default" else None
     return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
-
-
-def with_source(view: ShotView, smoky: Sequence[int], scene: CompleteScene, lit: bool) -> ShotView:
-    """Return a view with the usual source radiance of its smoke, if it stands before a picture.
-
-    The light shows it where it is given (``lit``), else some of the smoky frames do.
-    """
-    frames = sorted(smoky[:SOURCE_FRAMES])
-    if not frames or backdrop_colour(view.plates.at(frames[0]).image) is not None:
-        return view
-    if lit:
-        return replace(view, source=SHADOWED_SOURCE * scene_optics(scene).unshadowed_source().astype(np.float32))
-    shown = []
-    for frame in frames:
-        working = view.working_at(frame, scene.domain)
-        if working is not None:
-            picture = view.clip.stored(frame).cut(working.part).linear()
-            shown.append((picture, view.plates.at(frame).through(working.part)))
-    if not shown:
-        return view
-    columns, rows = view.working.camera.size
-    shrink = max(1.0, max(columns, rows) / SOURCE_SIDE)
-    size = max(1, round(columns / shrink)), max(1, round(rows / shrink))
-    return replace(view, source=usual_source(shown, np.array(scene.medium.color), size))
 
 
 def place_estimate(place: AxisEstimate) -> Estimate[str]:

@@ -65,9 +65,8 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     done = events(capsys.readouterr().out)[-1]
     assert done["files"] == [str(page)]
     known = {fact["what"]: fact for fact in done["facts"]}
-    for what in ("exposure", "camera", "scale", "extinction", "albedo", "light strength", "smoke thickness"):
+    for what in ("exposure", "camera", "scale", "extinction", "albedo", "light strength"):
         assert known[what]["origin"] == "undetermined"
-    assert known["light strength"]["how"] != known["smoke thickness"]["how"]
     for what in ("sun's direction", "sun's colour", "ambient share"):
         assert known[what]["origin"] == "undetermined"
     if kind == ".html":

@@ -48,6 +48,26 @@ def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
     assert source.max() < 0.4
 
 
+@pytest.mark.parametrize("tint", [(1.0, 1.0, 1.0), (1.2, 1.0, 0.75)], ids=["white", "warm"])
+def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft, tmp_path, tint) -> None:
+    """Thin smoke, which before one color looks as if it stood in fainter light; and the light's color is its own."""
+    detail = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None]
+    write_image(tmp_path / "wall.png", (0.05 + 0.2 * detail * (1.0, 0.8, 0.6)).astype("f4"))
+    haze = replace(
+        plume.scene,
+        medium=Medium(1.5, 0.9),
+        lights=(DirectionalLight((0.3, 0.5, -0.8), tuple(9.0 * channel for channel in tint)),),
+        background=Background(image=tmp_path / "wall.png"),
+    )
+    scene = plume.write(tmp_path / "clip", plume.densities, haze)
+    shot = shot_of(replace(scene, lights=()), draft)
+    true = 0.9 / (4 * np.pi) * 9.0 * np.array(tint)  # without the little that the haze shades itself
+    found = chosen(shot, "source radiance")
+    assert found.source == "measured"
+    assert [found.figures[name] for name in ("red", "green", "blue")] == pytest.approx(true, rel=0.2)
+    assert shot.optics.unshadowed_source() == pytest.approx(shot.views[0].source, rel=1e-4)
+
+
 # what light is doubted
 
 

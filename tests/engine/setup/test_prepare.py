@@ -80,9 +80,9 @@ def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
 
 
 def test_the_light_that_nothing_tells_is_called_undetermined(estimated) -> None:
-    """Before black, with how thick the smoke is, in an estimate that is said and kept."""
-    (thickness,) = [estimate for estimate in estimated.estimates if estimate.what == "smoke thickness"]
-    assert thickness.value == UNDETERMINED
+    """Before black, in an estimate that is said and kept."""
+    (source,) = [estimate for estimate in estimated.estimates if estimate.what == "source radiance"]
+    assert source.value == UNDETERMINED
 
 
 def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:

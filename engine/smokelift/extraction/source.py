@@ -1,0 +1,39 @@
+"""The usual source radiance of a clip's smoke: the one place that says from which frames and cells it is found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smokelift.extraction.element import MODEL_ERROR, usual_source
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import Picture, area_average, blurred, reduced_size
+from smokelift.footage.plate import Plates
+from smokelift.scene import Medium
+
+SOURCE_FRAMES, SOURCE_SIDE = 4, 64
+"""Frames, and cells along their longer side, from which the source radiance is found."""
+
+
+def clip_source(clip: Clip, plates: Plates, frames: Sequence[int], medium: Medium | None) -> Picture:
+    """Return the usual source radiance (3,) of a clip's smoke before its plates, from the first of some frames.
+
+    ``frames`` (one at least) have those with the most smoke first. A ``medium`` that is given has the color that the
+    search starts from, else it is white.
+    """
+    shown = [(clip.stored(frame).linear(), plates.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
+    color = np.array((1, 1, 1) if medium is None else medium.color, np.float32)
+    return usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE))
+
+
+def tells_source(plate: Picture) -> bool:
+    """Whether smoke before a plate (rows, columns, 3) shows its source radiance: detail of it has to show through.
+
+    Its neighboring cells have to differ by more than the model's errors do: six walls and photographs by .10 to .35 of
+    their mean, smooth skies by .001 and .03. Before these thin smoke in strong light looks like thick smoke.
+    """
+    rows, columns = plate.shape[:2]
+    small = area_average(plate, *reduced_size(columns, rows, SOURCE_SIDE))
+    detail = np.sqrt(np.square(small - blurred(small, 1.0)).mean())
+    return bool(detail > MODEL_ERROR * small.mean())

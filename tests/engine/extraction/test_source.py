@@ -1,0 +1,49 @@
+"""The usual source radiance: what the smoke of a few pictures sends, over its opacity, in the color of its light."""
+
+import numpy as np
+import pytest
+
+from smokelift.extraction import tells_source, usual_source
+from smokelift.footage.noise import lasting_noise
+from smokelift.footage.plate import Plate
+
+SIZE = (96, 80)
+"""Columns and rows of the pictures."""
+
+
+def plate(texture: float) -> Plate:
+    """A wall of a warm grey with so much texture."""
+    shape = SIZE[1], SIZE[0]
+    detail = texture * np.random.default_rng(1).standard_normal((*shape, 1)) * np.array((1.0, 0.8, 0.6))
+    return Plate((0.2 + detail).astype("f4"), np.ones(shape, np.float32), lasting_noise(0.004))
+
+
+def before(behind: Plate, source: tuple[float, ...], depth: float, height: float) -> np.ndarray:
+    """A blob of smoke of an optical depth before a plate, with noise."""
+    x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
+    clear = np.exp(-depth * np.exp(-((x - 48) ** 2 + (y - height) ** 2) / 300))[..., None]
+    noise = 0.003 * np.random.default_rng(2).standard_normal((*clear.shape[:2], 3))
+    return (clear * behind.image + (1 - clear) * source + noise).astype("f4")
+
+
+@pytest.mark.parametrize("depth", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "source", [(0.6, 0.6, 0.6), (0.7, 0.6, 0.42), (0.45, 0.6, 0.75)], ids=["white", "warm", "cold"]
+)
+def test_texture_tells_the_light_of_thin_and_of_thick_smoke(source, depth) -> None:
+    """The color that the search starts from is white: it is not that of the answer."""
+    wall = plate(0.04)
+    pictures = [(before(wall, source, depth, height), wall) for height in (35, 45)]
+    assert usual_source(pictures, np.ones(3, np.float32), (48, 40)) == pytest.approx(np.array(source), rel=0.2)
+
+
+def test_without_smoke_the_source_can_be_divided_by() -> None:
+    wall = plate(0.04)
+    source = usual_source([(before(wall, (0.6, 0.6, 0.6), 0.0, 40), wall)], np.ones(3, np.float32), (48, 40))
+    assert np.isfinite(source).all() and (source > 0).all()
+
+
+def test_a_smooth_plate_does_not_tell_the_source() -> None:
+    sky = np.linspace((0.2, 0.3, 0.6), (0.4, 0.5, 0.7), SIZE[1]).astype("f4")
+    assert not tells_source(np.repeat(sky[:, None], SIZE[0], axis=1))
+    assert tells_source(plate(0.04).image)
