@@ -43,7 +43,7 @@ MIN_CONTRAST = 0.1
 """Contrast of the background to the source radiance in shadow, over that without shadows, below which the latter tells
 more: in deep shadow noise would be taken for smoke."""
 
-WHITE = 1.5
+WHITE = 2.0
 """Brightness of the white that T is shown over, over that of the plate or of what the smoke sends, whichever is
 brighter: with half of it smoke of the plate's own brightness is not fitted, with twice of it errors of T are fitted
 rather than the picture (docs/experiments/extraction.md)."""

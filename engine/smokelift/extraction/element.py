@@ -55,10 +55,6 @@ nine do, in 36 composed clips in white, warm and cold light."""
 MIN_CHROMA = 0.01
 """Lower bound of a channel of the usual source radiance over its mean, for logarithms."""
 
-OWN_LIGHT, PRIOR_SMOKE = 8, 10.0
-"""Power of the fraction of a cell's light that is the smoke's own by which the cell shows the smoke's color: half at
-.92; and the number of opaque cells that the color given first counts as."""
-
 BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
 """Percentile of a picture's brightness that the usual source radiance starts from, and its lower bound: a picture
 darker than that shows no light in eight bits."""
@@ -139,29 +135,24 @@ def source_of(fields: Picture, source: Picture) -> Picture:
 def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size: tuple[int, int]) -> Picture:
     """Return the usual J (3,) of a clip's smoke from some of its pictures: S over opacity, by least squares.
 
-    Its color (3,) is first the given one, then that of cells in which hardly any light is the plate's. Its brightness
-    is first, and at most, that of the brightest pixels: where smoke is thin everywhere, nothing shows how much brighter
-    it is. The pictures are reduced to a ``size`` (columns, rows).
+    It is first of a ``color`` (3,), and as bright as the brightest pixels. The pictures are reduced to a ``size``
+    (columns, rows).
     """
     finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
     seen = [_Cells.of(picture, plate, size, finer) for picture, plate in pictures]
     percentile = float(np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
-    brightest = max(percentile, MIN_SOURCE)
-    source = np.asarray(np.asarray(color, np.float64) / np.mean(color) * brightest, np.float32)
+    source = np.asarray(np.asarray(color, np.float64) / np.mean(color) * max(percentile, MIN_SOURCE), np.float32)
     for _ in range(SOURCE_ROUNDS):
-        shown = np.asarray(PRIOR_SMOKE * source, np.float64)
-        total = squares = 0.0
+        total, squares = np.zeros(3), 0.0
         for cells in seen:
             fields, _, weight = _extracted(cells, source)
             opacity = fields[..., 0].astype(np.float64)
             sent = cells.seen - (1 - opacity)[..., None] * cells.behind
-            own = np.clip(channel_mean(sent) / np.maximum(channel_mean(cells.seen), MIN_SOURCE), 0, 1)
-            shown += np.einsum("ij,ijc->c", weight * opacity * own**OWN_LIGHT, sent)
-            total += float(np.sum(weight * opacity * channel_mean(sent)))
+            total += np.sum((weight * opacity)[..., None] * sent, axis=(0, 1))
             squares += float(np.sum(weight * opacity**2))
-        brightness = np.clip(total / max(squares, MIN_SOURCE), MIN_SOURCE, brightest)
-        shown = np.maximum(shown, MIN_CHROMA * shown.mean())
-        source = np.asarray(shown / shown.mean() * brightness, np.float32)
+        found = np.maximum(total / max(squares, 1e-12), 0)
+        brightness = max(float(found.mean()), MIN_SOURCE)
+        source = np.asarray(np.maximum(found, MIN_CHROMA * brightness), np.float32)
     return source
 
 

@@ -14,7 +14,7 @@ from smokelift.checks import counted, require_kind
 from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
 from smokelift.render import scene_optics
-from smokelift.scene import Background, CompleteScene, Domain, Scene
+from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_remarks import first_remarks
 from smokelift.setup.coarse import coarse_frame, coarse_frames
 from smokelift.setup.estimate import UNDETERMINED, Estimate
@@ -74,8 +74,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     )
     first = replace(ShotView.before(domain, estimate.clip, camera, plates), source=estimate.source)
     if estimate.source is not None and scene.lights:
-        lit = scene_optics(complete).unshadowed_source().astype(np.float32)
-        first = replace(first, source=SHADOWED_SOURCE * lit)
+        lit = scene_optics(complete).unshadowed_source()
+        lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
+        first = replace(first, source=np.asarray(lit, np.float32))
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
     of_scattering: tuple[Estimate[str], ...] = ()
     if coarse and asked is not None:

@@ -315,11 +315,11 @@ def test_no_brightness_makes_nan(picture: float, plate: float) -> None:
 @pytest.mark.parametrize("brightness", [0.3, 1.0, 4.0])
 @pytest.mark.parametrize("plate", PLATES.values(), ids=PLATES.keys())
 def test_the_source_is_found_from_the_pictures(brightness: float, plate: Picture) -> None:
-    """Within 20 %, of dim smoke as of smoke that is brighter than its plate; its color is given."""
+    """Within 20 %, of dim smoke as of smoke that is brighter than its plate; its color within 1 %."""
     clear = TRANSMITTANCE[..., None]
     picture = filmed((1 - clear) * RADIANCE * brightness + clear * plate)
     found = usual_source([(picture, plate_of(plate)), (picture[::-1], plate_of(plate[::-1]))], SOURCE, (48, 36))
-    np.testing.assert_allclose(found / found.mean(), SOURCE / SOURCE.mean(), rtol=1e-5)
+    np.testing.assert_allclose(found / found.mean(), SOURCE / SOURCE.mean(), rtol=0.01)
     assert found.mean() == pytest.approx(SOURCE.mean() * brightness, rel=0.2)
 
 

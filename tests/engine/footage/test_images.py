@@ -254,12 +254,24 @@ def test_what_cannot_be_written_leaves_the_old_file(tmp_path: Path) -> None:
     with pytest.raises(ImageError, match="not finite"):
         write_image(path, np.full((2, 2, 3), np.nan))
     with pytest.raises(ImageError, match="shape"):
-        write_image(path, np.zeros((2, 2, 4)))
+        write_image(path, np.zeros((2, 2, 5)))
     with pytest.raises(ImageError, match=r"only write \.exr and \.png"):
         write_image(tmp_path / "a.bmp", colours())
     with pytest.raises(ImageError, match="is none of"):
         read_image(tmp_path / "a.bmp")
     assert path.read_bytes() == before
+
+
+def test_alpha_is_premultiplied_in_exr_and_straight_in_png(tmp_path: Path) -> None:
+    element = np.full((2, 3, 4), [0.2, 0.1, 0.05, 0.5], np.float32)
+    element[0, 0] = 0  # clear
+    write_image(tmp_path / "a.exr", element)
+    (part,) = OpenEXR.File(str(tmp_path / "a.exr")).parts
+    np.testing.assert_allclose(part.channels["RGBA"].pixels, element, atol=1e-3)
+    write_image(tmp_path / "a.png", element)
+    codes = np.asarray(Image.open(tmp_path / "a.png"))
+    assert codes.shape == (2, 3, 4) and codes[0, 0].tolist() == [0, 0, 0, 0] and codes[1, 1, 3] == 128
+    np.testing.assert_allclose(srgb_to_linear(codes[1, 1, :3] / np.float32(255)), [0.4, 0.2, 0.1], atol=0.005)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
