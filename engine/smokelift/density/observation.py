@@ -43,12 +43,12 @@ MIN_CONTRAST = 0.1
 """Contrast of the background to the source radiance in shadow, over that without shadows, below which the latter tells
 more: in deep shadow noise would be taken for smoke."""
 
-WHITE = 2.0
+WHITE = 1.5
 """Brightness of the white that T is shown over, over that of the plate or of what the smoke sends, whichever is
 brighter: with half of it smoke of the plate's own brightness is not fitted, with twice of it errors of T are fitted
 rather than the picture (docs/experiments/extraction.md)."""
 
-USEFUL_DEVIATION = 0.2
+USEFUL_DEVIATION = 0.4
 """Deviation of T beyond which it shows little: smoke is clear air or not, by one and a half of it to either side."""
 
 CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.98, 2.33
@@ -266,15 +266,17 @@ def apparent_optical_depth(
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
     J is the source radiance of smoke in the middle of the domain, B the background. T is the least squares solution
-    over the channels. Without a channel for T, no T explains a pixel that the smoke darkens although J is brighter than
-    B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a fit that starts from less
-    thins it out until nothing is left (docs/experiments/bright-background.md).
+    over the channels, or what the channel of T itself shows. Without that, no T explains a pixel that the smoke darkens
+    although J is brighter than B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a
+    fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
         source = optics.unshadowed_source()
     source = _in_channels(source, image)
     contrast = background - source
+    if image.shape[-1] > 3:  # shadows do not matter to the last channel
+        image, contrast, source = image[..., 3:], contrast[..., 3:], source[3:]
     clear = np.sum((image - source) * contrast, -1) / np.maximum(np.sum(contrast * contrast, -1), 1e-12)
     depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
     if optics.scattering in SHADOWED and image.shape[-1] == 3:
