@@ -15,6 +15,10 @@ from smokelift.scene import Medium
 SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and cells along their longer side, from which the source radiance is found."""
 
+HUE = 2 * MODEL_ERROR
+"""Smallest difference of two colors of mean 1, root mean square, from which on they differ: both may be off by the
+model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
+
 
 def clip_source(clip: Clip, plates: Plates, frames: Sequence[int], medium: Medium | None) -> Picture:
     """Return the usual source radiance (3,) of a clip's smoke before its plates, from the first of some frames.
@@ -25,6 +29,16 @@ def clip_source(clip: Clip, plates: Plates, frames: Sequence[int], medium: Mediu
     shown = [(clip.stored(frame).linear(), plates.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
     color = np.array((1, 1, 1) if medium is None else medium.color, np.float32)
     return usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE))
+
+
+def shows_transmittance(plate: Picture, source: Picture) -> bool:
+    """Whether a plate (rows, columns, 3) shows how much of it smoke of a source radiance (3,) lets through.
+
+    It has to have detail (`tells_source`), or another hue than the smoke: before a smooth gray wall white smoke that is
+    thick and white smoke that is thin look alike, and the picture itself is the best that can be fitted.
+    """
+    own, other = (color / max(float(color.mean()), 1e-12) for color in (plate.mean((0, 1)), source))
+    return tells_source(plate) or float(np.sqrt(np.square(own - other).mean())) > HUE
 
 
 def tells_source(plate: Picture) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.extraction import clip_source
+from smokelift.extraction import clip_source, shows_transmittance
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
@@ -143,13 +143,15 @@ def first_estimate(
 
 
 def picture_source(clip: Clip, plates: Plates, smoky: Sequence[int], medium: Medium | None) -> Picture | None:
-    """Return the usual source radiance (3,) of smoke before a picture; None before black or one color.
+    """Return the usual source radiance (3,) of smoke before a picture; None before one that does not show T.
 
-    ``smoky`` are frames with smoke, those with the most first; without any the answer is None.
+    That is black, one color, or as good as one. ``smoky`` are frames with smoke, those with the most first; without any
+    the answer is None.
     """
     if not smoky or backdrop_colour(plates.at(smoky[0]).image) is not None:
         return None
-    return clip_source(clip, plates, smoky, medium)
+    source = clip_source(clip, plates, smoky, medium)
+    return source if shows_transmittance(plates.at(smoky[0]).image, source) else None
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
