@@ -45,6 +45,17 @@ Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
 Codes = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
+FOREIGN_ERRORS = (
+    av.FFmpegError,
+    RuntimeError,
+    ValueError,
+    LookupError,
+    SyntaxError,
+    OSError,
+    Image.DecompressionBombError,
+)
+"""What the libraries that read pictures raise for a damaged one."""
+
 MAX_PIXELS = 2**28
 """Largest number of pixels of a picture."""
 
@@ -217,8 +228,8 @@ def _read(path: Path) -> Codes | tuple[Picture, Picture | None]:
             return _read_integers(path)
     except ImageError:
         raise
-    # three libraries raise exceptions of their own that mean the same to the caller
-    except (RuntimeError, ValueError, LookupError, SyntaxError, OSError, Image.DecompressionBombError) as error:
+    # libraries raise exceptions of their own that mean the same to the caller
+    except FOREIGN_ERRORS as error:
         raise ImageError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
 
 
