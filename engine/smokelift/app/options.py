@@ -29,9 +29,27 @@ def named_path(text: str) -> Path:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def add_clip_options(parser: argparse.ArgumentParser) -> None:
+    """Add the clip or scene file, and what of the clip is used."""
+    parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
+    parser.add_argument(
+        "--frames",
+        type=frame_range,
+        metavar="A:B",
+        help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
+    )
+    parser.add_argument(
+        "--mask",
+        type=named_path,
+        metavar="PATH",
+        help="picture that is white where smoke may be and black where none is, or mask_####.png or a video with one "
+        "for each frame (default: the scene's, else none)",
+    )
+
+
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the clip or scene file, and how it is reconstructed."""
-    parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
+    add_clip_options(parser)
     parser.add_argument(
         "--quality",
         choices=QUALITIES,
@@ -56,19 +74,6 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         choices=("auto", *SCATTERINGS),
         default="auto",
         help="how light is scattered; auto (default): what the scene says, else measured on the clip",
-    )
-    parser.add_argument(
-        "--frames",
-        type=frame_range,
-        metavar="A:B",
-        help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
-    )
-    parser.add_argument(
-        "--mask",
-        type=named_path,
-        metavar="PATH",
-        help="picture that is white where smoke may be and black where none is, or mask_####.png or a video with one "
-        "for each frame (default: the scene's, else none)",
     )
     parser.add_argument(
         "--distance",

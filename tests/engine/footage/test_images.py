@@ -269,7 +269,8 @@ def test_alpha_is_premultiplied_in_exr_and_straight_in_png(tmp_path: Path) -> No
     (part,) = OpenEXR.File(str(tmp_path / "a.exr")).parts
     np.testing.assert_allclose(part.channels["RGBA"].pixels, element, atol=1e-3)
     write_image(tmp_path / "a.png", element)
-    codes = np.asarray(Image.open(tmp_path / "a.png"))
+    with Image.open(tmp_path / "a.png") as picture:
+        codes = np.asarray(picture)
     assert codes.shape == (2, 3, 4) and codes[0, 0].tolist() == [0, 0, 0, 0] and codes[1, 1, 3] == 128
     np.testing.assert_allclose(srgb_to_linear(codes[1, 1, :3] / np.float32(255)), [0.4, 0.2, 0.1], atol=0.005)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.app.options import frame_range, named_path, require_folder, scene_of
+from smokelift.app.options import add_clip_options, named_path, require_folder, scene_of
 from smokelift.app.progress import Reporter
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
@@ -29,7 +29,7 @@ CHECKER = (0.05, 0.25)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
+    add_clip_options(parser)
     parser.add_argument(
         "--out",
         type=named_path,
@@ -37,19 +37,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="element_####.exr",
         help="pictures to write, numbered as the frames of the clip's file: .exr is premultiplied and linear, .png "
         "straight and sRGB; or a directory",
-    )
-    parser.add_argument(
-        "--frames",
-        type=frame_range,
-        metavar="A:B",
-        help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
-    )
-    parser.add_argument(
-        "--mask",
-        type=named_path,
-        metavar="PATH",
-        help="picture that is white where smoke may be and black where none is, or one for each frame (default: the "
-        "scene's, else none)",
     )
     parser.add_argument("--plate", type=named_path, metavar="FILE.exr", help="write the clean plate, .exr or .png")
     parser.add_argument(
