@@ -50,7 +50,7 @@ def given_plates(background: Background | None, camera: Camera | None, clip: Cli
 
 def _mean_of_frames(numbers: Sequence[int], clip: Clip) -> Picture:
     """The mean (rows, columns, 3) of frames of a clip's file."""
-    whole = clip.whole()
+    whole = clip.whole().as_filmed()
     for number in numbers:
         if number >= len(whole):
             raise ClipError(

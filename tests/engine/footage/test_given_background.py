@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from films import COUNT, HEIGHT, WIDTH, codes_apart, pan, passing_wall
 
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import ClipError
 from smokelift.footage.given_background import background_picture, given_plates, open_plates
 from smokelift.footage.plate import ChangingPlate, Plate
+from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix
 
 CAMERA = Camera.look_at((0, -4, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
@@ -34,6 +37,23 @@ def test_a_colour_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None
     assert isinstance(plates, Plate)
     assert codes_apart(plates.image, passing_wall()[:, 6 : 6 + WIDTH]).max() < 6
     assert open_plates(picture, None) is None
+
+
+def test_frames_of_the_clip_are_its_plate_as_they_were_filmed(tmp_path: Path) -> None:
+    """Also where a mask hides a part of them, and outside the frames in use; those that do not exist are refused."""
+    filmed = np.random.default_rng(0).uniform(0.1, 0.9, (4, 24, 32, 3)).astype(np.float32)
+    for number, picture in enumerate(filmed):
+        write_image(tmp_path / f"frame_{number}.exr", picture)
+    seen = np.zeros((24, 32), np.float32)
+    seen[:, :20] = 1
+    write_image(tmp_path / "mask.png", seen)
+    for mask in (None, tmp_path / "mask.png"):
+        with Clip.open(tmp_path / "frame_#.exr", frames=(1, 2), mask=mask) as clip:
+            plates = given_plates(Background(frame=(0, 3)), None, clip)
+            assert isinstance(plates, Plate)
+            np.testing.assert_allclose(plates.image, filmed[[0, 3]].mean(0), atol=1e-3)
+            with pytest.raises(ClipError, match="has no frame 4"):
+                given_plates(Background(frame=(4,)), None, clip)
 
 
 def test_pictures_are_a_plate_a_frame_and_are_cut_like_one(folder: Path) -> None:
