@@ -6,14 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smokelift.extraction.element import MODEL_ERROR, usual_source
+from smokelift.extraction.element import MODEL_ERROR, extract_element, usual_source
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture, area_average, blurred, reduced_size
+from smokelift.footage.images import Picture, area_average, blurred, channel_mean, reduced_size
 from smokelift.footage.plate import Plates
 from smokelift.scene import Medium
 
 SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and cells along their longer side, from which the source radiance is found."""
+
+LIT_PERCENTILE = 90
+"""Percentile of what thick smoke sends that an assumed light has to reach: with 99 the transmittance of three composed
+clips is off by .02 to .04 more, with 75 the picture of a real one loses 2 dB."""
 
 HUE = 2 * MODEL_ERROR
 """Smallest difference of two colors of mean 1, root mean square, from which on they differ: both may be off by the
@@ -29,6 +33,18 @@ def clip_source(clip: Clip, plates: Plates, frames: Sequence[int], medium: Mediu
     shown = [(clip.stored(frame).linear(), plates.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
     color = np.array((1, 1, 1) if medium is None else medium.color, np.float32)
     return usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE))
+
+
+def brightest_smoke(clip: Clip, plates: Plates, frame: int, source: Picture) -> float:
+    """Return the radiance that the brightest thick smoke of a frame sends, S of its element; 0 without any.
+
+    ``source`` (3,) is what `clip_source` returns. Smoke sends no more than its source radiance, so a light has to make
+    that at least as bright.
+    """
+    picture = clip.stored(frame).linear()
+    element = extract_element(picture, plates.at(frame), source, reduced_size(*clip.size, SOURCE_SIDE))
+    sent = channel_mean(element.radiance)[element.transmittance < 0.5]
+    return float(np.percentile(sent, LIT_PERCENTILE)) if sent.size else 0.0
 
 
 def shows_transmittance(plate: Picture, source: Picture) -> bool:

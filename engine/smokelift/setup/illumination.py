@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from smokelift.checks import Doubt, Figures, Remark
-from smokelift.extraction import tells_source
+from smokelift.extraction import brightest_smoke, tells_source
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.environment_count import environment_count
@@ -70,7 +70,12 @@ def first_light(
     if lights or richest == "absorption":
         return tuple(_countable(each, geometry, medium) for each in lights), richest, (), ()
     found = _shown_source(estimate)
-    source = source_radiance(estimate.samples) if found is None else found
+    if found is None:
+        source = source_radiance(estimate.samples)
+    else:
+        # without shadows no smoke is brighter than the light makes all of it
+        brightest = brightest_smoke(estimate.clip, estimate.found.plates, estimate.samples.smoky[0], found)
+        source = found * max(1.0, brightest / float(found.mean()))
     share = np.array(medium.albedos) / (4 * np.pi)
     red, green, blue = np.divide(source, share, out=np.zeros(3), where=share > 0).tolist()
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
