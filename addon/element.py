@@ -96,6 +96,9 @@ class _Element(OfClip):
 
     def draw(self, context: bpy.types.Context) -> None:
         smoke = active_smoke(context.scene)
+        row = self.layout.row(align=True)
+        row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
+        row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
         for operator, icon in (
             ("smokelift.extract", "IMAGE_RGB_ALPHA"),
             ("smokelift.render_element", "RENDER_ANIMATION"),

@@ -102,16 +102,15 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
 
 def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
-    layout.prop(settings, "plate_mode")
+    row = layout.row(align=True)
+    row.prop(settings, "plate_mode")
+    row.operator("smokelift.plate_from_frame", text="", icon="IMAGE_BACKGROUND")
     if settings.plate_mode == "FILE":
         layout.prop(settings, "plate", text=" ")
     elif settings.plate_mode == "FRAMES":
         row = layout.row(align=True)
         row.prop(settings, "plate_frames", text=" ")
         row.operator("smokelift.clear_plate_frames", text="", icon="X")
-    layout.operator("smokelift.plate_from_frame", icon="IMAGE_BACKGROUND")
-    layout.template_ID(settings, "strokes", open="image.open", text="Strokes")
-    layout.operator("smokelift.paint_strokes", icon="BRUSH_DATA")
     layout.prop(settings, "mask")
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
