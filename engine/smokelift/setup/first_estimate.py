@@ -109,7 +109,7 @@ class FirstEstimate:
 
     ``clip`` is the footage at its background's exposure, without fire and without the brightness that noise adds.
     ``hot`` are the pixels that may be fire. ``source`` (3,) is the usual source radiance of the smoke before a picture;
-    None before black or one color, and without smoke.
+    None before one that does not show its transmittance (`picture_source`), and without smoke.
     """
 
     clip: Clip

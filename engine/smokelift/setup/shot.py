@@ -26,7 +26,7 @@ class ShotView:
 
     Frame 0 of ``clip`` is of the same moment as the input's. The grid is fitted to the small picture ``working``; for a
     camera that moves it is that of the first frame that shows the domain. ``source`` (3,) is the usual source radiance
-    of the smoke before a picture, which is extracted; None before black or one color.
+    of the smoke before a picture that shows its transmittance; then it is extracted. None before any other.
     """
 
     clip: Clip
@@ -56,7 +56,7 @@ class ShotView:
         return Observation(working.camera, image, plate, self.element(frame, working))
 
     def element(self, frame: int, working: WorkingPicture) -> Element | None:
-        """The smoke of a frame, from 0, without the plate, as a small picture; None before black or one color."""
+        """The smoke of a frame, from 0, without the plate, as a small picture; None where ``source`` is."""
         if self.source is None:
             return None
         picture = self.clip.stored(frame).cut(working.part).linear()
