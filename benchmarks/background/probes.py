@@ -17,12 +17,12 @@ import numpy as np
 
 from benchmarks.background.clips import Smoke, backdrop, exposed, filmed, sky, wall
 from smokelift.checks.array_types import Doubles
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
 from smokelift.setup.estimate import UNDETERMINED
-from smokelift.setup.first_estimate import picture_source, sample_smoke
+from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.medium import smoke_colour, source_radiance
 
 Plates = Mapping[str, Picture]
@@ -116,7 +116,8 @@ def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
     clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
     plates = known_plate(plate, clip) if given else find_backdrop(clip, None, None).plates
     samples = sample_smoke(clip, plates)
-    source, bright = picture_source(clip, plates, samples.smoky, None), source_radiance(samples)
+    _, source = with_source(Backdrop("given", clip, plates), clip, samples.smoky, None)
+    bright = source_radiance(samples)
     return ["undetermined" if source is None else f"{source.mean() / true:.2f}", f"{bright.mean() / true:.2f}"]
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Mask
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean
 from smokelift.footage.plate import Plate, noise_at
 
@@ -55,8 +56,11 @@ nine do, in 36 composed clips in white, warm and cold light."""
 MIN_CHROMA = 0.01
 """Lower bound of a channel of the usual source radiance over its mean, for logarithms."""
 
+START_PERCENTILE = 90
+"""Percentile, of what brightens its plate, that the search for J starts from: what is brighter may be no smoke."""
+
 BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
-"""Percentile of a picture's brightness that the usual source radiance starts from, and its lower bound: a picture
+"""Percentile of a picture's brightness that it starts from where smoke only darkens, and its lower bound: a picture
 darker than that shows no light in eight bits."""
 
 FINER = 1.5
@@ -114,8 +118,8 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     """
     columns, rows = size
     shrink = max(1.0, max(size) / MAX_CELLS)
-    cells = _Cells.of(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
-    fields, deviation, weight = _extracted(cells, source)
+    cells = Cells.of(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
+    fields, deviation, weight = extracted(cells, source)
     deviation = blurred(deviation, WINDOW_BLUR)
     small, behind = (area_average(each, columns, rows) for each in (picture, plate.image))
     fields, deviation, weight = (area_average(each, columns, rows) for each in (fields, deviation, weight))
@@ -132,22 +136,32 @@ def source_of(fields: Picture, source: Picture) -> Picture:
     return np.asarray(source * brightness * np.exp(fields[..., 2:] @ CHROMA_BASIS.T), np.float32)
 
 
-def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size: tuple[int, int]) -> Picture:
+def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture | None, size: tuple[int, int]) -> Picture:
     """Return the usual J (3,) of a clip's smoke from some of its pictures: S over opacity, by least squares.
 
-    It is first of a ``color`` (3,), and as bright as the brightest pixels. The pictures are reduced to a ``size``
-    (columns, rows).
+    It is first as bright as what brightens the plates most, or as the brightest pixels if nothing does; and of its
+    color, if none (3,) is given. The pictures are reduced to a ``size`` (columns, rows).
     """
     finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
-    seen = [_Cells.of(picture, plate, size, finer) for picture, plate in pictures]
-    percentile = float(np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
-    source = np.asarray(np.asarray(color, np.float64) / np.mean(color) * max(percentile, MIN_SOURCE), np.float32)
+    seen = [Cells.of(picture, plate, size, finer) for picture, plate in pictures]
+    lit = np.concatenate([cells.seen[cells.brightened] for cells in seen])
+    if len(lit):
+        first = np.percentile(lit, START_PERCENTILE, axis=0)
+    else:
+        brightest = [np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]
+        first = np.full(3, np.mean(brightest))
+    if color is not None:
+        first = np.asarray(color, np.float64) / np.mean(color) * np.mean(first)
+    source = np.asarray(np.maximum(first, MIN_SOURCE), np.float32)
     for _ in range(SOURCE_ROUNDS):
         total, squares = np.zeros(3), 0.0
         for cells in seen:
-            fields, _, weight = _extracted(cells, source)
+            fields, _, weight = extracted(cells, source)
             opacity = fields[..., 0].astype(np.float64)
             sent = cells.seen - (1 - opacity)[..., None] * cells.behind
+            # errors of the plate are errors of S as far as smoke lets them through
+            noise, errors = cells.noise.mean(-1), cells.unknown * (np.trace(cells.errors) / 3)
+            weight = weight * noise / (noise + (1 - opacity) ** 2 * errors)
             total += np.sum((weight * opacity)[..., None] * sent, axis=(0, 1))
             squares += float(np.sum(weight * opacity**2))
         found = np.maximum(total / max(squares, 1e-12), 0)
@@ -156,8 +170,8 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture, size
     return source
 
 
-def _extracted(cells: _Cells, source: Picture) -> tuple[Picture, Picture, Picture]:
-    """Opacity and fields of J, deviation of T and weight of the data by cell; see `_core.extract`."""
+def extracted(cells: Cells, source: Picture) -> tuple[Picture, Picture, Picture]:
+    """Return opacity and fields of J, deviation of T and weight of the data by cell; see `_core.extract`."""
     rows, columns = cells.moments.shape[:2]
     deviations = scale_deviations((columns, rows))
     errors = cells.errors[np.triu_indices(3)].tolist()
@@ -180,7 +194,7 @@ def scale_deviations(cells: tuple[int, int]) -> list[tuple[float, float, float, 
 
 
 @dataclass(frozen=True, eq=False)
-class _Cells:
+class Cells:
     """A picture in cells of so many ``pixels``: their mean, the plate's, and what `_core.extract` takes."""
 
     seen: Picture
@@ -189,8 +203,24 @@ class _Cells:
     errors: Picture
     pixels: float
 
+    @property
+    def noise(self) -> Picture:
+        """Variance (rows, columns, 3) of a pixel of the picture."""
+        return self.moments[..., 21:24]
+
+    @property
+    def unknown(self) -> Picture:
+        """How much of the plate is not known, (rows, columns)."""
+        return self.moments[..., 24]
+
+    @property
+    def brightened(self) -> Mask:
+        """Cells (rows, columns) that something makes brighter than the plate, beyond the noise of a pixel."""
+        change = channel_mean(self.seen - self.behind)
+        return np.asarray(change > 3 * np.sqrt(self.noise.mean(-1) + self.unknown * np.trace(self.errors) / 3))
+
     @staticmethod
-    def of(picture: Picture, plate: Plate, size: tuple[int, int], pixels: float = FINER) -> _Cells:
+    def of(picture: Picture, plate: Plate, size: tuple[int, int], pixels: float = FINER) -> Cells:
         """Average a picture and its plate down to a size (columns, rows), by so many pixels along a cell."""
         columns, rows = size
         whole = picture.shape[1::-1]
@@ -206,4 +236,4 @@ class _Cells:
         model = np.abs(means[..., 9:12]).mean(-1, keepdims=True) + float(plate.image.mean())
         noise = np.maximum(np.square(noise_at(seen, plate)) + np.square(MODEL_ERROR * model), MIN_VARIANCE)
         moments = np.dstack([means[..., :21], noise, means[..., 21:]])
-        return _Cells(seen, means[..., :3], moments, plate.errors, finer[0] * finer[1] / (columns * rows))
+        return Cells(seen, means[..., :3], moments, plate.errors, finer[0] * finer[1] / (columns * rows))

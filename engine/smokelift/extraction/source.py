@@ -28,10 +28,10 @@ def clip_source(clip: Clip, plates: Plates, frames: Sequence[int], medium: Mediu
     """Return the usual source radiance (3,) of a clip's smoke before its plates, from the first of some frames.
 
     ``frames`` (one at least) have those with the most smoke first. A ``medium`` that is given has the color that the
-    search starts from, else it is white.
+    search starts from.
     """
     shown = [(clip.stored(frame).linear(), plates.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
-    color = np.array((1, 1, 1) if medium is None else medium.color, np.float32)
+    color = None if medium is None else np.array(medium.color, np.float32)
     return usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE))
 
 

@@ -92,6 +92,8 @@ class Backdrop:
         the camera is known to move.
     frames
         Number of the file's frames, up to the next cut, that it was estimated from.
+    shot
+        First and last of these in the file; None where it was not estimated from frames.
     quantiser
         The file's median quantiser, if known; only for an estimated picture.
     cut
@@ -105,9 +107,14 @@ class Backdrop:
     plates: Plates
     background: Background | None = None
     frames: int = 0
+    shot: tuple[int, int] | None = None
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
     strokes: Strokes | None = None
+
+    def shot_of(self, clip: Clip) -> Clip:
+        """Return the part of a clip's file that the background was estimated from."""
+        return clip if self.shot is None else clip.part(*self.shot)
 
 
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
@@ -168,7 +175,7 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))
         return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
-    made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut)
+    made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=(part.numbers[0], part.numbers[-1]), cut=cut)
     # black, or a colour seen often, is the same wherever the camera points; any other may be texture that passes by
     plain = found.colour is not None and (found.clear > SEEN_OFTEN or not found.colour.any())
     if not plain and camera_motion.moves(proxy.between(*proxy.clip).pictures):

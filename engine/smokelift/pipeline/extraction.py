@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from smokelift.checks import require_kind
-from smokelift.extraction import Element, clip_source, extract_element
+from smokelift.extraction import Element, extract_element, plates_and_source
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern
@@ -126,4 +126,4 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     found = find_backdrop(clip, scene.camera, scene.background)
     exposed = evened(found.clip, found.plates)
     smoky = sample_smoke(found.clip, found.plates).smoky or range(len(clip))
-    return Extraction(exposed, found.plates, clip_source(exposed, found.plates, smoky, scene.medium))
+    return Extraction(exposed, *plates_and_source(exposed, found.shot_of(exposed), found.plates, smoky, scene.medium))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.extraction import clip_source, shows_transmittance
+from smokelift.extraction import plates_and_source, shows_transmittance
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
@@ -109,7 +109,7 @@ class FirstEstimate:
 
     ``clip`` is the footage at its background's exposure, without fire and without the brightness that noise adds.
     ``hot`` are the pixels that may be fire. ``source`` (3,) is the usual source radiance of the smoke before a picture;
-    None before one that does not show its transmittance (`picture_source`), and without smoke.
+    None before one that does not show its transmittance (`with_source`), and without smoke.
     """
 
     clip: Clip
@@ -137,21 +137,26 @@ def first_estimate(
         light = firelight(exposed, doused)
         fire, exposed = Fire(hot.share, light, flame_color or fire_colour(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
-    return FirstEstimate(
-        exposed, found, samples, fire, hot, picture_source(exposed, found.plates, samples.smoky, medium)
-    )
+    settled, source = with_source(found, exposed, samples.smoky, medium)
+    if settled is not found:
+        samples = replace(sample_smoke(exposed, settled.plates), gains=samples.gains)
+    return FirstEstimate(exposed, settled, samples, fire, hot, source)
 
 
-def picture_source(clip: Clip, plates: Plates, smoky: Sequence[int], medium: Medium | None) -> Picture | None:
-    """Return the usual source radiance (3,) of smoke before a picture; None before one that does not show T.
+def with_source(
+    found: Backdrop, clip: Clip, smoky: Sequence[int], medium: Medium | None
+) -> tuple[Backdrop, Picture | None]:
+    """Return what is behind the smoke of a clip, in turn with the smoke, and the usual source radiance (3,) of that.
 
-    That is black, one color, or as good as one. ``smoky`` are frames with smoke, those with the most first; without any
-    the answer is None.
+    There is none before what does not show T: black, one color, or a picture that is as good as one; and without
+    ``smoky`` frames, those with the most smoke first.
     """
-    if not smoky or backdrop_colour(plates.at(smoky[0]).image) is not None:
-        return None
-    source = clip_source(clip, plates, smoky, medium)
-    return source if shows_transmittance(plates.at(smoky[0]).image, source) else None
+    if not smoky or backdrop_colour(found.plates.at(smoky[0]).image) is not None:
+        return found, None
+    plates, source = plates_and_source(clip, found.shot_of(clip), found.plates, smoky, medium)
+    if not shows_transmittance(plates.at(smoky[0]).image, source):
+        return found, None
+    return found if plates is found.plates else replace(found, plates=plates), source
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:

@@ -26,7 +26,7 @@ from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_remarks import backdrop_remarks
 from smokelift.setup.coarse import HeldOut, coarse_frames, held_out
 from smokelift.setup.estimate import Estimate
-from smokelift.setup.first_estimate import picture_source, sample_smoke
+from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -98,9 +98,9 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         background = replace(scene.background, strokes=None)
     found = find_backdrop(opened, camera, background)
     try:
-        shown = ShotView.before(scene.domain, evened(found.clip, found.plates), camera, found.plates)
-        smoky = sample_smoke(found.clip, found.plates).smoky
-        shown = replace(shown, source=picture_source(shown.clip, found.plates, smoky, scene.medium))
+        exposed, smoky = evened(found.clip, found.plates), sample_smoke(found.clip, found.plates).smoky
+        found, source = with_source(found, exposed, smoky, scene.medium)
+        shown = replace(ShotView.before(scene.domain, exposed, camera, found.plates), source=source)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]

@@ -1,0 +1,92 @@
+"""A plate whose middle no frame shows clear, before which smoke drifts or stands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.extraction.hidden_plate import plate_in_turn
+from smokelift.footage.images import Picture, area_average, blurred
+from smokelift.footage.noise import EIGHT_BIT_NOISE
+from smokelift.footage.plate import Plate
+
+COLUMNS, ROWS, FRAMES = 192, 160, 8
+SOURCE = np.array([0.6, 0.58, 0.55], np.float32)
+X, Y = np.meshgrid(np.arange(COLUMNS), np.arange(ROWS))
+
+
+class Pictures:
+    """A clip of linear pictures; what `plate_in_turn` reads of one."""
+
+    def __init__(self, pictures: list[Picture]) -> None:
+        self.pictures, self.size = pictures, (COLUMNS, ROWS)
+
+    def spread(self, count: int) -> range:
+        return range(min(count, len(self.pictures)))
+
+    def stored(self, frame: int) -> "Pictures":
+        self.shown = self.pictures[frame]
+        return self
+
+    def averaged(self, columns: int, rows: int) -> Picture:
+        return area_average(self.shown, columns, rows)
+
+
+def wall() -> Picture:
+    detail = blurred(np.random.default_rng(1).standard_normal((ROWS, COLUMNS, 3)).astype("f4"), 2.4)
+    return np.maximum(0.25 * (1 + 0.4 * detail / detail.std()), 0.02).astype("f4")
+
+
+def filmed(behind: Picture, centers: list[float], depth: float) -> Pictures:
+    noise = np.random.default_rng(2)
+    pictures = []
+    for center in centers:
+        clear = np.exp(-depth * np.exp(-((X - center) ** 2 + (Y - 80) ** 2) / 1000))[..., None]
+        picture = clear * behind + (1 - clear) * SOURCE + 0.002 * noise.standard_normal(behind.shape)
+        pictures.append(picture.astype("f4"))
+    return Pictures(pictures)
+
+
+def continued(behind: Picture) -> Plate:
+    """The wall with a middle that is brighter and smoother than it is."""
+    unknown = np.clip(1.5 - ((X - 96) ** 2 + (Y - 80) ** 2) / 1200, 0, 1).astype("f4")[..., None]
+    image = behind + unknown * (blurred(behind, 4.0) + 0.08 - behind)
+    errors = np.full((3, 3), 0.15**2, np.float32) + np.eye(3, dtype="f4") * 3e-3
+    return Plate(image.astype("f4"), 1 - unknown[..., 0], EIGHT_BIT_NOISE, errors)
+
+
+def off(plate: Plate, behind: Picture) -> float:
+    unknown = continued(behind).confidence < 0.5
+    return float(np.sqrt(np.square((plate.image - behind)[unknown]).mean()))
+
+
+def test_smoke_that_drifts_shows_what_is_behind_it() -> None:
+    behind = wall()
+    plate = continued(behind)
+    better = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 1.5), plate, SOURCE)
+    assert off(better, behind) < 0.5 * off(plate, behind)
+    assert (better.confidence >= plate.confidence - 1e-6).all()
+    assert better.confidence[plate.confidence < 0.5].mean() > 0.6
+
+
+def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
+    behind = wall()
+    plate = continued(behind)
+    same = plate_in_turn(filmed(behind, [96.0] * FRAMES, 6.0), plate, SOURCE)
+    assert off(same, behind) < 1.1 * off(plate, behind)
+    middle = np.hypot(X - 96, Y - 80) < 16
+    assert same.confidence[middle].max() < 0.5
+
+
+def test_what_is_known_stays() -> None:
+    behind = wall()
+    plate = continued(behind)
+    better = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 1.5), plate, SOURCE)
+    known = plate.confidence == 1
+    assert np.array_equal(better.image[known], plate.image[known])
+
+
+@pytest.mark.parametrize("change", [{"confidence": np.ones((ROWS, COLUMNS), "f4")}, {"errors": np.zeros((3, 3), "f4")}])
+def test_a_plate_without_errors_is_returned_itself(change) -> None:
+    plate = replace(continued(wall()), **change)
+    assert plate_in_turn(filmed(plate.image, [96.0], 1.0), plate, SOURCE) is plate
