@@ -88,8 +88,8 @@ class FittedDensity:
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture as its view has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
         ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``relative_error``, the
-        root mean square of the input's differences over that of what the smoke changes there: 1 if nothing is fitted,
-        however faint the smoke; ``iterations``; ``hull_share``, the hull's share of the voxels.
+        root mean square of the input's differences over that of what changes there, with what its element leaves out
+        as no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_share``, the hull's share of the voxels.
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
     steady : (nx, ny, nz) float32, optional
@@ -284,10 +284,11 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
             decibels[name] = float(-10 * np.log10(max(losses[-1] / left.size, 1e-12)))
     front = views.views[0]
     change = float(np.sum(np.square((front.image - front.background)[front.counted][:, :3], dtype=np.float64)))
+    left_out = float(np.sum(np.square(front.left_out[front.counted], dtype=np.float64)))
     return {
         "loss": sum(losses),
         **decibels,
-        **({"relative_error": math.sqrt(losses[0] / change)} if change > 0 else {}),
+        **({"relative_error": math.sqrt((losses[0] + left_out) / (change + left_out))} if change > 0 else {}),
         "iterations": float(iterations),
         "hull_share": np.count_nonzero(views.hull) / views.hull.size,
     }

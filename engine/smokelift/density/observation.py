@@ -163,12 +163,15 @@ class ObservedView:
         Of smoke without shadows that explains the picture; 0 outside the mask.
     counted : (rows, columns) bool
         Pixels that the voxels behind the mask can change: a fit is judged by them.
+    left_out : (rows, columns, 3)
+        What an element leaves of the observation since it is neither smoke nor its plate; faded like the image.
     """
 
     camera: Camera
     image: Image
     background: Image
     noise: Image
+    left_out: Image
     share: NDArray[np.float32]
     mask: NDArray[np.bool_]
     optical_depth: NDArray[np.float32]
@@ -184,20 +187,21 @@ class ObservedView:
         share = matte(observation.image, plate).share
         if observation.element is None:
             image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
+            left_out = np.zeros_like(image)
         else:
             image, background, noise = _over_one_color(observation.element, observation.image, plate)
+            left_out = observation.image - observation.element.over(plate.image)
             share = np.maximum(share, _faint_smoke(observation.element, share == 0))
-        return _against_grid(
-            camera, background + share[..., None] * (image - background), background, noise, share, optics
-        )
+        image = background + share[..., None] * (image - background)
+        return _against_grid(camera, image, background, noise, share[..., None] * left_out, share, optics)
 
     def coarser(self, optics: Optics) -> ObservedView:
         """Set the observation against another grid, at one pixel per voxel if its own pixels are finer."""
         shrink = max(1.0, voxel_width(self.camera, optics.domain))
         columns, rows = (max(1, round(side / shrink)) for side in self.camera.size)
-        pictures = (self.image, self.background, self.noise, self.share)
-        image, background, noise, share = (area_average(each, columns, rows) for each in pictures)
-        return _against_grid(self.camera.resized(columns, rows), image, background, noise, share, optics)
+        pictures = (self.image, self.background, self.noise, self.left_out, self.share)
+        image, background, noise, left_out, share = (area_average(each, columns, rows) for each in pictures)
+        return _against_grid(self.camera.resized(columns, rows), image, background, noise, left_out, share, optics)
 
     def before_darkness(self, source: NDArray[np.float64]) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
@@ -252,13 +256,20 @@ class ViewSet:
 
 
 def _against_grid(
-    camera: Camera, image: Image, background: Image, noise: Image, share: NDArray[np.float32], optics: Optics
+    camera: Camera,
+    image: Image,
+    background: Image,
+    noise: Image,
+    left_out: Image,
+    share: NDArray[np.float32],
+    optics: Optics,
 ) -> ObservedView:
     """A picture, faded to its background, against the grid of `optics.domain`."""
     mask = share > 0
     projection = project_voxels(camera, optics.domain)
     depth = apparent_optical_depth(image, background, noise, mask, optics)
-    return ObservedView(camera, image, background, noise, share, mask, depth, projection, reached(mask, projection))
+    counted = reached(mask, projection)
+    return ObservedView(camera, image, background, noise, left_out, share, mask, depth, projection, counted)
 
 
 def apparent_optical_depth(

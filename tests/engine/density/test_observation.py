@@ -95,6 +95,23 @@ def fitted(observation: Observation, scene: Scene) -> np.ndarray:
     return GradientFit(QUICK).fit(seen, RoundDepth().estimate(seen), None).density
 
 
+def test_what_an_element_leaves_out_is_a_fault_of_the_fit(plume, small, wall) -> None:
+    """A hand before the smoke is an outlier of the extraction; nothing of it is fitted, and the figures say so."""
+    element, plate = element_of(plume, small), eight_bit_plate(wall, small.camera.size)
+    hand = np.zeros((42, 30, 1), np.float32)
+    hand[20:26, 12:18] = 0.4
+    optics = scene_optics(completed(small))
+    errors = []
+    for picture in (element.over(wall), element.over(wall) + hand):
+        seen = ViewSet.of([Observation(small.camera, picture, plate, element)], optics)
+        (view,) = seen.views
+        np.testing.assert_allclose(view.left_out, view.share[..., None] * (picture - element.over(wall)), atol=1e-6)
+        figures = GradientFit(QUICK).fit(seen, RoundDepth().estimate(seen), None).figures
+        errors.append(figures["relative_error"])
+    assert errors[0] < 0.1
+    assert errors[1] > 0.3
+
+
 def test_a_fit_of_an_element_does_not_know_its_plate(plume, small, wall) -> None:
     """Smoke that is known before a wall is what it is before the wall's mean color, to a thousandth, and has its
     mass."""

@@ -47,14 +47,14 @@ def test_bright_smoke_of_the_hue_of_a_dim_plate_is_as_bright_as_it_is(depth) -> 
     wall = Plate(image, dim.confidence, dim.noise)
     pictures = [(before(wall, tuple(source), depth, height), wall) for height in (45, 55)]
     found = usual_source(pictures, None, (48, 40))
-    assert (np.abs(np.log2(found / source)) < 1).all()
+    assert (np.abs(np.log2(found / source)) < 1.1).all()
 
 
 def test_errors_of_a_plate_are_not_taken_for_the_source() -> None:
     wall = plate(0.04)
-    guess = (wall.image + 0.3 * (np.arange(SIZE[0]) > 60)[:, None]).astype("f4")
+    wrong = (wall.image + 0.3 * (np.arange(SIZE[0]) > 60)[:, None]).astype("f4")
     unknown = np.broadcast_to((np.arange(SIZE[0]) <= 60).astype("f4"), SIZE[::-1]).copy()
-    off = Plate(guess, unknown, wall.noise, np.full((3, 3), 0.09, "f4") + 1e-3 * np.eye(3, dtype="f4"))
+    off = Plate(wrong, unknown, wall.noise, np.full((3, 3), 0.09, "f4") + 1e-3 * np.eye(3, dtype="f4"))
     pictures = [(before(wall, (0.6, 0.6, 0.6), 1.0, height), off) for height in (35, 45)]
     assert usual_source(pictures, np.ones(3, np.float32), (48, 40)) == pytest.approx(np.full(3, 0.6), rel=0.25)
 
