@@ -5,7 +5,7 @@
 
 A SCENE is a folder with truth.npz and what `benchmarks.truth.picture` makes of it. A plate is one of `plates.PAINTED`
 or `plates.PHOTOGRAPHS` (which are files of scikit-image), or the path of a picture. Of the plate a scene file knows the
-picture (given), a frame of the clip with hardly any smoke (frame), or nothing (unknown); without any of them the clips
+picture (given), a frame of the clip without smoke (frame), or nothing (unknown); without any of them the clips
 are only composed. Camera, box, medium and lights are given. With --black the same smoke before black follows, from
 which nothing has to be separated.
 

@@ -23,12 +23,15 @@ from smokelift.render import scene_renderer
 from smokelift.scene import completed
 
 GIVEN, FRAME, UNKNOWN = KNOWN = ("given", "frame", "unknown")
-"""What a scene file knows of the plate: the picture, a frame of the clip with hardly any smoke, or nothing."""
+"""What a scene file knows of the plate: the picture, a frame of the clip without smoke, or nothing."""
 
 CRF = 18
 """Quality of H.264 at which a compressed clip is hard to tell from its original."""
 
 Half = npt.NDArray[np.float16]
+
+WITH_EMPTY_SET = "with_empty_set.mp4"
+"""File of the clip that begins with one frame without smoke."""
 
 TRUTH = "element.npz"
 """File of a composed scene with its true element."""
@@ -163,8 +166,8 @@ def folder_name(scene: str, plate_of: str, filming: Filming) -> str:
 def compose(smoke: BakedSmoke, behind: str, filming: Filming, out: Path) -> Composed:
     """Put smoke before a plate and write everything into a folder, unless that is done already.
 
-    The folder gets clip.mp4, plate.png, the true element as `TRUTH`, and a scene file for each of `KNOWN`. It appears
-    whole or not at all.
+    The folder gets clip.mp4, `WITH_EMPTY_SET`, plate.png, the true element as `TRUTH`, and a scene file for each of
+    `KNOWN`. It appears whole or not at all.
 
     Parameters
     ----------
@@ -202,9 +205,11 @@ def compose(smoke: BakedSmoke, behind: str, filming: Filming, out: Path) -> Comp
     known = Background(color=(0.0, 0.0, 0.0)) if behind == BLACK else Background(image=part / "plate.png")
     replace(scene, background=known).save(part / f"{GIVEN}.toml")
     scene.save(part / f"{UNKNOWN}.toml")
-    emptiest = int((1 - front.transmittance).mean((1, 2)).argmin())
-    text = (part / f"{UNKNOWN}.toml").read_text()
-    (part / f"{FRAME}.toml").write_text(f"{text}\n[background]\nframe = {emptiest}\n")
+    # the whole clip begins when the set is empty; the part in use does not hold that
+    empty = np.concatenate([composed.plate[None], front.before(composed.plate)])
+    write_video(part / WITH_EMPTY_SET, list(eight_bits(filming.filmed(empty))), FPS, filming.crf)
+    used = ClipSource(part / WITH_EMPTY_SET, frames=(1, len(front.radiance)))
+    replace(scene, clip=used, background=Background(frame=(0,))).save(part / f"{FRAME}.toml")
     part.rename(out)
     return composed
 
