@@ -51,9 +51,9 @@ rather than the picture (docs/experiments/extraction.md)."""
 USEFUL_DEVIATION = 0.4
 """Deviation of T beyond which it shows little: smoke is clear air or not, by one and a half of it to either side."""
 
-CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.8, 1.28
-"""Quantile of the opacity that is found in clear air, and the deviations of normal noise's size there. So a fifth of it
-may be smoke of the plate's brightness; .98 and 2.33 make next to no difference on composed clips."""
+CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.98, 2.33
+"""Quantile of the opacity that is found in clear air, and the deviations of normal noise's size there. With .9 and
+1.645 a codec's errors at the rim of a puff are taken for smoke."""
 
 MIN_OPACITY_NOISE = 0.01
 """Smallest such opacity: a step or two of eight bits before a bright plate."""

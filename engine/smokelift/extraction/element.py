@@ -139,8 +139,8 @@ def source_of(fields: Picture, source: Picture) -> Picture:
 def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture | None, size: tuple[int, int]) -> Picture:
     """Return the usual J (3,) of a clip's smoke from some of its pictures: S over opacity, by least squares.
 
-    It is first as bright as what brightens the plates most, or as the brightest pixels if nothing does; and of its
-    color, if none (3,) is given. The pictures are reduced to a ``size`` (columns, rows).
+    It is first what brightens the plates most, or as bright as the brightest pixels if nothing does; and of a ``color``
+    (3,), if that is given. The pictures are reduced to a ``size`` (columns, rows).
     """
     finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
     seen = [Cells.of(picture, plate, size, finer) for picture, plate in pictures]

@@ -76,8 +76,8 @@ SENTENCES: Mapping[str, str] = {
     "background seen": "Background estimated from the clip, which shows every part of it free of smoke.",
     "background partly seen": (
         "Background estimated from the clip; {unknown:.0%} of the picture is hardly ever free of smoke. The background "
-        "there is filled in from around it, so how thick the smoke is there is undetermined. Give a clean plate as "
-        "background to show it."
+        "there is filled in from around it and from what the smoke lets through, so how thick the smoke is there is "
+        "uncertain. Give a clean plate as background to show it."
     ),
     "strokes": (
         "Strokes: of the picture {smoke:.1%} is painted as smoke, {other:.1%} as not smoke, and {behind:.1%} as "

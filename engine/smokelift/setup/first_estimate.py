@@ -107,13 +107,15 @@ class Fire:
 class FirstEstimate:
     """What a clip shows: its background, its smoke, and its fire if any burns.
 
-    ``clip`` is the footage at its background's exposure, without fire and without the brightness that noise adds.
-    ``hot`` are the pixels that may be fire. ``source`` (3,) is the usual source radiance of the smoke before a picture;
-    None before one that does not show its transmittance (`with_source`), and without smoke.
+    ``plates`` are those that were ``found``, and better known where smoke hides them. ``clip`` is the footage at its
+    background's exposure, without fire and without the brightness that noise adds. ``hot`` are the pixels that may be
+    fire. ``source`` (3,) is the usual source radiance of the smoke before a picture; None before one that does not show
+    its transmittance (`with_source`), and without smoke.
     """
 
     clip: Clip
     found: Backdrop
+    plates: Plates
     samples: SmokeSamples
     fire: Fire | None
     hot: HotPixels
@@ -137,26 +139,26 @@ def first_estimate(
         light = firelight(exposed, doused)
         fire, exposed = Fire(hot.share, light, flame_color or fire_colour(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
-    settled, source = with_source(found, exposed, samples.smoky, medium)
-    if settled is not found:
-        samples = replace(sample_smoke(exposed, settled.plates), gains=samples.gains)
-    return FirstEstimate(exposed, settled, samples, fire, hot, source)
+    plates, source = with_source(found, exposed, samples.smoky, medium)
+    if plates is not found.plates:
+        # what no frame shows clear is unknown, although turns say what is behind it
+        again = sample_smoke(exposed, plates)
+        samples = replace(again, gains=samples.gains, unknown=samples.unknown, over_known=samples.over_known)
+    return FirstEstimate(exposed, found, plates, samples, fire, hot, source)
 
 
 def with_source(
     found: Backdrop, clip: Clip, smoky: Sequence[int], medium: Medium | None
-) -> tuple[Backdrop, Picture | None]:
-    """Return what is behind the smoke of a clip, in turn with the smoke, and the usual source radiance (3,) of that.
+) -> tuple[Plates, Picture | None]:
+    """Return the plates of a clip, found in turn with its smoke, and the usual source radiance (3,) of that.
 
     There is none before what does not show T: black, one color, or a picture that is as good as one; and without
     ``smoky`` frames, those with the most smoke first.
     """
     if not smoky or backdrop_colour(found.plates.at(smoky[0]).image) is not None:
-        return found, None
+        return found.plates, None
     plates, source = plates_and_source(clip, found.shot_of(clip), found.plates, smoky, medium)
-    if not shows_transmittance(plates.at(smoky[0]).image, source):
-        return found, None
-    return found if plates is found.plates else replace(found, plates=plates), source
+    return (plates, source) if shows_transmittance(plates.at(smoky[0]).image, source) else (found.plates, None)
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:

@@ -99,8 +99,8 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     found = find_backdrop(opened, camera, background)
     try:
         exposed, smoky = evened(found.clip, found.plates), sample_smoke(found.clip, found.plates).smoky
-        found, source = with_source(found, exposed, smoky, scene.medium)
-        shown = replace(ShotView.before(scene.domain, exposed, camera, found.plates), source=source)
+        plates, source = with_source(found, exposed, smoky, scene.medium)
+        shown = replace(ShotView.before(scene.domain, exposed, camera, plates), source=source)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]

@@ -257,7 +257,7 @@ def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpect
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
-            frames.append((part(estimate.clip.frame(number)), estimate.found.plates.at(number).through(part)))
+            frames.append((part(estimate.clip.frame(number)), estimate.plates.at(number).through(part)))
     return smoke_detail(frames, _pixels(camera.at(smoky[0]), box)) if smoky else None
 
 

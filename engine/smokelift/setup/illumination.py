@@ -74,7 +74,7 @@ def first_light(
         source = source_radiance(estimate.samples)
     else:
         # without shadows no smoke is brighter than the light makes all of it
-        brightest = brightest_smoke(estimate.clip, estimate.found.plates, estimate.samples.smoky[0], found)
+        brightest = brightest_smoke(estimate.clip, estimate.plates, estimate.samples.smoky[0], found)
         source = found * max(1.0, brightest / float(found.mean()))
     share = np.array(medium.albedos) / (4 * np.pi)
     red, green, blue = np.divide(source, share, out=np.zeros(3), where=share > 0).tolist()
@@ -84,7 +84,7 @@ def first_light(
 
 def _shown_source(estimate: FirstEstimate) -> Picture | None:
     """The source radiance (3,) of the smoke; None where what is behind it hardly shows it."""
-    if estimate.source is None or not tells_source(estimate.found.plates.at(estimate.samples.smoky[0]).image):
+    if estimate.source is None or not tells_source(estimate.plates.at(estimate.samples.smoky[0]).image):
         return None
     return estimate.source
 

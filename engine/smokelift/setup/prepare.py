@@ -54,7 +54,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
     estimate = first_estimate(clip, scene.camera, scene.background, scene.medium)
-    plates, samples = estimate.found.plates, estimate.samples
+    plates, samples = estimate.plates, estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium, medium_remarks = find_medium(scene, estimate, camera, domain)

@@ -64,7 +64,7 @@ def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft
     true = 0.9 / (4 * np.pi) * 9.0 * np.array(tint)  # without the little that the haze shades itself
     found = chosen(shot, "source radiance")
     assert found.source == "measured"
-    assert [found.figures[name] for name in ("red", "green", "blue")] == pytest.approx(true, rel=0.25)
+    assert [found.figures[name] for name in ("red", "green", "blue")] == pytest.approx(true, rel=0.3)
     assert shot.optics.unshadowed_source() == pytest.approx(shot.views[0].source, rel=1e-4)
 
 
