@@ -61,6 +61,9 @@ MIN_MOVED = 1 / 8
 """Smallest part of the frames of a camera that moves: of falling ash one in fifteen fits a motion, with the frames next
 to it, and a knock is over in fewer."""
 
+JUDGED = 16
+"""Frames that show whether the camera moves at all: two of them, a fourth of a second of a clip of two, are enough."""
+
 MIN_REGISTERED = 0.8
 """Smallest part of the frames that have to be registered: what is behind the smoke of the others is unknown."""
 
@@ -72,8 +75,12 @@ BLACK, MIN_BLACK = np.float32(4 / 255), 0.15
 motion are the smoke's: what a camera that travels sees has texture or a sky."""
 
 
+USUAL, FIT_ROUNDS = 0.1, 5
+"""Distance, in pixels of the proxy, at which a cell's weight in a fit is half (Cauchy weights): smoke moves cells by
+less than `IN_PLACE`, too. Rounds in which they settle."""
+
 ROUNDS = 2
-"""Times that a motion is measured again on the registered frame: a third changes it by less than .01 pixels."""
+"""Times that a motion is measured again on the frame that is registered by it."""
 
 
 @dataclass(frozen=True)
@@ -202,9 +209,12 @@ class Texture:
             offsets = shifts - turns * points
             fits = _apart(shifts - turns[..., None] * points - offsets[..., None], tensors) <= limit
             near = fits[np.unravel_index(fits.sum(-1).argmax(), turns.shape)]
-            for _ in range(ROUNDS):
-                turn, shift = _least_squares(points, shifts, tensors * near)
-                near = _apart(shifts - turn * points - shift, tensors) <= limit
+            weights = near.astype(np.float64)
+            for _ in range(FIT_ROUNDS):
+                turn, shift = _least_squares(points, shifts, tensors * weights)
+                apart = _apart(shifts - turn * points - shift, tensors)
+                near = apart <= limit
+                weights = near / (1 + (apart * self._length / USUAL) ** 2)
         return Match(Similarity(1 + turn, shift), len(found), int(self._textured.sum()), count, 0, int(near.sum()))
 
     def _cut(self, detail: Picture) -> Picture:
@@ -281,11 +291,12 @@ class CameraMotion:
 
 def find_motion(proxy: Proxy) -> CameraMotion | Literal["other"] | None:
     """Return how the camera moves in a proxy's frames: None if it stands still, "other" if as no similarity does."""
-    texture = Texture(proxy.pictures[len(proxy.numbers) // 2])
-    matches = [texture.match(picture) for picture in proxy.pictures]
-    if not _some_move(matches):
+    count = len(proxy.numbers)
+    texture = Texture(proxy.pictures[count // 2])
+    some = np.unique(np.linspace(0, count - 1, min(count, JUDGED)).round().astype(int))
+    if not _some_move([texture.match(proxy.pictures[n]) for n in some]):
         return None
-    found = _registered_to_median(proxy, matches)
+    found = _registered_to_median(proxy, [texture.match(picture) for picture in proxy.pictures])
     if found is None:
         black = (brightest_channel(proxy.encoded) <= BLACK).mean() >= MIN_BLACK
         return None if black else "other"
