@@ -2,9 +2,9 @@
 
 The first of these that applies: what an alpha channel says; what the scene gives; one colour, if the whole file makes
 it the likeliest (`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show
-next to nothing. Before a picture the camera must stand still (`camera_motion`); one colour is the same wherever it
-points. The clip's noise is measured first, on what cannot be smoke (`noise`). Strokes of the scene change what was
-found (`strokes`); an alpha channel leaves nothing for them to say.
+next to nothing. If the camera moves before a picture, the frames are registered (`camera_motion`), or the clip is
+refused; one colour is the same wherever it points. The clip's noise is measured first, on what cannot be smoke
+(`noise`). Strokes of the scene change what was found (`strokes`); an alpha channel leaves nothing for them to say.
 """
 
 from __future__ import annotations
@@ -119,8 +119,9 @@ class Backdrop:
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
     """Find what stands behind the smoke of a clip, given what the scene says of it.
 
-    ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves and the
-    background is neither given for every frame nor of one colour, or strokes are given.
+    ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves, other
+    than a similarity of the picture mends, and the background is neither given for every frame nor of one colour, or
+    strokes are given.
     """
     grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
     behind, moves = grey or background, camera is not None and camera.moves

@@ -50,8 +50,8 @@ FITTING_OVER_PLACED = 3
 place even where smoke hides most of it; labels that are drawn into a picture stay while a camera moves."""
 
 CLEARLY = 0.75
-"""Part of the found cells that fit the motion of a camera for certain. Four cameras in the hand have .75 to 1 in most
-frames, a forest that a drone nears slowly .5 (docs/experiments/turning-camera.md)."""
+"""Part of the found cells that fit the motion of a camera for certain. Shakes and drifts have .7 to 1 in half of their
+frames, a forest that a drone nears slowly .4 (docs/experiments/turning-camera.md)."""
 
 MIN_TEXTURED, MAX_PLACED = 1 / 3, 0.1
 """Smallest part of the cells with texture, and largest part of the found ones in place, where shifts that fit no motion
@@ -62,7 +62,7 @@ MIN_MOVED = 1 / 8
 to it, and a knock is over in fewer."""
 
 JUDGED = 16
-"""Frames that show whether the camera moves at all: two of them, a fourth of a second of a clip of two, are enough."""
+"""Frames that show whether the camera moves at all; the others cost as much again."""
 
 MIN_REGISTERED = 0.8
 """Smallest part of the frames that have to be registered: what is behind the smoke of the others is unknown."""
@@ -73,7 +73,6 @@ MAX_REACH = 1 / 8
 BLACK, MIN_BLACK = np.float32(4 / 255), 0.15
 """Largest sRGB value of black with its noise, and smallest part of all pixels in it from which on shifts that fit no
 motion are the smoke's: what a camera that travels sees has texture or a sky."""
-
 
 USUAL, FIT_ROUNDS = 0.1, 5
 """Distance, in pixels of the proxy, at which a cell's weight in a fit is half (Cauchy weights): smoke moves cells by
