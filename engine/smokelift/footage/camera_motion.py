@@ -28,9 +28,10 @@ Complex = npt.NDArray[np.complex128]
 FINE_SIGMA, COARSE_SIGMA, CONTRAST_SIGMA = 0.8, 3.0, 6.0
 """Standard deviations, in pixels, of the band-pass's two Gaussians, and of the one that measures its contrast."""
 
-MIN_CONTRAST = 2.5 / 255
-"""Contrast in sRGB values below which there is more noise or fog than texture: of a plastered wall that shakes 4 leaves
-too few cells to see it, and at 1.5 falling ash has texture everywhere (docs/experiments/turning-camera.md)."""
+MIN_CONTRAST, CLEAR = 1.6 / 255, 0.66
+"""Contrast in sRGB values from which on there is texture, and smallest part of a cell's variance that is clear texture,
+of 1.4 times that contrast. From 4 of 255 on a plastered wall that shakes has too few cells to see it
+(docs/experiments/turning-camera.md)."""
 
 CELLS = 6
 """Cells side by side along the picture's longer side; the cells between these overlap them by half."""
@@ -49,17 +50,17 @@ FITTING_OVER_PLACED = 3
 """Cells that fit a motion, over cells in place, up to which the camera stands still. What a still camera shows is in
 place even where smoke hides most of it; labels that are drawn into a picture stay while a camera moves."""
 
-CLEARLY = 0.75
-"""Part of the found cells that fit the motion of a camera for certain. Shakes and drifts have .7 to 1 in half of their
+CLEARLY = 0.65
+"""Part of the found cells that fit the motion of a camera for certain. Shakes and drifts have .65 to 1 in half of their
 frames, a forest that a drone nears slowly .4 (docs/experiments/turning-camera.md)."""
 
 MIN_TEXTURED, MAX_PLACED = 1 / 3, 0.1
-"""Smallest part of the cells with texture, and largest part of the found ones in place, where shifts that fit no motion
-are those of a camera that travels: smoke alone has less texture, and leaves more in place."""
+"""Smallest part of the cells with clear texture, and largest part of the found ones in place, where shifts that fit no
+motion are those of a camera that travels: smoke alone has less texture, falling ash .22, and leaves more in place."""
 
 MIN_MOVED = 1 / 8
-"""Smallest part of the frames of a camera that moves: of falling ash one in fifteen fits a motion, with the frames next
-to it, and a knock is over in fewer."""
+"""Smallest part of the frames of a camera that moves: of falling ash the frames next to the reference fit a motion, and
+a knock is over in fewer."""
 
 JUDGED = 16
 """Frames that show whether the camera moves at all; the others cost as much again."""
@@ -90,18 +91,20 @@ class Match:
     ----------
     motion
         The motion that most cells fit.
-    cells, textured
-        Number of cells, and of those in which the reference has texture.
     found, placed, fitting
-        Number of these that the frame shows again, that are in place, and that fit the motion.
+        Numbers of cells with texture that the frame shows again, that are in place, and that fit the motion.
+    certain
+        Number of those that fit it and have clear texture: drawn fog that drifts as one has hardly any.
+    full
+        Whether the reference is full of clear texture, and the frame shows most of it again.
     """
 
     motion: Similarity
-    cells: int
-    textured: int
     found: int
     placed: int
     fitting: int
+    certain: int
+    full: bool
 
     @property
     def fits(self) -> bool:
@@ -113,10 +116,9 @@ class Match:
         """What the frame shows of the camera: that it travelled if its motion is none of the picture plane."""
         if self.placed >= MIN_CELLS and FITTING_OVER_PLACED * self.placed >= self.fitting:
             return "still"
-        if self.fitting >= max(MIN_CELLS, CLEARLY * self.found):
+        if self.certain >= MIN_CELLS and self.fitting >= CLEARLY * self.found:
             return "moved"
-        full = self.textured >= MIN_TEXTURED * self.cells and self.found >= HALF * self.textured
-        if full and not self.fits and self.placed <= MAX_PLACED * self.found:
+        if self.full and not self.fits and self.placed <= MAX_PLACED * self.found:
             return "travelled"
         return "unknown"
 
@@ -138,7 +140,9 @@ class Texture:
         self._power = np.square(cells).mean((1, 2))
         # a cell must hold the area that contrast is measured over
         large = self._side >= 4 * CONTRAST_SIGMA
-        self._textured = large & (self._power > HALF * np.square(self._window).mean())
+        self._textured, self._clear = (
+            large & (self._power > part * np.square(self._window).mean()) for part in (HALF, CLEAR)
+        )
         self._tensors = _structure(cells)
         self._spectra, self._spectrum = (np.conj(fft.rfft2(each)) for each in (cells, detail))
 
@@ -151,7 +155,7 @@ class Texture:
         """Return how a linear frame (rows, columns, 3) lies on the reference."""
         textured = int(self._textured.sum())
         if not self.enough:
-            return Match(IDENTITY, len(self._points), textured, 0, 0, 0)
+            return Match(IDENTITY, 0, 0, 0, 0, full=False)
         detail = _detail(picture)
         shifts, found = self._shifts(detail)
         placed = int((_apart(shifts[found], self._tensors[:, found]) * self._length <= IN_PLACE).sum())
@@ -214,7 +218,10 @@ class Texture:
                 apart = _apart(shifts - turn * points - shift, tensors)
                 near = apart <= limit
                 weights = near / (1 + (apart * self._length / USUAL) ** 2)
-        return Match(Similarity(1 + turn, shift), len(found), int(self._textured.sum()), count, 0, int(near.sum()))
+        clear = int(self._clear.sum())
+        full = clear >= MIN_TEXTURED * len(found) and int((self._clear & found).sum()) >= HALF * clear
+        certain = int((self._clear[found] & near).sum())
+        return Match(Similarity(1 + turn, shift), count, 0, int(near.sum()), certain, full)
 
     def _cut(self, detail: Picture) -> Picture:
         """The cells (n, side, side) of a band-passed picture, which fade to their edges."""
