@@ -2,9 +2,9 @@
 
 The first of these that applies: what an alpha channel says; what the scene gives; one colour, if the whole file makes
 it the likeliest (`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show
-next to nothing. Before a picture the camera must stand still (`camera_motion`); one colour is the same wherever it
-points. The clip's noise is measured first, on what cannot be smoke (`noise`). Strokes of the scene change what was
-found (`strokes`); an alpha channel leaves nothing for them to say.
+next to nothing. If the camera moves before a picture, the frames are registered (`camera_motion`), or the clip is
+refused; one colour is the same wherever it points. The clip's noise is measured first, on what cannot be smoke
+(`noise`). Strokes of the scene change what was found (`strokes`); an alpha channel leaves nothing for them to say.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from typing import Any, Literal
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage import camera_motion
 from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
 from smokelift.footage.behind_smoke import DETAIL
+from smokelift.footage.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import given_plates
-from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.given_background import given_plates, one_picture
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
@@ -34,13 +34,10 @@ from smokelift.footage.noise import (
     white_noise,
 )
 from smokelift.footage.plate import Plate, Plates, cleared, known_plate, uncovered, without_noise_light
-from smokelift.footage.proxy import Proxy
+from smokelift.footage.proxy import PROXY_SIDE, Proxy
 from smokelift.footage.strokes import Strokes, stroked_plate, without_others
 from smokelift.footage.video import median_quantiser
 from smokelift.scene import Background, Camera
-
-NOISE_FRAMES = 16
-"""Frames that white noise is measured on."""
 
 MOSTLY = 0.5
 """Mean share of the picture in one colour from which on that colour is no texture that passes by."""
@@ -64,6 +61,12 @@ MOVING_CAMERA = (
     "as background. If the camera stood still, give one clean plate, or a color."
 )
 """Message that refuses a clip."""
+
+PLATE_ELSEWHERE = (
+    "The clean plate does not lie on the clip: what both show is in other places, and no shift, rotation or zoom "
+    "mends that. Give a plate that the clip's camera filmed from the same place, or frames of the clip without smoke."
+)
+"""Message that refuses a clean plate."""
 
 STROKES_OVER_ONE_FRAME = (
     "Strokes are painted over one frame, but what is behind the smoke changes from frame to frame. Leave them out, or "
@@ -100,6 +103,8 @@ class Backdrop:
         Frames of the file before and after a cut within the clip, if there is one.
     strokes
         What was painted over a frame, if that was used.
+    motion
+        The motion of the camera by which the clip's frames are registered, if it moves.
     """
 
     source: Source
@@ -111,6 +116,7 @@ class Backdrop:
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
     strokes: Strokes | None = None
+    motion: CameraMotion | None = None
 
     def shot_of(self, clip: Clip) -> Clip:
         """Return the part of a clip's file that the background was estimated from."""
@@ -120,13 +126,15 @@ class Backdrop:
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
     """Find what stands behind the smoke of a clip, given what the scene says of it.
 
-    ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves and the
-    background is neither given for every frame nor of one colour, or strokes are given.
+    ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves, other
+    than a similarity of the picture mends, and the background is neither given for every frame nor of one colour, or
+    strokes are given.
     """
     grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
     behind, moves = grey or background, camera is not None and camera.moves
     if moves and behind is not None and behind.frame is not None:
         raise ValueError(MOVING_CAMERA)
+    clip, motion = _on_plate(clip, one_picture(behind, camera, clip))
     plates = given_plates(behind, camera, clip)
     if plates is None:
         found = _estimated(clip, moves)
@@ -136,12 +144,29 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             again: Any = given_plates(behind, camera, quiet)
             plates = replace(again, noise=plates.noise)
-        found = Backdrop("alpha" if grey else "given", quiet, plates, behind)
+        found = Backdrop("alpha" if grey else "given", quiet, plates, behind, motion=motion)
     shown = uncovered(found.plates, found.clip)
     found = replace(found, clip=cleared(found.clip, shown), plates=shown)
     if background is None or background.strokes is None or grey is not None:
         return found
     return _with_strokes(found, background, background.strokes, moves)
+
+
+def _on_plate(clip: Clip, plate: Picture | None) -> tuple[Clip, CameraMotion | None]:
+    """A clip, registered to a given picture if it does not lie on it, and the motion by which."""
+    if plate is None:
+        return clip, None
+    texture = Texture(area_average(plate, *reduced_size(*clip.size, PROXY_SIDE)))
+    motion = motion_before(texture, Proxy.of(clip, beyond=False)) if texture.enough else None
+    if motion == "other":
+        raise ValueError(PLATE_ELSEWHERE)
+    return (clip, None) if motion is None else (_registered(clip, motion), motion)
+
+
+def _registered(clip: Clip, motion: CameraMotion) -> Clip:
+    """A clip whose frames are registered as they lie on a reference."""
+    size = reduced_size(*clip.size, PROXY_SIDE)
+    return clip.registered(lambda number, frame: motion.at(number, lambda: frame.averaged(*size)))
 
 
 def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bool) -> Backdrop:
@@ -156,8 +181,9 @@ def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bo
     )
 
 
-def _estimated(clip: Clip, moves: bool) -> Backdrop:
-    """The background of a clip when none is given."""
+def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> Backdrop:
+    """The background of a clip when none is given; ``motion`` is that by which its frames are registered."""
+    filmed = clip
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
     proxy = Proxy.of(clip)
@@ -175,11 +201,17 @@ def _estimated(clip: Clip, moves: bool) -> Backdrop:
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))
         return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
-    made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=(part.numbers[0], part.numbers[-1]), cut=cut)
+    shot = part.numbers[0], part.numbers[-1]
+    made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
     # black, or a colour seen often, is the same wherever the camera points; any other may be texture that passes by
-    plain = found.colour is not None and (found.clear > SEEN_OFTEN or not found.colour.any())
-    if not plain and camera_motion.moves(proxy.between(*proxy.clip).pictures):
-        raise ValueError(MOVING_CAMERA)
+    often = found.clear > SEEN_OFTEN and white.max() <= TEXTURE
+    plain = found.colour is not None and (often or not found.colour.any())
+    if not plain and motion is None:
+        shaken = find_motion(proxy.with_own(part))
+        if shaken == "other":
+            raise ValueError(MOVING_CAMERA)
+        if shaken is not None:
+            return _estimated(_registered(filmed, shaken), moves, shaken)
     colour, objects = found.colour, found.objects
     source: Source = "colour"
     if colour is None:
@@ -228,8 +260,7 @@ def _of_one_colour(
 
 def _white_noise(proxy: Proxy) -> Picture:
     """The white noise (3,) of the clip's pixels, measured at one exposure."""
-    own = np.flatnonzero([number in proxy.blocks for number in proxy.numbers])
-    part = proxy.only(own[np.unique(np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int))])
+    part = proxy.only(np.flatnonzero([number in proxy.blocks for number in proxy.numbers]))
     _, gains = part.evened
     blocks = []
     for number, gain in zip(part.numbers, gains, strict=True):

@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSo
 from smokelift.footage.image_sequence import ImageSequence, is_video
 from smokelift.footage.images import Picture, Transfer, reduced_size
 from smokelift.footage.mask import Mask, Seen
+from smokelift.footage.registered import Read, RegisteredMask, registered
+from smokelift.footage.similarity import IDENTITY, Similarity
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
@@ -26,7 +28,6 @@ STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
 """Memory for kept frames: as stored, twenty of 1080p at 8 bits, since the same ones spread over a clip are read again;
 linear, two of 1080p."""
 
-Read = Callable[[int], StoredPicture]
 Kept = OrderedDict[int, StoredPicture]
 
 
@@ -62,7 +63,7 @@ class Clip:
         self.path = path
         self.fps = source.fps if fps is None else float(fps)
         self.warning, self.lens, self.backdrop = source.warning, source.lens, source.backdrop
-        self.mask: Mask | None = None
+        self.mask: Mask | RegisteredMask | None = None
         self._source = source
         self._damaged = lru_cache(maxsize=None)(source.damaged)
         self._count = source.count
@@ -236,6 +237,22 @@ class Clip:
             return StoredPicture(change(n, image.linear()))
 
         return self._with(_read=read)
+
+    def registered(self, motion: Callable[[int, StoredPicture], Similarity]) -> Clip:
+        """Return the clip with each frame as a reference shows it; what a frame does not show of that is hidden.
+
+        ``motion`` gives that of a frame, by its number in the file and what is stored of it.
+        """
+        before, filmed = self._read, self._filmed
+
+        @cache
+        def known(number: int) -> Similarity:
+            with suppress(DamagedFrameError):
+                return motion(number, before(number))
+            return IDENTITY  # another frame stands in, as it is registered
+
+        masked = RegisteredMask(self.mask, known)
+        return self._with(_read=registered(before, known), _filmed=registered(filmed, known), mask=masked)
 
     def close(self) -> None:
         """Close the file, and that of a mask."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -25,10 +26,25 @@ def open_plates(background: Background | None, camera: Camera | None) -> Clip | 
     that it begins, else for itself. ClipError is raised if the plate cannot be read.
     """
     image = None if background is None else background.image
-    moves = camera is not None and camera.moves
-    if image is None or not (moves or is_pattern(image) or is_video(image)):
+    return None if image is None or not _changes(image, camera) else Clip.open(image)
+
+
+def _changes(image: Path, camera: Camera | None) -> bool:
+    """Whether a clean plate has a picture for each frame."""
+    return (camera is not None and camera.moves) or is_pattern(image) or is_video(image)
+
+
+def one_picture(background: Background | None, camera: Camera | None, clip: Clip) -> Picture | None:
+    """Return the one linear picture (rows, columns, 3) that a scene gives for all frames; None if it gives none.
+
+    Of several frames of the clip it is the first. ClipError or ImageError is raised if it cannot be read.
+    """
+    if background is None:
         return None
-    return Clip.open(image)
+    if background.frame is not None:
+        return _mean_of_frames(background.frame[:1], clip)
+    image = background.image
+    return None if image is None or _changes(image, camera) else read_image(image)
 
 
 def given_plates(background: Background | None, camera: Camera | None, clip: Clip) -> Plates | None:

@@ -238,6 +238,8 @@ def uncovered(plates: Plates, clip: Clip) -> Plates:
     for number in numbers:
         seen = clip.seen(number, *clip.size)
         hidden = hidden if seen is None else hidden & ~seen
+    if not hidden.any():
+        return plates
     filmed, gains_of = clip.as_filmed(), exposures(plates)
     shown = []
     for number in numbers:

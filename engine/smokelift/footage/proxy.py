@@ -29,6 +29,9 @@ FRAMES = 32
 """Largest number of frames of the file, and of the clip. A half is enough for a median, a third for a false-alarm rate
 of 1e-3 if every second pair of smoke's samples is alike."""
 
+NOISE_FRAMES = 16
+"""Frames of the clip that white noise is measured on."""
+
 MAX_STILL_CHANGE = np.float32(4 / 255)
 """Change in sRGB values up to which a pixel counts as unchanged."""
 
@@ -52,7 +55,8 @@ class Proxy:
     seen : (frames, rows, columns) bool
         Pixels that no mask hides.
     blocks
-        For each frame of the clip, `some_blocks` of its full picture, and where no mask hides them (None without one).
+        For `NOISE_FRAMES` of the clip's frames, `some_blocks` of the full picture, and where no mask hides them (None
+        without one).
     scale
         Pixels of the file along one pixel here.
     """
@@ -65,13 +69,14 @@ class Proxy:
     scale: float
 
     @staticmethod
-    def of(clip: Clip) -> Proxy:
-        """Read the frames; ClipError is raised if one that the clip uses cannot be read."""
+    def of(clip: Clip, beyond: bool = True) -> Proxy:
+        """Read the frames, ``beyond`` the part in use too; ClipError is raised if one of that part cannot be read."""
         first, last = clip.first, clip.first + len(clip) - 1
         (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
         pictures, seen, blocks = {}, [], {}
-        own = {first + number for number in clip.spread(FRAMES)}
-        for number in sorted(own | set(whole.spread(FRAMES))):
+        own = [first + number for number in clip.spread(FRAMES)]
+        noisy = {own[n] for n in np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int)}
+        for number in sorted({*own} | set(whole.spread(FRAMES) if beyond else ())):
             inside = first <= number <= last
             of, n = (clip, number - first) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
@@ -79,7 +84,7 @@ class Proxy:
                 pictures[number] = picture.averaged(columns, rows)
                 shown = of.seen(n, columns, rows)
                 seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
-                if inside:
+                if number in noisy:
                     hides = of.seen(n, *clip.size)
                     blocks[number] = picture.cut(some_blocks), None if hides is None else some_blocks(hides)
         scale = max(clip.size) / max(columns, rows)
@@ -98,6 +103,15 @@ class Proxy:
         wanted = np.linspace(numbers[0], numbers[-1], min(FRAMES, len(numbers)))
         chosen = np.unique(np.abs(numbers - wanted[:, None]).argmin(1))
         return self.only(inside[chosen])
+
+    def with_own(self, part: Proxy) -> Proxy:
+        """Return a part of the frames, and the middle one of those that the clip uses if it has none of them."""
+        first, last = self.clip
+        own = [number for number in self.numbers if first <= number <= last]
+        if any(number in part.numbers for number in own):
+            return part
+        wanted = {*part.numbers, own[len(own) // 2]}
+        return self.only(np.array([n for n, number in enumerate(self.numbers) if number in wanted]))
 
     def shot(self, clip: Clip) -> tuple[Proxy, tuple[int, int] | None]:
         """Return the frames of a clip's shot, and the file's frames before and after a cut within the clip, if any.

@@ -113,7 +113,7 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
 def _mask(shot: Shot) -> tuple[Fact, ...]:
     """The fact about the mask, if there is one."""
     seen = shot.clip.seen(0, *shot.clip.size)
-    if seen is None:
+    if seen is None or shot.clip.mask is None or not shot.clip.mask.files:
         return ()
     how = "No smoke is made there, and the fit ignores it."
     return (Fact("mask", f"hides {1 - seen.mean():.0%} of the first frame", "given", how),)

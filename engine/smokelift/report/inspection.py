@@ -59,7 +59,8 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
     unknown = unknown_part(whole, shot.clip, number)
     path = _path(shot, camera, picture)
     lit = " and the light" if _light_starts(shot, shot.scene.domain) else ""
-    masked = "" if shot.clip.mask is None else ", the mask's outline"
+    hidden = shot.clip.mask
+    masked = "" if hidden is None else ", the mask's outline" if hidden.files else ", the edge of what it shows"
     panels = [
         Panel(f"frame {shot.clip.first + number} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
         Panel("background", eight_bit(plate.image)),

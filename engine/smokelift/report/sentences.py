@@ -79,6 +79,14 @@ SENTENCES: Mapping[str, str] = {
         "there is filled in from around it and from what the smoke lets through, so how thick the smoke is there is "
         "uncertain. Give a clean plate as background to show it."
     ),
+    "frames registered": (
+        "The camera moves: every frame is shifted, rotated and scaled to lie on frame {frame} (counted from 0), by up "
+        "to {pixels:.0f} pixels. The result stands still as that frame shows it."
+    ),
+    "frames registered to the plate": (
+        "The clip does not lie on the clean plate: every frame is shifted, rotated and scaled to lie on it, by up to "
+        "{pixels:.0f} pixels. The result stands still as the plate shows it."
+    ),
     "strokes": (
         "Strokes: of the picture {smoke:.1%} is painted as smoke, {other:.1%} as not smoke, and {behind:.1%} as "
         "background."

@@ -61,7 +61,7 @@ def _possible_fire(estimate: FirstEstimate) -> tuple[Doubt, ...]:
 def backdrop_remarks(found: Backdrop, bars: bool = False) -> tuple[Remark, ...]:
     """Return how a background was found, and what stands before it if it has one colour, not that of ``bars``."""
     clip, plates = found.clip, found.plates
-    painted = _painted(found)
+    painted = (*_registered(found), *_painted(found))
     if found.source == "alpha":
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
     if found.source == "given":
@@ -84,6 +84,16 @@ def backdrop_remarks(found: Backdrop, bars: bool = False) -> tuple[Remark, ...]:
         *((Remark("background with objects", {"share": other}),) if other else ()),
         *painted,
     )
+
+
+def _registered(found: Backdrop) -> tuple[Remark, ...]:
+    """That the frames are registered, to which of them or to what is given, and by how much at most."""
+    if found.motion is None:
+        return ()
+    pixels, frame = found.motion.reach(*found.clip.size), found.motion.reference
+    if frame is None:
+        return (Remark("frames registered to the plate", {"pixels": pixels}),)
+    return (Remark("frames registered", {"pixels": pixels, "frame": frame}),)
 
 
 def _painted(found: Backdrop) -> tuple[Remark, ...]:
@@ -125,7 +135,7 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> tuple[Doubt, 
 
 def what_helps(clip: Clip, given: bool) -> Doubt:
     """Return what may help where no smoke is found; ``given`` as in `doubts`."""
-    if clip.mask is not None and _shows_smoke(clip.as_filmed()):
+    if clip.mask is not None and clip.mask.files and _shows_smoke(clip.as_filmed()):
         return Doubt("smoke behind the mask")
     if given:
         return Doubt("no smoke before the given background")

@@ -1,68 +1,244 @@
-"""Whether the camera of a clip moves."""
+"""How the camera of a clip moves, and what becomes of its frames."""
+
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from films import codes_apart
 from scipy import ndimage
 
-from smokelift.footage.camera_motion import moves
+from smokelift.footage.backdrop import find_backdrop
+from smokelift.footage.camera_motion import CameraMotion, find_motion
+from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.plate import Plate
+from smokelift.footage.proxy import Proxy
+from smokelift.footage.similarity import Similarity, corners
+from smokelift.output.images import write_image
+from smokelift.scene import Background
 
 COUNT, SIZE, MARGIN = 12, (120, 160), 40
+STILL = (Similarity(),) * COUNT
 
 
-def filmed(
-    shifts: np.ndarray, parallax: float = 0.0, smoke: float = 0.0, noise: float = 1.0, contrast: float = 1.0
-) -> np.ndarray:
-    """Return frames of a wall, linear, each from another place (down, right); parallax adds to it towards the floor.
-
-    The smoke, up to so opaque, boils over a quarter of the picture. Noise is in 8 bit codes.
-    """
+def wall(contrast: float = 1.0) -> np.ndarray:
+    """Return a wall (rows, columns) in sRGB values, wider than the picture by a margin."""
     random = np.random.default_rng(0)
     shape = (SIZE[0] + 2 * MARGIN, SIZE[1] + 2 * MARGIN)
     texture = sum(ndimage.gaussian_filter(random.standard_normal(shape), s) * s for s in (1.0, 3.0))
-    wall = 0.4 + 0.12 * contrast * texture
-    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
-    boil = ndimage.gaussian_filter(random.standard_normal((len(shifts), *SIZE)), (1, 6, 6))
+    return np.asarray(0.4 + 0.12 * contrast * texture)
+
+
+def seen_at(behind: np.ndarray, motion: Similarity, parallax: float = 0.0) -> np.ndarray:
+    """Return what a camera sees of a wall; with parallax shifts along rows grow towards the floor."""
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float64)
+    middle = (np.array(SIZE) - 1) / 2
+    points = ((columns - middle[1]) + 1j * (rows - middle[0])) / max(SIZE)
+    back = motion.inverse().moves(points) * max(SIZE)
+    at = [rows + MARGIN + back.imag, columns + MARGIN + back.real * (1 + parallax * rows / SIZE[0])]
+    return np.asarray(ndimage.map_coordinates(behind, at, order=3))
+
+
+def filmed(
+    motions: tuple[Similarity, ...],
+    parallax: float = 0.0,
+    smoke: float = 0.0,
+    noise: float = 1.0,
+    contrast: float = 1.0,
+) -> np.ndarray:
+    """Return frames of a wall, linear, each as a motion of the camera shows it.
+
+    The smoke, up to so opaque, boils over a quarter of the picture. Noise is in 8 bit codes.
+    """
+    random, behind = np.random.default_rng(1), wall(contrast)
+    columns = np.arange(SIZE[1])
+    boil = ndimage.gaussian_filter(random.standard_normal((len(motions), *SIZE)), (1, 6, 6))
     opacity = smoke * np.clip(0.5 + 0.5 * boil / boil.std(), 0, 1) * (abs(columns - SIZE[1] / 2) < SIZE[1] / 8)
-    seen = []
-    for (down, right), cover in zip(shifts, opacity, strict=True):
-        at = [rows + MARGIN + down, columns + MARGIN + right * (1 + parallax * rows / SIZE[0])]
-        behind = ndimage.map_coordinates(wall, at, order=3)
-        seen.append(behind * (1 - cover) + 0.9 * cover)
-    codes = np.stack(seen)[..., None] + random.normal(0, noise / 255, (len(seen), *SIZE, 3))
-    return srgb_to_linear(np.clip(codes, 0, 1))
+    shown = [
+        seen_at(behind, motion, parallax) * (1 - cover) + 0.9 * cover
+        for motion, cover in zip(motions, opacity, strict=True)
+    ]
+    codes = np.stack(shown)[..., None] + random.normal(0, noise / 255, (len(shown), *SIZE, 3))
+    return np.asarray(srgb_to_linear(np.clip(codes, 0, 1)), np.float32)
 
 
-STILL = np.zeros((COUNT, 2))
-ALONG = np.stack([np.zeros(COUNT), np.linspace(-0.5, 0.5, COUNT)], 1)
-SHAKE = np.random.default_rng(2).uniform(-3, 3, (COUNT, 2))
+def shifts(down: np.ndarray, right: np.ndarray) -> tuple[Similarity, ...]:
+    """Return motions of shifts in pixels."""
+    return tuple(Similarity(shift=complex(x, y) / max(SIZE)) for y, x in zip(down, right, strict=True))
 
 
-@pytest.mark.parametrize("shifts", [SHAKE, 30 * ALONG, 6 * ALONG], ids=["shakes", "pans", "drifts"])
-def test_a_camera_that_moves_is_seen_behind_smoke(shifts: np.ndarray) -> None:
-    assert moves(filmed(shifts, smoke=0.9))
+def found(pictures: np.ndarray) -> CameraMotion | str | None:
+    """Return the motion that is found in pictures."""
+    seen = np.ones(pictures.shape[:3], np.bool_)
+    return find_motion(Proxy(tuple(range(len(pictures))), (0, len(pictures) - 1), pictures, seen, {}, 1.0))
 
 
-def test_a_camera_that_travels_is_seen() -> None:
-    assert moves(filmed(20 * ALONG, parallax=1.0))
+def pixels_off(motion: CameraMotion, truth: tuple[Similarity, ...]) -> float:
+    """Return how far the corners of the worst frame are, in pixels, from where they belong."""
+    assert motion.reference is not None
+    at = corners(*SIZE[::-1])
+    reference = truth[motion.reference], motion.measured[motion.reference]
+    apart = [
+        own.after(reference[1].inverse()).moves(at) - truth[number].after(reference[0].inverse()).moves(at)
+        for number, own in motion.measured.items()
+    ]
+    return float(np.abs(apart).max()) * max(SIZE)
+
+
+ALONG, NONE = np.linspace(-0.5, 0.5, COUNT), np.zeros(COUNT)
+SHAKE = np.random.default_rng(2).uniform(-3, 3, (2, COUNT))
+ROLL = tuple(Similarity((1 + 0.06 * a) * np.exp(0.05j * a), 0.1 * a) for a in ALONG)
+
+
+@pytest.mark.parametrize(
+    "motions",
+    [shifts(*SHAKE), shifts(NONE, 30 * ALONG), shifts(NONE, 6 * ALONG), ROLL],
+    ids=["shakes", "pans", "drifts", "rolls and zooms"],
+)
+def test_a_similarity_behind_smoke_is_measured(motions: tuple[Similarity, ...]) -> None:
+    motion = found(filmed(motions, smoke=0.9))
+    assert isinstance(motion, CameraMotion)
+    assert len(motion.measured) == COUNT
+    assert pixels_off(motion, motions) < 0.5
+
+
+def test_a_slow_zoom_with_little_texture_is_measured() -> None:
+    """Only a part of the picture has any."""
+    zoom = tuple(Similarity(1 + 0.06 * a) for a in ALONG)
+    pictures = filmed(zoom, noise=0.5)
+    pictures[:, :, : SIZE[1] * 2 // 3] = 0.2
+    assert isinstance(found(pictures), CameraMotion)
+
+
+def test_a_camera_that_travels_is_no_similarity() -> None:
+    assert found(filmed(shifts(NONE, 20 * ALONG), parallax=1.0)) == "other"
+
+
+def test_what_is_seen_for_a_few_frames_only_cannot_be_registered() -> None:
+    assert found(filmed(shifts(NONE, 76 * ALONG), smoke=0.9)) == "other"
 
 
 @pytest.mark.parametrize(("smoke", "noise"), [(0.0, 1.0), (1.0, 1.0), (1.0, 12.0)])
 def test_a_still_camera_does_not_move(smoke: float, noise: float) -> None:
-    assert not moves(filmed(STILL, smoke=smoke, noise=noise))
+    assert found(filmed(STILL, smoke=smoke, noise=noise)) is None
 
 
 def test_a_knock_is_no_camera_that_moves() -> None:
-    assert not moves(filmed(np.where(np.arange(COUNT)[:, None] == 3, [[0.0, 8.0]], 0.0), smoke=0.9))
+    assert found(filmed(shifts(NONE, np.where(np.arange(COUNT) == 3, 8.0, 0.0)), smoke=0.9)) is None
 
 
 def test_a_camera_that_hardly_moves_does_not() -> None:
-    assert not moves(filmed(0.6 * ALONG))
+    assert found(filmed(shifts(NONE, 0.6 * ALONG))) is None
 
 
 def test_smoke_before_one_colour_is_no_camera() -> None:
-    assert not moves(filmed(SHAKE, smoke=1.0, contrast=0.0))
+    assert found(filmed(shifts(*SHAKE), smoke=1.0, contrast=0.0)) is None
 
 
 def test_one_frame_tells_nothing() -> None:
-    assert not moves(filmed(STILL[:1]))
+    assert found(filmed(STILL[:1])) is None
+
+
+def ink(count: int) -> np.ndarray:
+    """Return fine texture over half of black, which a swirl turns by a pixel a frame."""
+    random, shape = np.random.default_rng(3), (180, 240)
+    texture = sum(ndimage.gaussian_filter(random.standard_normal((360, 480)), s) * s for s in (1, 3))
+    stream = ndimage.gaussian_filter(random.standard_normal(shape), 24)
+    flow = np.stack([-np.gradient(stream, axis=1), np.gradient(stream, axis=0)])
+    flow /= np.hypot(*flow).max()
+    rows, columns = np.mgrid[: shape[0], : shape[1]].astype(float)
+    at, pictures = np.stack([rows, columns]), []
+    for _ in range(count):
+        inside = np.clip(np.hypot(at[0] - 90, at[1] - 120) / -4 + 20, 0, 1)
+        value = 0.45 + 0.12 * ndimage.map_coordinates(texture, at + 60, order=1)
+        pictures.append(inside * np.clip(value, 0, 1) + random.normal(0, 0.5 / 255, shape))
+        at = at - flow
+    return np.asarray(srgb_to_linear(np.clip(np.stack(pictures)[..., None].repeat(3, -1), 0, 1)), np.float32)
+
+
+def test_slow_ink_with_fine_texture_on_black_is_no_camera() -> None:
+    assert found(ink(16)) is None
+
+
+def clip_of(folder: Path, pictures: np.ndarray, frames: tuple[int, int] | None = None) -> Clip:
+    for n, picture in enumerate(pictures):
+        write_image(folder / f"frame_{n:02d}.png", picture)
+    return Clip.open(folder / "frame_##.png", fps=24, frames=frames)
+
+
+def rising(count: int) -> Callable[[int], np.ndarray]:
+    """Return the opacity of a puff that rises through the picture."""
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
+
+    def opacity(n: int) -> np.ndarray:
+        away = np.hypot(rows - SIZE[0] * (1.2 - 1.4 * n / count), columns - SIZE[1] / 2)
+        return np.clip(1.5 - away / 14, 0, 0.8)
+
+    return opacity
+
+
+def puffing(motions: tuple[Similarity, ...]) -> np.ndarray:
+    """Return frames of a puff before the wall, linear."""
+    opacity = rising(len(motions))
+    pictures = [seen_at(wall(), motion) * (1 - opacity(n)) + 0.9 * opacity(n) for n, motion in enumerate(motions)]
+    codes = np.stack(pictures)[..., None] + np.random.default_rng(4).normal(0, 1 / 255, (len(pictures), *SIZE, 3))
+    return np.asarray(srgb_to_linear(np.clip(codes, 0, 1)), np.float32)
+
+
+@pytest.mark.parametrize("frames", [None, (44, 55)], ids=["whole", "after"])
+def test_a_camera_that_moves_after_it_stood_is_registered(tmp_path: Path, frames: tuple[int, int] | None) -> None:
+    """Also if the frames in use are of one place: the plate is that of all of the file."""
+    way = np.clip((np.arange(60) - 36) / 8, 0, 1)
+    motions = shifts(2 * way, 6 * way)
+    with clip_of(tmp_path, puffing(motions), frames) as clip:
+        backdrop = find_backdrop(clip, None, None)
+        assert backdrop.motion is not None
+        assert backdrop.motion.reference is not None
+        plate = backdrop.plates.at(0)
+        truth = srgb_to_linear(seen_at(wall(), motions[backdrop.motion.reference]))[..., None].repeat(3, -1)
+        inner = np.s_[10:-10, 10:-10]
+        assert np.percentile(codes_apart(plate.image, truth)[inner], 95) < 12
+        last = len(clip) - 1
+        shown, seen = backdrop.clip.frame(last), clip.registered(lambda *_: motions[-1]).seen(0, *clip.size)
+        assert codes_apart(shown, truth)[inner].mean() < 4
+        assert seen is not None
+        assert 0.9 < seen.mean() < 1
+
+
+def test_a_clip_that_stands_still_stays_as_it_is(tmp_path: Path) -> None:
+    with clip_of(tmp_path, puffing(STILL * 2)) as clip:
+        backdrop = find_backdrop(clip, None, None)
+        assert (backdrop.motion, backdrop.clip) == (None, clip)
+
+
+def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path: Path) -> None:
+    motions = (Similarity(shift=(4 - 3j) / max(SIZE)),) * COUNT
+    write_image(tmp_path / "plate.exr", srgb_to_linear(seen_at(wall(), Similarity()))[..., None].repeat(3, -1))
+    with clip_of(tmp_path, puffing(motions)) as clip:
+        backdrop = find_backdrop(clip, None, Background(image=tmp_path / "plate.exr"))
+        assert backdrop.motion is not None
+        assert backdrop.motion.reference is None
+        assert backdrop.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
+        assert isinstance(backdrop.plates, Plate)
+        off = codes_apart(backdrop.clip.frame(0), backdrop.plates.image)
+        assert off[10 : SIZE[0] // 2, 10:-10].mean() < 4
+
+
+def test_a_plate_of_another_place_is_refused(tmp_path: Path) -> None:
+    motions = shifts(NONE, np.full(COUNT, 30.0))
+    write_image(tmp_path / "plate.exr", srgb_to_linear(seen_at(wall(), Similarity()))[..., None].repeat(3, -1))
+    with (
+        clip_of(tmp_path, puffing(motions)) as clip,
+        pytest.raises(ValueError, match="does not lie on the clip"),
+    ):
+        find_backdrop(clip, None, Background(image=tmp_path / "plate.exr"))
+
+
+def test_frames_of_the_clip_are_a_plate_that_the_others_are_registered_to(tmp_path: Path) -> None:
+    with clip_of(tmp_path, puffing(shifts(*SHAKE))) as clip:
+        backdrop = find_backdrop(clip, None, Background(frame=(0,)))
+        assert backdrop.motion is not None
+        assert isinstance(backdrop.plates, Plate)
+        off = codes_apart(backdrop.clip.frame(5), backdrop.plates.image)
+        assert off[10 : SIZE[0] // 3, 10:-10].mean() < 4
