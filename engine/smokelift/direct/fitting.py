@@ -154,36 +154,44 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, depth_axis: in
 
     found = [picture(moment.density) for moment in moments]
 
+    rise = float(np.mean([_rise(moment, compared) for moment in moments]))
+
     def too_high(buoyancy: float) -> float:
         """Voxels per frame by which the carried smoke rises more than the clip's."""
         along = _along(replace(still, physics=Physics(buoyancy, 0.0)))
-        velocity, terms = moments[0].velocity, np.zeros(2)
+        velocity, carried = moments[0].velocity, []
         for step, before in enumerate(moments[:-1], 1):
             velocity = along.velocity(replace(before, velocity=velocity), step)
             if step >= half:
-                carried = picture(advect(before.density, velocity, dt, conserve=True))
-                terms += _rise_terms(carried, found[step])
-        return float(terms[0] / terms[1]) if terms[1] > 0 else 0.0
+                carried.append(picture(advect(before.density, velocity, dt, conserve=True)))
+        return _higher(carried, found[half:], rise)
 
     density = moments[half].density
     typical = float(np.vdot(density, density) / density.sum(dtype=np.float64))
     by_a_voxel = moments[0].velocity.voxel_size / (typical * (half * dt) ** 2)
-    return _root(too_high, by_a_voxel), float(np.mean([_rise(moment, compared) for moment in moments]))
+    return _root(too_high, by_a_voxel), rise
 
 
-def _rise_terms(carried: Array, found: Array) -> tuple[float, float]:
-    """Numerator and denominator of the voxels by which a carried picture (n, nz) is higher than the one that is found.
+def _higher(carried: Sequence[Array], found: Sequence[Array], rise: float) -> float:
+    """Voxels by which carried pictures (n, nz) are higher than those that are found.
 
-    It is the optical flow of Lucas and Kanade, common to all pixels, beside a brightness that changes linearly with
-    height: smoke whose head dissolves, or whose base becomes denser, does not count as smoke that sinks.
+    It is the optical flow of Lucas and Kanade, common to all pixels, beside the brightness of each picture and one that
+    changes linearly with height. Smoke may dissolve on its way, which a known rise gives, but none appears there: a
+    change the other way is motion.
     """
-    height = np.linspace(-1, 1, found.shape[1], dtype=np.float32)
-    brightness = np.stack([found.ravel(), (found * height).ravel()])
-    slope = np.gradient(found, axis=1).ravel()
-    products = brightness @ brightness.T
+    products, sums = np.zeros((2, 2)), np.zeros(2)
+    for one, other in zip(carried, found, strict=True):
+        height = np.linspace(-1, 1, other.shape[1], dtype=np.float32)
+        changes = np.stack([np.gradient(other, axis=1).ravel(), (other * height).ravel()])
+        brightness = other.ravel() / max(float(np.linalg.norm(other)), 1e-30)
+        changes -= np.outer(changes @ brightness, brightness)
+        products += changes @ changes.T
+        sums -= changes @ one.ravel()
     products[1, 1] *= 1 + STEADINESS
-    slope = slope - np.linalg.pinv(products) @ (brightness @ slope) @ brightness
-    return -float(np.vdot(slope, carried)), float(np.vdot(slope, slope))
+    if not products[0, 0] > 0:
+        return 0.0
+    higher, brighter = np.linalg.lstsq(products, sums, rcond=None)[0]
+    return float(higher if brighter * rise < 0 else sums[0] / products[0, 0])
 
 
 def _rise(moment: Moment, compared: Array) -> float:
