@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.direct.constraint import faces_of
+from smokelift.direct.eddies import with_small_eddies
 from smokelift.direct.fitting import BUOYANCY_MOMENTS, coarse, fit_simulation, spun_up
 from smokelift.direct.growth import (
     Growth,
@@ -198,7 +199,7 @@ def _simulated(
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     else:
         box, larger = clip, _start_box(continuation, growth)
-        moment = spun_up(simulation, moments)
+        moment = with_small_eddies(spun_up(simulation, moments))
         moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
     del moments  # they are large
     for step in range(1, continuation.frames + 1):
