@@ -38,6 +38,9 @@ MIN_MOMENTS = 8
 """Moments that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
 which is within its error."""
 
+UNUSUAL = 2.0
+"""Times the median speed above which a moment's velocity is taken to be wrong."""
+
 BUOYANCY_MOMENTS = 24
 """Last moments, at most, that show the buoyancy: half of them are needed to forget that an estimated velocity is too
 slow (docs/experiments/continuation.md)."""
@@ -124,10 +127,18 @@ def spun_up(simulation: Simulation, moments: Sequence[Moment]) -> Moment:
 
     The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
-    along, velocity = _along(simulation), moments[0].velocity
-    for step, moment in enumerate(moments[:-1], 1):
+    first = _first_typical(moments)
+    along, velocity = _along(simulation), moments[first].velocity
+    for step, moment in enumerate(moments[first:-1], first + 1):
         velocity = along.velocity(replace(moment, velocity=velocity), step)
     return replace(moments[-1], velocity=velocity)
+
+
+def _first_typical(moments: Sequence[Moment]) -> int:
+    """The first moment whose velocity is as fast as usual: a wrong one would go on through all others."""
+    speeds = [sum(float(np.vdot(component, component)) for component in m.velocity.faces) ** 0.5 for m in moments]
+    usual = UNUSUAL * float(np.median(speeds))
+    return next((number for number in range(len(moments) // 2) if speeds[number] <= usual), 0)
 
 
 def _along(simulation: Simulation) -> Simulation:
@@ -143,7 +154,7 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, depth_axis: in
     moments = moments[-BUOYANCY_MOMENTS:]
     if len(moments) < MIN_MOMENTS or not all(moment.density.any() for moment in moments):
         return 0.0, 0.0
-    half = len(moments) // 2
+    half, first = len(moments) // 2, _first_typical(moments)
     still = Simulation(Physics(0.0, 0.0), Inflow(inlets, moments).cropped(), Surroundings(), dt)
     compared = (~ndimage.binary_dilation(inlets, iterations=AROUND)).astype(np.float32)
     compared[:, :, :BORDER] = compared[:, :, -BORDER:] = 0
@@ -159,8 +170,8 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, depth_axis: in
     def too_high(buoyancy: float) -> float:
         """Voxels per frame by which the carried smoke rises more than the clip's."""
         along = _along(replace(still, physics=Physics(buoyancy, 0.0)))
-        velocity, carried = moments[0].velocity, []
-        for step, before in enumerate(moments[:-1], 1):
+        velocity, carried = moments[first].velocity, []
+        for step, before in enumerate(moments[first:-1], first + 1):
             velocity = along.velocity(replace(before, velocity=velocity), step)
             if step >= half:
                 carried.append(picture(advect(before.density, velocity, dt, conserve=True)))

@@ -86,6 +86,14 @@ def test_the_forces_of_a_clip_make_its_velocity_from_one_that_is_too_slow():
     assert error(found.velocity, moments[-1].velocity) < 0.5 * error(slow[-1].velocity, moments[-1].velocity)
 
 
+def test_a_velocity_that_is_estimated_wrong_does_not_go_on():
+    moments, inlet = plume(), Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    wrong = [slowed(moments[0], -5.0), *moments[1:]]
+    simulation = fit_simulation(wrong, DT, inlet)
+    assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.2)
+    assert error(spun_up(simulation, wrong).velocity, moments[-1].velocity) < 0.1
+
+
 def test_a_velocity_that_the_forces_explain_stays():
     moments, inlet = plume(), Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     simulation = fit_simulation(moments, DT, inlet)
