@@ -49,7 +49,18 @@ SIDES = ("x-", "y-", "z-", "x+", "y+", "z+")
 """Sides of the box that can be closed, in the order of the panel."""
 
 DIRECTIONS = {
-    "continue": ("--frames", "--start", "--fade", "--room", "--closed", "--wind", "--turbulence", "--fan"),
+    "continue": (
+        "--frames",
+        "--start",
+        "--fade",
+        "--room",
+        "--buoyancy",
+        "--dissipation",
+        "--closed",
+        "--wind",
+        "--turbulence",
+        "--fan",
+    ),
     "retime": ("--speed",),
     "loop": ("--frames", "--overlap"),
 }

@@ -96,6 +96,8 @@ def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     layout.prop(settings, "frames")
     layout.prop(settings, "fade")
     _draw_ticked(layout, settings, "use_start", "start")
+    draw_automatic(layout, settings, "buoyancy")
+    draw_automatic(layout, settings, "dissipation")
     layout.prop(settings, "room")
     draw_closed(layout, settings)
     layout.prop(settings, "effectors")

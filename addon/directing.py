@@ -68,6 +68,9 @@ def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[s
         )
     options = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
     options += ["--room", _number_text(settings.room)]
+    for name in ("buoyancy", "dissipation"):
+        if getattr(settings, f"use_{name}"):
+            options += [f"--{name}", _number_text(getattr(settings, name))]
     last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
     if settings.use_start:
         start = settings.start

@@ -108,6 +108,27 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
         max=4096.0,
         precision=1,
     )
+    use_buoyancy: BoolProperty(
+        name="Buoyancy", description="Choose Buoyancy by hand; otherwise it is that of the clip's smoke"
+    )
+    buoyancy: FloatProperty(
+        name="Buoyancy",
+        description="Upward acceleration of smoke of density 1 in the clip's own scale; below zero it sinks",
+        unit="ACCELERATION",
+        default=1.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+    )
+    use_dissipation: BoolProperty(
+        name="Dissipation", description="Choose Dissipation by hand; otherwise it is that of the clip's smoke"
+    )
+    dissipation: FloatProperty(
+        name="Dissipation",
+        description="How fast smoke dissolves, per second: 0 keeps it, at 1 a third is left after a second",
+        default=0.0,
+        min=0.0,
+        soft_max=5.0,
+    )
     effectors: PointerProperty(
         name="Effectors",
         description=(

@@ -1,14 +1,16 @@
 """Clips cut at two thirds and continued, beside what really came.
 
-    python -m benchmarks.direct.continuation SCENES/plume-3 ... [--runs OUT/runs] [--picture FILE.png]
+    python -m benchmarks.direct.continuation SCENES/plume-3 ... [--runs OUT/runs] [--heads RATE] [--picture FILE.png]
 
 Every scene is continued from its true densities and velocities and, where OUT/runs holds a run `balanced` of
 `benchmarks.accuracy`, from that. It is compared with the last frame held, and with the last frame carried on by its
-velocity.
+velocity. The rise is how far the smoke of the last frame goes up by the simulated velocities, over how far it really
+goes. With --heads the upper part of the smoke dissolves before anything is fitted, up to RATE (1/s) at its top.
 """
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,31 +19,73 @@ import numpy.typing as npt
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
 from benchmarks.direct.clips import density_error, picture_psnr, reconstructed_moment, true_moment
 from benchmarks.tables import markdown
-from smokelift.direct import Moment, fit_simulation, spun_up
+from smokelift.direct import Moment, coarse, fit_simulation, spun_up
 from smokelift.direct.continuation import FITTED_MOMENTS
+from smokelift.direct.fitting import BUOYANCY_MOMENTS
+from smokelift.direct.simulation import Physics, Simulation
 from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
-from smokelift.transport import Array, advect, divergence
+from smokelift.transport import Array, Velocity, advect, at_centres, divergence
 
 RUN = "balanced"
-HEADER = ["scene", "from", "", "error", "error, last frame", "new views (dB)", "mass over the truth's", "divergence"]
+HEADER = [
+    "scene",
+    "from",
+    "",
+    "buoyancy",
+    "rise",
+    "error",
+    "error, last frame",
+    "new views (dB)",
+    "mass over the truth's",
+    "divergence",
+]
 
 
-def ways(moments: list[Moment], frames: int, dt: float) -> Iterator[tuple[str, list[Moment]]]:
-    """Yield every way to continue moments by so many frames, with its moments."""
+def ways(
+    moments: list[Moment], frames: int, dt: float, fitted: list[Moment] | None = None
+) -> Iterator[tuple[str, list[Moment], Physics | None]]:
+    """Yield every way to continue moments by so many frames, with its moments and its physics.
+
+    The physics is fitted to the moments, or to others in their place.
+    """
     last = moments[-1]
-    yield "held", [last] * frames
+    yield "held", [last] * frames, None
     carried = [last]
     for _ in range(frames):
         density = advect(carried[-1].density, last.velocity, dt, conserve=True)
         carried.append(Moment(density, last.velocity))
-    yield "carried", carried[1:]
-    fitted = moments[-FITTED_MOMENTS:]
-    simulation = fit_simulation(fitted, dt)
-    simulated = [spun_up(simulation, fitted)]
+    yield "carried", carried[1:], None
+    simulation = fitted_simulation(fitted or moments, dt)
+    simulated = [spun_up(simulation, moments[-FITTED_MOMENTS:])]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))
-    yield "simulated", simulated[1:]
+    yield "simulated", simulated[1:], simulation.physics
+
+
+def fitted_simulation(moments: list[Moment], dt: float) -> Simulation:
+    """Return the simulation that `smokelift continue` goes on with."""
+    earlier = [coarse(moment) for moment in moments[-BUOYANCY_MOMENTS:-FITTED_MOMENTS]]
+    return fit_simulation(moments[-FITTED_MOMENTS:], dt, earlier=earlier)
+
+
+def with_dissolving_heads(moments: list[Moment], dt: float, rate: float) -> list[Moment]:
+    """Return moments whose smoke dissolves since the first: above 30 % of its height, up to a rate (1/s) at its top."""
+    layers = moments[-1].density.sum((0, 1))
+    top = int(np.flatnonzero(layers > 1e-3 * layers.max())[-1])
+    share = np.clip((np.arange(len(layers)) / top - 0.3) / 0.7, 0, 1)
+    left = [np.exp(-rate * dt * number * share).astype(np.float32) for number in range(len(moments))]
+    return [replace(moment, density=moment.density * each) for moment, each in zip(moments, left, strict=True)]
+
+
+def rise(velocities: list[Velocity], density: Array, dt: float) -> float:
+    """Return how far (m) a density goes up that velocities carry."""
+    way = 0.0
+    for velocity in velocities:
+        upwards = at_centres(velocity.faces)[2]
+        way += dt * float(np.vdot(density, upwards)) / float(density.sum(dtype=np.float64))
+        density = advect(density, velocity, dt, conserve=True)
+    return way
 
 
 def largest_divergence(moment: Moment) -> float:
@@ -50,25 +94,30 @@ def largest_divergence(moment: Moment) -> float:
     return float(np.abs(divergence(moment.velocity)).max()) * moment.velocity.voxel_size / largest
 
 
-def table(known: KnownScene, folder: Path | None) -> Iterator[list[str]]:
-    """Yield the rows of a scene from its truth, or from a run in a folder."""
+def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list[str]]:
+    """Yield the rows of a scene from its truth, or from a run in a folder; its head dissolves at a rate (1/s)."""
     truth = known.truth
     assert truth is not None
     count = truth.frames if folder is None else len(list(folder.glob("[0-9]*.npz")))
     cut = 2 * count // 3
+    shown, frames = range(max(1, cut - BUOYANCY_MOMENTS), cut), range(cut, count)
     if folder is None:
-        moments = [true_moment(truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
+        moments = [true_moment(truth, frame) for frame in shown]
     else:
-        moments = [reconstructed_moment(folder, truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
-    frames = range(cut, count)
+        moments = [reconstructed_moment(folder, truth, frame) for frame in shown]
+    really = rise([truth.velocity(frame - 1) for frame in frames], truth.density(cut - 1), truth.dt)
     run, at = ("truth", Path()) if folder is None else (RUN, folder)
-    for how, found in ways(moments, len(frames), truth.dt):
+    fitted = with_dissolving_heads(moments, truth.dt, heads)
+    for how, found, physics in ways(moments, len(frames), truth.dt, fitted):
         errors = [density_error(m.density, truth.density(f)) for m, f in zip(found, frames, strict=True)]
         views = picture_psnr(known, [m.density for m in found[::3]], frames[::3], run, at)
         share = truth.density(cut).size / found[-1].density.size
         mass = share * found[-1].density.sum(dtype=float) / truth.density(frames[-1]).sum(dtype=float)
         figures = [f"{np.mean(errors):.2f}", f"{errors[-1]:.2f}", f"{views:.1f}", f"{mass:.2f}"]
-        yield [known.name, "truth" if folder is None else "clip", how, *figures, f"{largest_divergence(found[-1]):.0e}"]
+        up = rise([moment.velocity for moment in found], moments[-1].density, truth.dt) / really
+        own = [f"{physics.buoyancy:.2f}", f"{up:.2f}"] if physics else ["", ""]
+        source = "truth" if folder is None else "clip"
+        yield [known.name, source, how, *own, *figures, f"{largest_divergence(found[-1]):.0e}"]
 
 
 def tile(density: Array, white: float) -> npt.NDArray[np.uint8]:
@@ -82,11 +131,11 @@ def picture(known: KnownScene, path: Path) -> None:
     assert truth is not None
     cut = 2 * truth.frames // 3
     frames = range(cut, truth.frames)
-    moments = [true_moment(truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
+    moments = [true_moment(truth, frame) for frame in range(max(1, cut - BUOYANCY_MOMENTS), cut)]
     shown = [0, len(frames) // 3, 2 * len(frames) // 3, len(frames) - 1]
     white = float(max(truth.density(f).mean(axis=1).max() for f in frames))
     columns = {"what came": [truth.density(frames[i]) for i in shown]}
-    for how, found in ways(moments, len(frames), truth.dt):
+    for how, found, _ in ways(moments, len(frames), truth.dt):
         columns[how] = [found[i].density for i in shown]
     rows = [[tile(column[i], white) for column in columns.values()] for i in range(len(shown))]
     write_sheet(path, rows, tuple(columns), [f"+{i + 1}" for i in shown])
@@ -97,14 +146,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--runs", type=Path)
+    parser.add_argument("--heads", type=float, default=0.0, metavar="RATE", help="at which heads dissolve, in 1/s")
     parser.add_argument("--picture", type=Path, help="of the first scene")
     options = parser.parse_args()
     rows: list[list[str]] = []
     for scene in options.scenes:
         known = baked_scene(scene, 10**6)
-        rows += table(known, None)
+        rows += table(known, None, options.heads)
         if options.runs and (folder := options.runs / scene.name / RUN).is_dir():
-            rows += table(known, folder)
+            rows += table(known, folder, options.heads)
     print(markdown(HEADER, rows), flush=True)
     if options.picture:
         picture(baked_scene(options.scenes[0], 10**6), options.picture)

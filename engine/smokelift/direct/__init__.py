@@ -1,7 +1,7 @@
 """Smoke after its clip: continued, retimed, looped, and made to react to wind, turbulence, fans and obstacles."""
 
-from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
-from smokelift.direct.fitting import fit_simulation, spun_up
+from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
+from smokelift.direct.fitting import coarse, fit_simulation, spun_up
 from smokelift.direct.looping import loop_length, loop_sequence, steady_part, usual_overlap
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
@@ -14,6 +14,7 @@ from smokelift.direct.surroundings import Fan
 from smokelift.direct.turbulence import Turbulence
 
 __all__ = [
+    "CONTRADICTED",
     "DISSOLVED",
     "ROOM",
     "Ball",
@@ -25,6 +26,7 @@ __all__ = [
     "MovingMesh",
     "Simulation",
     "Turbulence",
+    "coarse",
     "complete_velocity",
     "continue_sequence",
     "fit_simulation",

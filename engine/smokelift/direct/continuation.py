@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from smokelift.direct.constraint import faces_of
-from smokelift.direct.fitting import fit_simulation, spun_up
+from smokelift.direct.eddies import with_small_eddies
+from smokelift.direct.fitting import BUOYANCY_MOMENTS, coarse, fit_simulation, spun_up
 from smokelift.direct.growth import (
     Growth,
     cut_sides,
@@ -30,19 +31,22 @@ from smokelift.direct.turbulence import Turbulence
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import SIDES, Box, CompleteScene, Domain, Side
+from smokelift.scene import SIDES, Box, Camera, CompleteScene, Domain, Side
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity
 
 FITTED_MOMENTS = 12
-"""Last moments of the clip, at most, that physics and inflow are fitted to. In half a second the source of a clip is
-steady, and the replay of so much is not noticed."""
+"""Last moments of the clip, at most, that inflow, fire and dissipation are fitted to. In half a second the source of a
+clip is steady, and the replay of so much is not noticed."""
 
 UNFADED = ("unfaded", "unfaded_flame")
 """Names of the density and the emission before the fading in the resume state: the simulation goes on from those."""
 
 DISSOLVED = "dissolved"
 """Figure of a simulated frame: the share of its smoke that has dissolved before sides that cannot move."""
+
+CONTRADICTED = "contradicted_buoyancy"
+"""Figure of a simulated frame: the buoyancy in m/s2 that was fitted and not taken, 0 if it was."""
 
 SMALLEST_EDDY = 3
 """Voxels across an eddy, at least: fewer do not show that it turns."""
@@ -75,6 +79,8 @@ class Continuation:
     room
         How many times as many voxels as the clip's the box may have that grows with the smoke, 1 at least. Before a
         side that cannot move any more the smoke dissolves.
+    buoyancy, dissipation
+        As in `smokelift.direct.simulation.Physics`; None takes those of the clip.
     """
 
     frames: int
@@ -86,6 +92,8 @@ class Continuation:
     obstacles: tuple[Obstacle, ...] = ()
     closed: tuple[Side, ...] = ()
     room: float = ROOM
+    buoyancy: float | None = None
+    dissipation: float | None = None
 
 
 def continue_sequence(
@@ -140,10 +148,15 @@ def continue_sequence(
         "obstacles": [_as_settings(obstacle) for obstacle in continuation.obstacles],
         "closed": continuation.closed,
         "room": continuation.room,
+        "buoyancy": continuation.buoyancy,
+        "dissipation": continuation.dissipation,
     }
+    given = [name for name in ("buoyancy", "dissipation") if settings[name] is not None]
+    found = [name for name in ("buoyancy", "dissipation") if name not in given]
     how = (
-        f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
-        "dissipation and the inflow of the clip, and of its fire if it shows any."
+        f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the "
+        f"{', '.join([*found, 'inflow'])} and fire of the clip, as far as it shows them"
+        + (f", and a given {' and '.join(given)}." if given else ".")
     )
     camera_frames = [float(number) for number in range(kept[0], last + 1)]
     with directed_writer(sequence, out, "continue", settings, how, camera_frames, npz=npz, resume=resume) as writer:
@@ -164,8 +177,19 @@ def _simulated(
 ) -> Iterator[Written]:
     start, dt, clip = kept[-1], 1 / sequence.fps, growth.clip
     # the first frame has no velocity of its own
-    moments = [read_moment(sequence, number) for number in kept[1:][-FITTED_MOMENTS:]]
-    simulation = fit_simulation(moments, dt, sequence.scene.inflow(), _surroundings(continuation, clip, clip))
+    numbers = kept[1:]
+    earlier = numbers[-BUOYANCY_MOMENTS:-FITTED_MOMENTS] if continuation.buoyancy is None else ()
+    moments = [read_moment(sequence, number) for number in numbers[-FITTED_MOMENTS:]]
+    simulation = fit_simulation(
+        moments,
+        dt,
+        sequence.scene.inflow(),
+        _surroundings(continuation, clip, clip),
+        earlier=[coarse(read_moment(sequence, number)) for number in earlier],
+        depth_axis=_depth_axis(sequence.scene.camera),
+        buoyancy=continuation.buoyancy,
+        dissipation=continuation.dissipation,
+    )
     cut = cut_sides(moments[-1].density, growth.closed)
     state = writer.state
     if state is not None and state.number > start:
@@ -175,7 +199,7 @@ def _simulated(
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     else:
         box, larger = clip, _start_box(continuation, growth)
-        moment = spun_up(simulation, moments)
+        moment = with_small_eddies(spun_up(simulation, moments))
         moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
     del moments  # they are large
     for step in range(1, continuation.frames + 1):
@@ -217,6 +241,12 @@ def _resumed(state: ResumeState, box: Domain, closed: tuple[Side, ...]) -> Momen
 def _share_left(step: int, continuation: Continuation) -> float:
     """The part of the smoke that is shown while it fades."""
     return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
+
+
+def _depth_axis(camera: Camera) -> int:
+    """The axis, x or y, that is nearest to the line of sight of a camera."""
+    along = [abs(row[2]) for row in camera.matrix[:2]]
+    return along.index(max(along))
 
 
 def _growth(continuation: Continuation, scene: CompleteScene) -> Growth:

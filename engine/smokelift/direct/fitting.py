@@ -6,9 +6,10 @@ the first moment alone, and at each moment the clip's density (direct insertion:
 incomplete historical data to infer the present state of the atmosphere", 1969). The density's detail turns the air
 around it, so that eddies come in on every scale that the clip shows.
 
-The buoyancy is the one with which smoke rises as it does in the clip. A velocity's change from one moment to the next
-does not tell it, since estimates err by more than that. How far the smoke rises in half of the moments does
-(docs/experiments/continuation.md).
+The buoyancy is the one whose velocity moves the smoke up as the clip does: each moment is carried on for a step, and
+compared with the next one in the picture. What rises there is the pattern of the smoke, not its centre of mass, which
+sinks where a head dissolves while the base is fed. A velocity's change from one moment to the next does not show the
+buoyancy, since estimates err by more than that (docs/experiments/continuation.md).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from scipy import ndimage
 
 from smokelift.checks.array_types import Mask
 from smokelift.direct.burning import fit_fire
@@ -26,38 +28,98 @@ from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.simulation import Physics, Simulation
 from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Array, Velocity, advect
+from smokelift.transport import Array, Velocity, advect, at_centres
 from smokelift.velocity.pyramid import coarsen, coarsen_faces
 
 COARSE = 64
-"""Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a centre needs no more."""
+"""Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a mean motion needs no more."""
 
 MIN_MOMENTS = 8
-"""Moments that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke's centre by less than a tenth of a
-voxel, which is within its error."""
+"""Moments that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
+which is within its error."""
+
+UNUSUAL = 2.0
+"""Times the median speed above which a moment's velocity is taken to be wrong."""
+
+BUOYANCY_MOMENTS = 24
+"""Last moments, at most, that show the buoyancy: half of them are needed to forget that an estimated velocity is too
+slow (docs/experiments/continuation.md)."""
+
+BLUR = 1.5
+"""Standard deviation in coarse voxels of the blur before pictures are compared: finer detail is of interpolation."""
+
+BORDER = 2
+"""Layers of coarse voxels at the lower and the upper side whose smoke may have come in or gone out."""
+
+AROUND = 1
+"""Coarse voxels around an inlet that are not compared: inlets are found roughly, and what enters there stands still."""
+
+STEADINESS = 0.1
+"""Weight, in units of the brightness itself, against a brightness that changes with height: without texture nothing
+else tells such a change from a rise."""
 
 TRIALS = 6
-"""Steps of the secant method at most: the centre's height is nearly linear in the buoyancy."""
+"""Steps of the secant method at most: the rise is nearly linear in the buoyancy."""
 
-MIN_HEIGHT_DIFFERENCE = 1e-6
-"""Voxels of difference in height, at most, that are rounding."""
+MIN_RISE_DIFFERENCE = 1e-9
+"""Voxels per frame of difference in rise, at most, that are rounding."""
 
 PRECISION = 0.01
 """Relative change of the buoyancy below which it is found."""
 
 
 def fit_simulation(
-    moments: Sequence[Moment], dt: float, marked: Mask | None = None, surroundings: Surroundings | None = None
+    moments: Sequence[Moment],
+    dt: float,
+    marked: Mask | None = None,
+    surroundings: Surroundings | None = None,
+    *,
+    earlier: Sequence[Moment] = (),
+    depth_axis: int = 1,
+    buoyancy: float | None = None,
+    dissipation: float | None = None,
 ) -> Simulation:
     """Fit forces, inlets and fire to the moments of a clip, for a simulation that goes on from them.
 
-    The moments are consecutive, two at least, `dt` seconds apart. Where smoke enters is marked (nx, ny, nz), if that is
-    known.
+    Parameters
+    ----------
+    moments
+        Consecutive, two at least, `dt` seconds apart.
+    marked : (nx, ny, nz) bool, optional
+        Where smoke enters, if that is known.
+    surroundings
+        What the artist has placed; nothing if None.
+    earlier
+        The moments before them, `coarse`, which show the buoyancy as well.
+    depth_axis
+        0 or 1: the axis, x or y, that is nearest to the camera's line of sight. Motion is compared in the picture.
+    buoyancy, dissipation
+        As in `Physics`, if they are known; None fits them.
     """
     inflow = find_inflow(moments, dt, marked)
-    dissipation = _dissipation(moments, dt, inflow.voxels)
-    physics = Physics(_buoyancy(moments, dt, inflow.voxels, dissipation), dissipation)
+    if dissipation is None:
+        dissipation = _dissipation(moments, dt, inflow.voxels)
+    if buoyancy is None:
+        fitted, rise = _buoyancy([*earlier, *map(coarse, moments)], dt, _coarse_mask(inflow.voxels), depth_axis)
+        contradicted = fitted * rise < 0
+        physics = Physics(0.0 if contradicted else fitted, dissipation, fitted if contradicted else 0.0)
+    else:
+        physics = Physics(buoyancy, dissipation)
     return Simulation(physics, inflow.cropped(), surroundings or Surroundings(), dt, fit_fire(moments, dt))
+
+
+def coarse(moment: Moment) -> Moment:
+    """The moment on the grid that the buoyancy is fitted on, without fire."""
+    while max(moment.density.shape) > COARSE:
+        faces = coarsen_faces(moment.velocity)
+        moment = Moment(coarsen(moment.density), Velocity(faces.faces, faces.voxel_size, faces.closed))
+    return Moment(moment.density, moment.velocity)
+
+
+def _coarse_mask(voxels: Mask) -> Mask:
+    while max(voxels.shape) > COARSE:
+        voxels = coarsen(voxels.astype(np.float32)) > 0
+    return voxels
 
 
 def spun_up(simulation: Simulation, moments: Sequence[Moment]) -> Moment:
@@ -65,7 +127,18 @@ def spun_up(simulation: Simulation, moments: Sequence[Moment]) -> Moment:
 
     The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
-    return _spun_up(_along(simulation), moments)
+    first = _first_typical(moments)
+    along, velocity = _along(simulation), moments[first].velocity
+    for step, moment in enumerate(moments[first:-1], first + 1):
+        velocity = along.velocity(replace(moment, velocity=velocity), step)
+    return replace(moments[-1], velocity=velocity)
+
+
+def _first_typical(moments: Sequence[Moment]) -> int:
+    """The first moment whose velocity is as fast as usual: a wrong one would go on through all others."""
+    speeds = [sum(float(np.vdot(component, component)) for component in m.velocity.faces) ** 0.5 for m in moments]
+    usual = UNUSUAL * float(np.median(speeds))
+    return next((number for number in range(len(moments) // 2) if speeds[number] <= usual), 0)
 
 
 def _along(simulation: Simulation) -> Simulation:
@@ -73,37 +146,70 @@ def _along(simulation: Simulation) -> Simulation:
     return replace(simulation, inflow=simulation.inflow.forwards(), surroundings=Surroundings(), fire=None)
 
 
-def _spun_up(along: Simulation, moments: Sequence[Moment]) -> Moment:
-    velocity = moments[0].velocity
-    for step, moment in enumerate(moments[:-1], 1):
-        velocity = along.velocity(replace(moment, velocity=velocity), step)
-    return replace(moments[-1], velocity=velocity)
+def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:
+    """The buoyancy whose velocity moves the smoke up as the clip does, and how fast the clip says that it rises (m/s).
 
-
-def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, dissipation: float) -> float:
-    """The buoyancy with which the simulated smoke's centre of mass arrives at the clip's height.
-
-    The first half of the moments spins the velocity up, the second half is simulated freely.
+    The velocity spins up along all moments, with their densities; the second half of them is compared.
     """
+    moments = moments[-BUOYANCY_MOMENTS:]
     if len(moments) < MIN_MOMENTS or not all(moment.density.any() for moment in moments):
-        return 0.0
-    while max(moments[0].density.shape) > COARSE:
-        moments, inlets = [_halved(moment) for moment in moments], coarsen(inlets.astype(np.float32)) > 0
-    half = len(moments) // 2
-    still = Simulation(Physics(0.0, dissipation), Inflow(inlets, moments).cropped(), Surroundings(), dt)
-    goal = _height(moments[-1].density)
+        return 0.0, 0.0
+    half, first = len(moments) // 2, _first_typical(moments)
+    still = Simulation(Physics(0.0, 0.0), Inflow(inlets, moments).cropped(), Surroundings(), dt)
+    compared = (~ndimage.binary_dilation(inlets, iterations=AROUND)).astype(np.float32)
+    compared[:, :, :BORDER] = compared[:, :, -BORDER:] = 0
 
-    def missed(buoyancy: float) -> float:
-        along = _along(replace(still, physics=Physics(buoyancy, dissipation)))
-        moment = _spun_up(along, moments[: half + 1])
-        for step in range(half + 1, len(moments)):
-            moment = along.next(moment, step)
-        return _height(moment.density) - goal
+    def picture(density: Array) -> Array:
+        blurred: Array = ndimage.gaussian_filter((density * compared).sum(depth_axis), BLUR)
+        return blurred
+
+    found = [picture(moment.density) for moment in moments]
+
+    rise = float(np.mean([_rise(moment, compared) for moment in moments]))
+
+    def too_high(buoyancy: float) -> float:
+        """Voxels per frame by which the carried smoke rises more than the clip's."""
+        along = _along(replace(still, physics=Physics(buoyancy, 0.0)))
+        velocity, carried = moments[first].velocity, []
+        for step, before in enumerate(moments[first:-1], first + 1):
+            velocity = along.velocity(replace(before, velocity=velocity), step)
+            if step >= half:
+                carried.append(picture(advect(before.density, velocity, dt, conserve=True)))
+        return _higher(carried, found[half:], rise)
 
     density = moments[half].density
     typical = float(np.vdot(density, density) / density.sum(dtype=np.float64))
     by_a_voxel = moments[0].velocity.voxel_size / (typical * (half * dt) ** 2)
-    return _root(missed, by_a_voxel)
+    return _root(too_high, by_a_voxel), rise
+
+
+def _higher(carried: Sequence[Array], found: Sequence[Array], rise: float) -> float:
+    """Voxels by which carried pictures (n, nz) are higher than those that are found.
+
+    It is the optical flow of Lucas and Kanade, common to all pixels, beside the brightness of each picture and one that
+    changes linearly with height. Smoke may dissolve on its way, which a known rise gives, but none appears there: a
+    change the other way is motion.
+    """
+    products, sums = np.zeros((2, 2)), np.zeros(2)
+    for one, other in zip(carried, found, strict=True):
+        height = np.linspace(-1, 1, other.shape[1], dtype=np.float32)
+        changes = np.stack([np.gradient(other, axis=1).ravel(), (other * height).ravel()])
+        brightness = other.ravel() / max(float(np.linalg.norm(other)), 1e-30)
+        changes -= np.outer(changes @ brightness, brightness)
+        products += changes @ changes.T
+        sums -= changes @ one.ravel()
+    products[1, 1] *= 1 + STEADINESS
+    if not products[0, 0] > 0:
+        return 0.0
+    higher, brighter = np.linalg.lstsq(products, sums, rcond=None)[0]
+    return float(higher if brighter * rise < 0 else sums[0] / products[0, 0])
+
+
+def _rise(moment: Moment, compared: Array) -> float:
+    """Upward velocity (m/s) of the smoke that is compared, by its own velocity."""
+    density = moment.density * compared
+    upwards = at_centres(moment.velocity.faces)[2]
+    return float(np.vdot(density, upwards)) / max(float(density.sum(dtype=np.float64)), 1e-30)
 
 
 def _root(function: Callable[[float], float], start: float) -> float:
@@ -114,7 +220,7 @@ def _root(function: Callable[[float], float], start: float) -> float:
     before, at_before, now = 0.0, function(0.0), start
     for _ in range(TRIALS):
         at_now = function(now)
-        if abs(at_now - at_before) <= MIN_HEIGHT_DIFFERENCE:
+        if abs(at_now - at_before) <= MIN_RISE_DIFFERENCE:
             return 0.0
         before, now, at_before = now, now - at_now * (now - before) / (at_now - at_before), at_now
         if abs(now - before) <= PRECISION * abs(now):
@@ -131,15 +237,3 @@ def _dissipation(moments: Sequence[Moment], dt: float, inlets: Mask) -> float:
         found_mass += float(after.density.sum(dtype=np.float64, where=~inlets))
     lost = math.log(carried_mass / found_mass) / dt if carried_mass > 0 and found_mass > 0 else 0.0
     return max(0.0, lost)
-
-
-def _height(density: Array) -> float:
-    """Height of the centre of mass, in voxels."""
-    layers = density.sum((0, 1), dtype=np.float64)
-    return float(layers @ np.arange(len(layers)) / max(layers.sum(), 1e-30))
-
-
-def _halved(moment: Moment) -> Moment:
-    """The moment on a grid half as fine."""
-    coarse = coarsen_faces(moment.velocity)
-    return Moment(coarsen(moment.density), Velocity(coarse.faces, coarse.voxel_size, coarse.closed))

@@ -37,12 +37,19 @@ TRACE = np.float32(1e-4)
 class Physics:
     """What acts on the smoke of a clip.
 
-    The buoyancy is the upward acceleration at density 1, in m/s2, below zero for smoke that sinks; the dissipation is
-    the rate at which smoke dissolves, in 1/s, at least 0.
+    Attributes
+    ----------
+    buoyancy
+        Upward acceleration at density 1, in m/s2, below zero for smoke that sinks.
+    dissipation
+        Rate at which smoke dissolves, in 1/s, at least 0.
+    contradicted_buoyancy
+        One that was fitted and is not taken, because the clip's smoke moves the other way; 0 if there is none.
     """
 
     buoyancy: float
     dissipation: float
+    contradicted_buoyancy: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

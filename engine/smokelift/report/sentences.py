@@ -303,6 +303,10 @@ SENTENCES: Mapping[str, str] = {
         "From frame {frame} on the smoke dissolves before it reaches the end of its box, because the box cannot grow "
         "any more. Give it more room than {room:g}, or move the camera or lamp in its way."
     ),
+    "contradicted buoyancy": (
+        "The smoke goes on without buoyancy: one of {buoyancy:.2g} m/s2 was fitted, but the smoke of the clip "
+        "{motion}. Give a buoyancy if you know better."
+    ),
 }
 """Sentences by the kinds of remarks."""
 

@@ -98,6 +98,9 @@ def test_frames_are_those_of_the_scene(shot, result) -> None:
     settings = result.smokelift.directing
     settings.frames, settings.fade = 10, 4
     assert directing.engine_request(result) == ("continue", ["--frames", "10", "--fade", "4", "--room", "8.000000"], [])
+    settings.use_buoyancy, settings.buoyancy = True, -0.5
+    settings.use_dissipation = True
+    assert directing.engine_request(result)[1][-4:] == ["--buoyancy", "-0.500000", "--dissipation", "0.000000"]
     result.data.frame_start = 101
     settings.use_start, settings.start = True, 105
     assert directing.engine_request(result)[1][-2:] == ["--start", "5"]

@@ -6,6 +6,8 @@ import shutil
 import pytest
 from command_line import command, events, names, refused
 
+from smokelift.app.commands import continue_
+from smokelift.direct import CONTRADICTED
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.report import cost
 
@@ -105,6 +107,7 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     words = ("continue", finished, "--out", out, "--frames", 3, "--npz", "--fade", 1, "--wind", 0.2, -0.1, 0)
     words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2, "--closed", "z-", "x+")
+    words += ("--buoyancy", -0.5, "--dissipation", 0.1)
     assert command(*words, "--progress", "json") == 0
     said = events(capsys.readouterr().out)
     assert said[-1]["event"] == "done"
@@ -128,6 +131,15 @@ def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, 
     assert said("--resume") == []
 
 
+def test_one_sentence_says_that_a_buoyancy_contradicts_the_clip(finished, tmp_path, capsys, monkeypatch) -> None:
+    figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
+    monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(7, figures), (8, figures)]))
+    start = ("continue", finished, "--out", tmp_path / "out", "--frames", 2, "--progress", "json")
+    assert command(*start) == 0
+    (sentence,) = [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
+    assert "without buoyancy: one of -0.4 m/s2 was fitted, but the smoke of the clip rises" in sentence
+
+
 def test_wrong_continuations_are_refused(finished, tmp_path, capsys) -> None:
     start = ("continue", finished, "--out", tmp_path / "out", "--npz")
     assert "--frames 0" in refused(capsys, *start, "--frames", 0)
@@ -135,6 +147,7 @@ def test_wrong_continuations_are_refused(finished, tmp_path, capsys) -> None:
     assert "radius" in refused(capsys, *start, "--frames", 3, "--ball", 0, 0, 1, -1)
     assert "no voxel" in refused(capsys, *start, "--frames", 3, "--box", 50, 50, 50, 60, 60, 60)
     assert "--room 0.5" in refused(capsys, *start, "--frames", 3, "--room", 0.5)
+    assert "--dissipation -1" in refused(capsys, *start, "--frames", 3, "--dissipation", -1)
     assert "--turbulence 1 0 0" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0, 0)
     assert "--turbulence 1 1 0.5" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 1, 0.5)
     assert "too small for voxels" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0.001, 0)

@@ -31,6 +31,16 @@ def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tm
     assert "Frames 11 to 15" in made.provenance[-1]["how"]
 
 
+def test_a_given_buoyancy_and_dissipation_count(source, tmp_path):
+    for name, buoyancy, dissipation in (("up", 6.0, 0.0), ("down", -6.0, 1.0)):
+        run(source, tmp_path / name, Continuation(6, buoyancy=buoyancy, dissipation=dissipation))
+    up, down = (Sequence.open(tmp_path / name) for name in ("up", "down"))
+    assert up.velocity(16).faces[2].mean() > down.velocity(16).faces[2].mean()
+    assert up.density(16).sum() > 1.1 * down.density(16).sum()
+    assert down.figures(16)["buoyancy"] == -6
+    assert "given buoyancy and dissipation" in down.provenance[-1]["how"]
+
+
 def run_twice(source, folder, continuation, last):
     """Continue a sequence in one go, and in two: stopped after a frame, and gone on with."""
     run(source, folder / "whole", continuation)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Moment, fit_simulation, spun_up
+from smokelift.direct import Ball, Moment, coarse, fit_simulation, spun_up
 from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.simulation import Physics
 from smokelift.transport import Velocity
@@ -35,6 +35,37 @@ def test_buoyancy_is_found_from_velocities_that_are_too_slow():
     assert fit_simulation(moments, DT).physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.15)
 
 
+def test_a_head_that_dissolves_above_a_base_that_is_fed_rises():
+    """Its centre of mass sinks."""
+    share = np.linspace(0, 1, DOMAIN.resolution[2])
+    moments = [
+        replace(moment, density=(moment.density * np.exp(-6 * DT * number * share)).astype(np.float32))
+        for number, moment in enumerate(plume())
+    ]
+    assert fit_simulation(moments, DT, Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)).physics.buoyancy > 1
+
+
+@pytest.mark.parametrize("buoyancy", [3.0, -3.0])
+def test_a_buoyancy_against_the_clips_own_motion_is_not_taken(buoyancy):
+    moments = course(free(Physics(buoyancy, 0.0)), at_rest(blob((0.0, 0.0, 1.5))), 11)
+    nowhere = np.zeros(DOMAIN.shape, bool)
+    assert fit_simulation(moments, DT, nowhere).physics.contradicted_buoyancy == 0
+    against = fit_simulation([slowed(moment, -1.0) for moment in moments], DT, nowhere).physics
+    assert against.buoyancy == 0
+    assert against.contradicted_buoyancy == pytest.approx(buoyancy, rel=0.1)
+
+
+def test_earlier_moments_show_the_buoyancy_too():
+    moments = [slowed(moment, 0.6) for moment in course(free(), at_rest(blob()), 23)]
+    found = fit_simulation(moments[-6:], DT, earlier=[coarse(moment) for moment in moments[:-6]]).physics
+    assert found.buoyancy == pytest.approx(fit_simulation(moments, DT).physics.buoyancy)
+
+
+def test_what_is_given_is_not_fitted():
+    moments = course(free(), at_rest(blob()), 9)
+    assert fit_simulation(moments, DT, buoyancy=-1.5, dissipation=0.2).physics == Physics(-1.5, 0.2)
+
+
 def test_few_moments_show_no_buoyancy():
     assert fit_simulation(course(free(), at_rest(blob()), 5), DT).physics.buoyancy == 0
 
@@ -53,6 +84,14 @@ def test_the_forces_of_a_clip_make_its_velocity_from_one_that_is_too_slow():
     found = spun_up(free(), slow)
     assert found.density is slow[-1].density
     assert error(found.velocity, moments[-1].velocity) < 0.5 * error(slow[-1].velocity, moments[-1].velocity)
+
+
+def test_a_velocity_that_is_estimated_wrong_does_not_go_on():
+    moments, inlet = plume(), Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    wrong = [slowed(moments[0], -5.0), *moments[1:]]
+    simulation = fit_simulation(wrong, DT, inlet)
+    assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.2)
+    assert error(spun_up(simulation, wrong).velocity, moments[-1].velocity) < 0.1
 
 
 def test_a_velocity_that_the_forces_explain_stays():

@@ -12,6 +12,7 @@ from smokelift.app.options import add_directed_options, finite_number, named_pat
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Doubt
 from smokelift.direct import (
+    CONTRADICTED,
     DISSOLVED,
     ROOM,
     Ball,
@@ -95,6 +96,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="TIMES",
         help="let the box grow with the smoke to at most so many times the clip's size; 1 keeps it",
     )
+    parser.add_argument(
+        "--buoyancy",
+        type=finite_number,
+        metavar="ACCELERATION",
+        help="upward acceleration of smoke of density 1, in m/s2; smoke sinks below 0 (default: the clip's)",
+    )
+    parser.add_argument(
+        "--dissipation",
+        type=finite_number,
+        metavar="RATE",
+        help="part of the smoke that dissolves in a second, as a rate in 1/s, at least 0 (default: the clip's)",
+    )
 
 
 def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[str, ...], what: str) -> None:
@@ -140,10 +153,14 @@ def _room(options: argparse.Namespace, sequence: Sequence, say: Reporter) -> flo
 
 
 def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterator[Written]:
-    """The frames, with one note when smoke first dissolves because its box cannot grow."""
-    said = False
+    """The frames, with a note on a buoyancy that is not taken, and one when smoke first dissolves for want of room."""
+    said = contradicted = False
     for number, figures in written:
         yield number, figures
+        if not contradicted and (buoyancy := figures.get(CONTRADICTED, 0.0)):
+            contradicted = True
+            motion = "rises" if buoyancy < 0 else "sinks"
+            say.note(Doubt("contradicted buoyancy", {"buoyancy": buoyancy, "motion": motion}))
         if not said and figures.get(DISSOLVED, 0.0) > NOTICED:
             said = True
             say.note(Doubt("dissolving smoke", {"frame": number, "room": room}))
@@ -155,6 +172,8 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         raise ValueError(f"--frames {options.frames}: expected 1 or more.")
     if not 0 <= options.fade <= options.frames:
         raise ValueError(f"--fade {options.fade}: expected 0 to {options.frames}, as many frames as are added.")
+    if options.dissipation is not None and options.dissipation < 0:
+        raise ValueError(f"--dissipation {options.dissipation:g}: expected 0 or more, in 1/s.")
     if options.room < 1:
         raise ValueError(f"--room {options.room:g}: expected 1 or more, in boxes of the clip.")
     balls = [_ball("--ball", values) for values in options.ball]
@@ -170,6 +189,8 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         obstacles=(*balls, *boxes, *map(_mesh, options.mesh)),
         closed=tuple(side for side in SIDES if side in options.closed),
         room=options.room,
+        buoyancy=options.buoyancy,
+        dissipation=options.dissipation,
     )
 
 
