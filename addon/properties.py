@@ -190,6 +190,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         description="Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend",
         options={"HIDDEN"},
     )
+    saved_as: StringProperty(
+        name="Saved As",
+        description="The .blend as it was last saved or opened, which may have been copied or renamed meanwhile",
+        options={"HIDDEN"},
+    )
     before: StringProperty(name="Before", description="The result that was shown before", options={"HIDDEN"})
     directing: PointerProperty(name="Direct", description="What is made of the result", type=SmokeliftDirecting)
 

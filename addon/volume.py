@@ -139,6 +139,12 @@ def take_of(volume: bpy.types.Volume) -> Take | None:
     return Take(path.parent) if path.suffix == ".vdb" else None
 
 
+def directories_on_show() -> set[Path]:
+    """Directories, without links, of the takes that Volumes of this file show."""
+    shown = (take_of(data) for data in bpy.data.volumes)
+    return {take.directory.resolve() for take in shown if take is not None}
+
+
 def provenance_note(smoke: bpy.types.Object) -> str:
     """What of a smoke is measured and what is not, as a line for the panel; empty if that is unknown."""
     return smoke.data.get(PROVENANCE, "")
