@@ -6,6 +6,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from . import run, shot_check, smoke_takes
 from .blender_scene import ShotError
+from .clip_table import frame_count
 from .editors import open_tab
 from .needs import NeedsClip
 from .properties import SEEDS
@@ -32,11 +33,16 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        text = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
         try:
             clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
         except RuntimeError:
-            text = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
             self.report({"ERROR"}, text.format(self.filepath))
+            return {"CANCELLED"}
+        if clip.frame_duration < 1:  # Blender takes any file for a clip
+            self.report({"ERROR"}, text.format(self.filepath))
+            if clip.users == 0:
+                bpy.data.movieclips.remove(clip)
             return {"CANCELLED"}
         new_smoke(context.scene, clip)
         if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
@@ -46,6 +52,23 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(SMOKELIFT_OT_add.bl_idname, icon="FILE_MOVIE")
+
+
+class SMOKELIFT_OT_use_all_files(NeedsClip, bpy.types.Operator):
+    """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
+
+    bl_idname = "smokelift.use_all_files"
+    bl_label = "Use All Files"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = active_smoke(context.scene).smokelift
+        try:
+            settings.last = frame_count(settings.clip)
+        except ShotError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
 
 
 class SMOKELIFT_OT_run(NeedsClip, bpy.types.Operator):
@@ -177,6 +200,7 @@ class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
 
 _CLASSES = (
     SMOKELIFT_OT_add,
+    SMOKELIFT_OT_use_all_files,
     SMOKELIFT_OT_run,
     SMOKELIFT_OT_vary,
     SMOKELIFT_OT_resume,

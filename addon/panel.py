@@ -9,7 +9,7 @@ from . import presets, shot_check, smoke_takes, volume
 from .automatic import draw_automatic
 from .blender_scene import frame_rate
 from .box_table import box_of, has_inlet
-from .clip_table import clip_path
+from .clip_table import clip_path, sequence_of
 from .job import ENDED
 from .proxy import lacks_proxy
 from .smoke import active_smoke, find_smoke, smokes
@@ -17,6 +17,9 @@ from .undistort import is_distorted
 
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
+
+MISSING = 3
+"""Names of missing pictures that are listed."""
 
 CELLS = 0.245, 0.215, 0.18, 0.18
 """Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
@@ -76,6 +79,7 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
+    _draw_gaps(layout, context, settings)
     if is_distorted(clip):
         column = layout.column(align=True)
         draw_text(
@@ -98,6 +102,25 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
             text = iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size)
         draw_text(column, context, text, "INFO")
         column.operator("smokelift.match_clip")
+
+
+def _draw_gaps(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+    """Pictures that are missing in a sequence, and the button that uses those after them."""
+    found, known = sequence_of(settings.clip), settings.clip.frame_duration
+    if found is None or not known <= settings.last or (found.count <= known and not found.missing):
+        return
+    column = layout.column(align=True)
+    if found.missing:
+        names = ", ".join(found.missing[:MISSING])
+        if len(found.missing) > MISSING:
+            names = iface_("{:s} and {:d} more").format(names, len(found.missing) - MISSING)
+        draw_text(column, context, iface_("Missing: {:s}.").format(names), "ERROR")
+    if settings.last < found.count:
+        text = iface_("Blender sees {:d} of {:d} frames.").format(known, found.count)
+        draw_text(column, context, text, "BLANK1" if found.missing else "INFO")
+        column.operator("smokelift.use_all_files")
+    else:
+        draw_text(column, context, "A neighboring picture stands in for each.", "BLANK1")
 
 
 def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

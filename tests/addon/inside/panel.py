@@ -7,6 +7,7 @@ import bpy
 import pytest
 
 from addon import advanced_panel, direct_panel, element, panel, shot_check, volume
+from addon.clip_table import clip_table
 from addon.contract import QUALITIES
 from conftest import changed, made
 from tests.example_shot import smoke
@@ -109,6 +110,32 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     assert drawn(shot, *panels).count("Automatic") == words - 1
     setattr(settings, f"use_{name}", False)
     assert getattr(settings, name) == 0
+
+
+def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path) -> None:
+    """And those that Blender does not know of because they were written after it read the first ones."""
+    image = bpy.data.images.new("frame", 48, 32)
+    for number in (17, 18, 20, 21, 22):
+        image.save(filepath=str(tmp_path / f"frame_{number:04d}.png"))
+    settings = smoke(scene).smokelift
+    settings.clip = bpy.data.movieclips.load(str(tmp_path / "frame_0017.png"))
+
+    def said() -> str:
+        bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
+        return " ".join(text.strip() for text in drawn(scene, panel.SMOKELIFT_PT_view))
+
+    assert (settings.first, settings.last) == (1, 2)
+    assert "Missing: frame_0019.png." in said() and "Blender sees 2 of 6 frames." in said()
+    assert bpy.ops.smokelift.use_all_files() == {"FINISHED"}
+    assert clip_table(smoke(scene))["frames"] == [0, 5]
+    assert "Missing: frame_0019.png." in said() and "Blender sees" not in said()
+    image.save(filepath=str(tmp_path / "frame_0023.png"))
+    assert "Blender sees 2 of 7 frames." in said()
+    (tmp_path / "frame_0019.png").touch()
+    bpy.ops.smokelift.use_all_files()
+    assert "Missing" not in said() and "Blender sees" not in said()
+    settings.last = 1
+    assert "Missing" not in said()
 
 
 def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
