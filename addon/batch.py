@@ -42,7 +42,8 @@ def main(words: Sequence[str]) -> int:
         if take is not None:
             smoke_takes.update_moved_files(smoke, take)
         take = take or smoke_takes.write_take(smoke)
-        job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
+        before = volume.frames_before_take(smoke, take)
+        job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT
@@ -149,13 +150,16 @@ def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
 
 def _render(smoke: bpy.types.Object, path: Path) -> None:
     """Render all frames of the smoke if the name has #### for their numbers, else the current frame."""
+    from . import volume
+
     scene = bpy.context.scene
     scene.render.filepath = str(path.absolute())
     if "#" not in path.name:
         bpy.ops.render.render(write_still=True)
         return
-    data = smoke.data
-    scene.frame_start, scene.frame_end = data.frame_start, data.frame_start + data.frame_duration - 1
+    seen = volume.shown_range(smoke)
+    if seen is not None:
+        scene.frame_start, scene.frame_end = seen
     bpy.ops.render.render(animation=True)
 
 

@@ -110,3 +110,10 @@ def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
 def start_frame(settings: bpy.types.PropertyGroup) -> int:
     """The scene's frame that shows the first used frame of the clip."""
     return settings.clip.frame_start + settings.first - 1
+
+
+def used_range(settings: bpy.types.PropertyGroup) -> tuple[int, int] | None:
+    """The scene's frames that show the first and the last used frame of the clip; None without one."""
+    if settings.clip is None:
+        return None
+    return start_frame(settings), settings.clip.frame_start + settings.last - 1

@@ -91,6 +91,8 @@ class Job:
         What to start.
     log
         File to which all messages are appended.
+    before
+        Number of the clip's frames before the first of the result.
 
     Attributes
     ----------
@@ -112,7 +114,7 @@ class Job:
         The engine's exit status; None before it ends.
     """
 
-    def __init__(self, command: Sequence[str], log: Path) -> None:
+    def __init__(self, command: Sequence[str], log: Path, before: int = 0) -> None:
         self.outcome: Outcome = "waiting"
         self.done = self.total = 0
         self.seconds_left: float | None = None
@@ -123,6 +125,7 @@ class Job:
         self.status: int | None = None
         self._command = list(command)
         self._log_path = log
+        self._before = before
         self._log: IO[bytes] | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._lines: queue.Queue[bytes | None] = queue.Queue(4 * LINES_A_POLL)
@@ -217,7 +220,7 @@ class Job:
     def _handle(self, event: str, message: dict[str, Any]) -> bool:
         match event:
             case "note":
-                self.notes.append(sentence(message))
+                self.notes.append(sentence(message, self._before))
                 if message.get("doubt"):
                     self.warnings.append(self.notes[-1])
                 self._write_log(self.notes[-1])
@@ -226,9 +229,10 @@ class Job:
             case "frame":
                 self.done, self.total = int(message["done"]), int(message["total"])
                 self.seconds_left = float(message["seconds_left"])
-                self._write_log(f"frame {message['frame']}: {self.done} of {self.total}")
+                number = self._before + int(message["frame"])
+                self._write_log(f"frame {number}: {self.done} of {self.total}")
             case "done":
-                self.sentence, self.details = sentence(message), message
+                self.sentence, self.details = sentence(message, self._before), message
                 self._write_log(self.sentence)
             case "error":
                 self._error = str(message["text"])

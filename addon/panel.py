@@ -239,7 +239,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     if all(row.outcome in ENDED for row in own):
         begun = smoke_takes.unfinished(smoke)
         if begun is not None and begun.read().frames:
-            text = iface_("Resume after Frame {:d}").format(begun.read().frames)
+            last = volume.frames_before_take(smoke, begun) + begun.read().frames
+            text = iface_("Resume after Frame {:d}").format(last)
             column.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
             column.operator("smokelift.run", text="Start Again", icon="PLAY")
         else:
@@ -249,11 +250,10 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     for row in jobs:
         _draw_job(layout, context, smoke, row)
     if volume.shown_take(smoke) is not None:
-        data = smoke.data
-        last = data.frame_start + data.frame_duration - 1
-        if data.sequence_mode == "CLIP" and not data.frame_start <= context.scene.frame_current <= last:
+        seen = volume.shown_range(smoke)
+        if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
             text = iface_("The smoke is seen in frames {:d} to {:d}.")
-            draw_text(layout, context, text.format(data.frame_start, last), "INFO")
+            draw_text(layout, context, text.format(*seen), "INFO")
         known = volume.provenance_note(smoke)
         if known:
             draw_text(layout, context, known, "INFO")

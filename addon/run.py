@@ -165,9 +165,10 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         return bool(self._jobs or self._not_shown) or self._check.running or manager.smokelift.check_ticks > 0
 
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
-        take = Take(Path(name))
+        take, smoke = Take(Path(name)), find_smoke(row.smoke_uid)
+        before = volume.frames_before_take(smoke, take) if smoke is not None else 0
         try:
-            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
+            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
         except (EngineMissingError, TakeError) as error:
             row.outcome, row.sentence = "failed", str(error)
             return

@@ -27,26 +27,36 @@ SENTENCES = {
         "The picture changes at once between frames {before} and {after}, as at a cut, so no single background fits "
         "both sides. Choose Frames {first} to {before} or {after} to {last}."
     ),
+    "dissolving smoke": (
+        "From frame {frame} on the smoke dissolves before it reaches the end of its box, because the box cannot grow "
+        "any more. Give it more Room than {room:g}, or move the camera or lamp in its way."
+    ),
 }
 """Sentences by kind, with the figures that the engine gives."""
 
 FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
 """Figures that the engine counts from 0, and the panel from 1."""
 
+OF_RESULT = ("dissolving smoke",)
+"""Sentences whose frames are counted from the first of the result, from 1."""
 
-def sentence(message: Mapping[str, Any]) -> str:
+
+def sentence(message: Mapping[str, Any], before: int = 0) -> str:
     """A message of the engine, as the panel shows it.
 
     Parameters
     ----------
     message
         With the engine's ``text``; with its ``kind`` and ``figures`` if it has those.
+    before
+        Number of the clip's frames before the first of the result.
     """
-    words = SENTENCES.get(message.get("kind", ""))
+    kind = message.get("kind", "")
+    words, add = SENTENCES.get(kind), before if kind in OF_RESULT else 1
     if words is None:
         return str(message["text"])
     figures = dict(message["figures"])
-    figures |= {name: figures[name] + 1 for name in FRAME_NUMBERS if name in figures}
+    figures |= {name: figures[name] + add for name in FRAME_NUMBERS if name in figures}
     if "frames" in figures:
         figures["frames"] = "1 frame" if figures["frames"] == 1 else f"{figures['frames']} frames"
     return words.format(**figures)

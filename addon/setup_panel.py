@@ -13,7 +13,7 @@ TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_
 
 
 class SMOKELIFT_OT_match_clip(NeedsClip, bpy.types.Operator):
-    """Set the scene's resolution, frame rate and length to the clip's"""
+    """Set the scene's resolution and frame rate to the clip's, and its length to the result's or its part in use"""
 
     bl_idname = "smokelift.match_clip"
     bl_label = "Match Scene to Clip"

@@ -11,6 +11,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from . import volume
+from .clip_table import used_range
 from .compositing import composite, take_composite_away
 from .kept import set_and_remember, set_unless_changed
 from .plate import play_beside, show_plate
@@ -30,7 +31,7 @@ BOUNCES = 128
 
 
 def match_clip(smoke: bpy.types.Object) -> None:
-    """Give the smoke's scene the clip's size, frame rate and length."""
+    """Give the smoke's scene the clip's size and frame rate, and the length of what is used or made of it."""
     clip, scene = smoke.smokelift.clip, scene_of(smoke)
     render = scene.render
     render.resolution_x, render.resolution_y = clip.size
@@ -41,7 +42,7 @@ def match_clip(smoke: bpy.types.Object) -> None:
 
 
 def follow_range(smoke: bpy.types.Object) -> None:
-    """Give the scene the length of its clips and results, unless the artist gave it another."""
+    """Give the scene the length of its results, unless the artist gave it another than that of a new file or a clip."""
     scene, clip = scene_of(smoke), smoke.smokelift.clip
     of_clip = (clip.frame_start, clip.frame_start + clip.frame_duration - 1) if clip is not None else NEW_RANGE
     if "smokelift_frame_end" in scene or (scene.frame_start, scene.frame_end) in (NEW_RANGE, of_clip):
@@ -49,17 +50,11 @@ def follow_range(smoke: bpy.types.Object) -> None:
 
 
 def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, Any, str, Any], None]) -> None:
-    """Set the scene's range to that of the clips of its smokes, and of results that go on after them."""
-    firsts, lasts = [], []
-    for smoke in smokes(scene):
-        clip, data = smoke.smokelift.clip, smoke.data
-        if clip is not None:
-            firsts.append(clip.frame_start)
-            lasts.append(clip.frame_start + clip.frame_duration - 1)
-        if volume.shown_take(smoke) is not None:
-            firsts.append(data.frame_start)
-            lasts.append(data.frame_start + data.frame_duration - 1)
-    if lasts:
+    """Set the scene's range to that of the results on show, and of the used frames of clips that have none yet."""
+    ranges = [volume.shown_range(smoke) or used_range(smoke.smokelift) for smoke in smokes(scene)]
+    found = [each for each in ranges if each is not None]
+    if found:
+        firsts, lasts = zip(*found, strict=True)
         set_value(scene, "frame_end", scene, "frame_end", max(lasts))
         set_value(scene, "frame_start", scene, "frame_start", min(firsts))
 

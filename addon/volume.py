@@ -87,6 +87,36 @@ def _step(smoke: bpy.types.Object) -> tuple[int, float]:
     return _numbers(index)[0], ratio if _real_time(smoke, ratio, index) else 1.0
 
 
+def frames_before_take(smoke: bpy.types.Object, take: Take) -> int:
+    """Number of the clip's frames before a take's first: with it, the take's numbers are the clip's, and go on.
+
+    One that is made of another take, and has no frame yet, has the other's.
+    """
+    index = take.read().index
+    while index is None and (source := take.read().source) is not None:
+        take = source
+        index = take.read().index
+    return frames_before(smoke.smokelift, index) if index else smoke.smokelift.first - 1
+
+
+def shown_range(smoke: bpy.types.Object) -> tuple[int, int] | None:
+    """The first and the last frame of its scene in which a smoke shows its take, those that are still made included."""
+    take, data = shown_take(smoke), smoke.data
+    index = take.read().index if take is not None else None
+    if index is None or not index["frames"]:
+        return None
+    last = data.frame_start + data.frame_duration - 1
+    if not index["complete"] and "direct" not in index.get("settings", {}):
+        last = max(last, scene_frame(smoke, _last_planned(index)))
+    return data.frame_start, last
+
+
+def _last_planned(index: dict[str, Any]) -> int:
+    """The number of the last frame that a take made of a clip will have."""
+    finished, used = _numbers(index), index["scene"]["clip"].get("frames")
+    return finished[0] + used[1] - used[0] if used else finished[-1]
+
+
 def go_to_smoke(smoke: bpy.types.Object) -> bool:
     """Go to the first frame that shows smoke unless the current one does, or will; returns whether there is any yet."""
     take, scene = shown_take(smoke), scene_of(smoke)
@@ -94,10 +124,8 @@ def go_to_smoke(smoke: bpy.types.Object) -> bool:
     smoky = [int(n) for n, figures in index["frames"].items() if figures.get("mass", 1.0) > 0.0] if index else []
     if not smoky:
         return False
-    finished, used = _numbers(index), index["scene"]["clip"].get("frames")
-    last = finished[0] + used[1] - used[0] if used else finished[-1]
     number = number_at(smoke, scene.frame_current)
-    if number not in smoky and not finished[-1] < number <= last:
+    if number not in smoky and not _numbers(index)[-1] < number <= _last_planned(index):
         scene.frame_set(scene_frame(smoke, min(smoky)))
     return True
 

@@ -70,3 +70,8 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
 )
 def test_a_sentence(message, said) -> None:
     assert sentence(message) == said
+
+
+def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
+    message = {"text": "", "kind": "dissolving smoke", "figures": {"frame": 70, "room": 8.0}}
+    assert sentence(message, before=39).startswith("From frame 109 on")

@@ -12,6 +12,7 @@ from addon import directing, smoke_takes, volume
 from addon.blender_scene import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
+from conftest import changed
 from smokelift.direct import BoxObstacle, Mesh
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import DOMAIN, write_plume
@@ -94,14 +95,19 @@ def solid(content: bytes, tmp_path) -> np.ndarray:
 # what the scene tells the engine
 
 
-def test_frames_are_those_of_the_scene(shot, result) -> None:
+def test_frames_are_those_of_the_clip(shot, result) -> None:
+    """Wherever the smoke stands in the scene's time, and whichever frames of the clip it was made of."""
+    with changed(volume.shown_take(result)) as index:
+        index["scene"]["clip"]["frames"] = [39, 44]
     settings = result.smokelift.directing
     settings.frames, settings.fade = 10, 4
     assert directing.engine_request(result) == ("continue", ["--frames", "10", "--fade", "4", "--room", "8.000000"], [])
     result.data.frame_start = 101
-    settings.use_start, settings.start = True, 105
+    settings.use_start = True
+    assert settings.start == 45
+    settings.start = 44
     assert directing.engine_request(result)[1][-2:] == ["--start", "5"]
-    for frame, said in ((102, "4 frames are needed"), (107, "from 101 to 106")):
+    for frame, said in ((41, "4 frames are needed"), (46, "from 40 to 45")):
         settings.start = frame
         with pytest.raises(ShotError, match=said):
             directing.engine_request(result)
@@ -222,7 +228,9 @@ def test_retime_and_loop(result) -> None:
     assert len(directing.engine_request(result)[1]) == 4
     settings.direction = "loop"
     assert directing.engine_request(result)[:2] == ("loop", [])
-    settings.use_part, settings.part_first, settings.part_last, settings.overlap = True, 2, 6, 2
+    settings.use_part = True
+    assert (settings.part_first, settings.part_last) == (1, 6)
+    settings.part_first, settings.part_last, settings.overlap = 2, 6, 2
     assert directing.engine_request(result)[1] == ["--frames", "2:6", "--overlap", "2"]
     settings.part_last = 4
     with pytest.raises(ShotError, match="4 frames"):

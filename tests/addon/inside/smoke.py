@@ -162,12 +162,12 @@ def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:
 
 
 def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
-    """The range is the clip's and follows a longer result; the playhead goes to smoke unless it shows some."""
+    """The range is the result's, also of one that is still made; the playhead goes to smoke unless it shows some."""
     obj = new_smoke(scene, clip)
     obj.smokelift.camera_mode = "SCENE"
     take = with_masses(tmp_path, [0.0, 0.0, 1.0, 1.0])
     smoke_takes.present(obj, take)
-    assert (scene.frame_start, scene.frame_end) == (1, clip.frame_duration)
+    assert (scene.frame_start, scene.frame_end) == (11, 14)
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 13
     scene.frame_set(14)
@@ -175,17 +175,38 @@ def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
     assert scene.frame_current == 14
     scene.frame_set(16)
     begun = with_masses(tmp_path / "begun", [1.0, 1.0], planned=6)
+    with changed(begun) as index:
+        index["complete"] = False
     smoke_takes.present(obj, begun)
+    assert (scene.frame_start, scene.frame_end) == (11, 16)
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 16
     longer = with_masses(tmp_path / "longer", [1.0] * 80)
     smoke_takes.present(obj, longer)
     assert scene.frame_end == 90
     bpy.ops.smokelift.match_clip()
-    assert (scene.frame_start, scene.frame_end) == (1, 90)
+    assert (scene.frame_start, scene.frame_end) == (11, 90)
     scene.frame_end = 60
     smoke_takes.present(obj, take)
     assert scene.frame_end == 60
     empty = with_masses(tmp_path / "empty", [0.0, 0.0])
     smoke_takes.present(obj, empty)
     assert not volume.go_to_smoke(obj)
+
+
+def test_the_range_is_that_of_what_is_used_or_shown(scene, clip, tmp_path) -> None:
+    """Before a run that of the used frames, then the result's; of several smokes all; a longer one of a result is."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.camera_mode = "SCENE"
+    obj.smokelift.first, obj.smokelift.last = 10, 20
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (10, 20)
+    smoke_takes.present(obj, with_masses(tmp_path, [1.0] * 8))
+    assert (scene.frame_start, scene.frame_end) == (11, 18)
+    continued = with_masses(tmp_path / "continued", [1.0] * 30, planned=8)
+    smoke_takes.present(obj, continued)
+    assert (scene.frame_start, scene.frame_end) == (11, 40)
+    other = new_smoke(scene, clip)
+    other.smokelift.first, other.smokelift.last = 3, 5
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (3, 40)
