@@ -26,7 +26,16 @@ from types import ModuleType
 
 
 def register() -> None:
-    """Register all classes, properties and handlers."""
+    """Register all classes, properties and handlers.
+
+    Raises
+    ------
+    EngineMissingError
+        If the zip is for another Blender, which its preferences show when they enable the add-on.
+    """
+    from .job import require_fitting_zip
+
+    require_fitting_zip()
     for module in _modules():
         module.register()
 

@@ -15,6 +15,7 @@ from addon import contract
 from addon.pace import paced
 from addon.pictures import Pictures, pictures_from
 from addon.toml import dumps
+from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.commands import continue_, loop, retime
 from smokelift.direct import new_sequence, playback
 from smokelift.footage.frame_source import ClipError
@@ -40,6 +41,18 @@ def test_names_are_the_engines() -> None:
     assert contract.MADE_UP in get_args(Origin)
     assert contract.QUALITIES == QUALITIES
     assert sorted(contract.SIDES) == sorted(SIDES)
+
+
+def test_zips_are_called_as_they_are_built() -> None:
+    assert contract.BLENDERS == NAMED
+    assert sorted(contract.PLATFORMS.values()) == sorted(platform.name for platform in PLATFORMS)
+    for (system, processor), name in contract.PLATFORMS.items():
+        (platform,) = (each for each in PLATFORMS if each.name == name)
+        assert (platform.markers["sys_platform"], platform.markers["platform_machine"].lower()) == (system, processor)
+        for python in NAMED:
+            names = {"blenders": contract.BLENDERS[python], "platform": name.replace("-", "_")}
+            built = Product("smokelift", "1.2.3", platform, python)
+            assert contract.ZIP_FILE.format(version="1.2.3", **names) == built.file
 
 
 def test_resolutions() -> None:

@@ -99,6 +99,16 @@ sys.exit(batch.main(sys.argv[1:]))
     return [sys.executable, "-c", start, *words]
 
 
+def test_a_zip_for_another_blender_is_not_enabled() -> None:
+    """It says so at once; where Blender's own version is the wrong one, Blender does."""
+    (other,) = set(ZIP.parent.glob("smokelift-*-linux_x64.zip")) - {ZIP}
+    with pytest.raises(RuntimeError, match=f"install {re.escape(ZIP.name)}|[Bb]lender"):
+        install(other)
+    assert MODULE not in bpy.context.preferences.addons
+    if extension().exists():
+        uninstall("smokelift")
+
+
 def test_installs_from_disk() -> None:
     """The zip is all that is needed, Blender's own numpy stays the only one, and little of the disk is taken."""
     assert not extension().exists()
