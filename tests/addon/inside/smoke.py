@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon import paths, run, smoke_takes, volume
+from addon import paths, run, shot_setup, smoke_takes, volume
 from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke
 from addon.take import Take, takes
 from conftest import changed, made
@@ -80,6 +80,46 @@ def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
         cube.data.vertices[0].co.x = -2.0
     hide_default_cube(scene)
     assert cube.hide_render == cube.hide_viewport == (change is None)
+
+
+@pytest.mark.parametrize("change", [None, "location", "energy", "animated", "hidden", "scene"])
+def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(scene, clip, tmp_path, change) -> None:
+    """Set Up Shot hides it and says so; a lamp that anybody changed, or that the smoke was made with, stays."""
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    lamp, obj = scene.objects["Light"], new_smoke(scene, bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4")))
+    for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
+        setattr(obj.smokelift, name, False)
+    if change == "location":
+        lamp.location.x += 1.0
+    elif change == "energy":
+        lamp.data.energy = 100.0
+    elif change == "animated":
+        lamp.keyframe_insert("location", frame=1)
+    elif change == "hidden":
+        lamp.hide_render = True
+    elif change == "scene":
+        obj.smokelift.light_mode = "SCENE"
+    take = made(tmp_path)
+    with changed(take) as index:
+        index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
+    volume.show(obj, take)
+    hidden, further = shot_setup.set_up(obj, take, take.read().index)
+    assert hidden == (change is None)
+    assert lamp.hide_viewport == (change is None)
+    assert lamp.hide_render == (change in (None, "hidden"))
+    assert further == (["Light"] if change in ("location", "energy", "animated") else [])
+    assert scene.cycles.samples == shot_setup.SAMPLES
+
+
+def test_samples_that_the_artist_chose_stay(shot, tmp_path) -> None:
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    for samples, wanted in ((4096, shot_setup.SAMPLES), (4096, shot_setup.SAMPLES), (128, 128)):
+        shot.cycles.samples = samples
+        smoke(shot).smokelift.set_up_plate = smoke(shot).smokelift.set_up_camera = False
+        assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+        assert shot.cycles.samples == wanted
 
 
 def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:

@@ -130,7 +130,7 @@ def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
 def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None:
     """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead goes to it."""
     bpy.ops.mesh.primitive_cube_add(size=2.0)
-    cube = scene.objects["Cube"]
+    cube, lamp = scene.objects["Cube"], lamp_of_a_new_file(scene)
     scene.frame_set(7)
     activate(smoke(scene), scene)
     smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
@@ -145,10 +145,18 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
     assert not row.warnings
     whole, within = look_alike(scene, tmp_path)
+    assert lamp.hide_render and lamp.hide_viewport
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
     assert whole > WANTED_DB + 5
     assert within > WANTED_DB
     assert scene.camera.name == "Smokelift Camera"
+
+
+def lamp_of_a_new_file(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Add it."""
+    lamp = add(scene, "Light", bpy.data.lights.new("Light", "POINT"))
+    lamp.location, lamp.data.energy = (4.0762453, 1.0054539, 5.9038620), 1000.0
+    return lamp
 
 
 def test_a_camera_that_moves(shot, tmp_path) -> None:
