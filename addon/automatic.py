@@ -22,10 +22,10 @@ def automatic_unless(name: str, label: str, start: float | Callable[[Any], float
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
     """Draw a number with its tick ``use_NAME``; returns its row."""
-    row = layout.row(heading=settings.bl_rna.properties[name].name)
-    row.prop(settings, f"use_{name}", text="")
-    if getattr(settings, f"use_{name}"):
+    row = layout.row(heading=settings.bl_rna.properties[name].name, align=True)
+    by_hand = getattr(settings, f"use_{name}")
+    if by_hand:
         row.prop(settings, name, text="")
-    else:
-        row.label(text="Automatic")
+    # ticked where it is automatic: an empty box before the word would read as off
+    row.prop(settings, f"use_{name}", text="" if by_hand else "Automatic", icon="AUTO", invert_checkbox=True)
     return row

@@ -1,5 +1,7 @@
 """The buttons that add a smoke, choose one, make it and stop that."""
 
+from pathlib import Path
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, StringProperty
@@ -11,7 +13,7 @@ from .editors import open_tab
 from .needs import NeedsClip
 from .properties import SEEDS
 from .smoke import activate, active_smoke, new_smoke, smokes
-from .take import TakeError
+from .take import Take, TakeError
 
 
 class SMOKELIFT_OT_add(bpy.types.Operator):
@@ -51,7 +53,7 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
 
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(SMOKELIFT_OT_add.bl_idname, icon="FILE_MOVIE")
+    menu.layout.operator(SMOKELIFT_OT_add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
 
 
 class SMOKELIFT_OT_use_all_files(NeedsClip, bpy.types.Operator):
@@ -156,11 +158,16 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for row in context.window_manager.smokelift.jobs:
-            if row.take == self.take or (not self.take and row.outcome == "running"):
+        jobs = context.window_manager.smokelift.jobs
+        for place in reversed(range(len(jobs))):
+            row = jobs[place]
+            if row.take != self.take and (self.take or row.outcome != "running"):
+                continue
+            if row.outcome == "waiting":  # it leaves nothing behind
+                Take(Path(row.take)).remove_unless_begun()
+                jobs.remove(place)
+            else:
                 row.cancel = True
-                if row.outcome == "waiting":
-                    row.outcome, row.sentence = "cancelled", "Cancelled before it began."
         return {"FINISHED"}
 
 

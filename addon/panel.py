@@ -66,7 +66,7 @@ def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active:
         for smoke in found:
             row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
             row.smoke = smoke.name
-    column.operator("smokelift.add", icon="ADD")
+    column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
 
 
 def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -144,8 +144,8 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     row = layout.row()
     row.active = not has_inlet(smoke)  # that says it
     draw_automatic(row, settings, "distance").operator("smokelift.place", text="", icon="EYEDROPPER")
-    draw_closed(layout, settings)
     layout.prop(settings, "light_mode")
+    draw_closed(layout, settings)
 
 
 def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -250,6 +250,7 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     for row in jobs:
         _draw_job(layout, context, smoke, row)
     if volume.shown_take(smoke) is not None:
+        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
         seen = volume.shown_range(smoke)
         if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
             text = iface_("The smoke is seen in frames {:d} to {:d}.")
@@ -264,7 +265,6 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
                 column = layout.column(align=True)
                 draw_text(column, context, "This smoke is large: a proxy keeps the viewport fast.", "INFO")
                 column.operator("smokelift.make_proxy", icon="MOD_REMESH")
-        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
 def _draw_job(
@@ -275,7 +275,7 @@ def _draw_job(
     if smoke is not None and smoke != shown:
         box.label(text=smoke.name, icon="VOLUME_DATA")
     if row.outcome == "waiting":
-        box.label(text="Waits for the run before it", icon="SORTTIME")
+        box.label(text="Queued", icon="SORTTIME")
     elif row.outcome == "running":
         draw_progress(box, row)
     else:

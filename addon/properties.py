@@ -405,7 +405,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties", update=_changed)
     extinction: FloatProperty(
         name="Extinction",
-        description="Extinction coefficient per metre of smoke of density 1",
+        description="Extinction coefficient per meter of smoke of density 1",
         default=5.0,
         min=0.001,
         max=1e9,

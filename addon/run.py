@@ -132,6 +132,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._check.kill()
         for row in context.window_manager.smokelift.jobs:
             row.icon = 0
+            if row.outcome == "waiting" and find_smoke(row.smoke_uid) is not None:  # a deleted one may come back
+                Take(Path(row.take)).remove_unless_begun()
             if row.outcome not in ENDED:
                 row.outcome, row.sentence = "cancelled", f"Stopped; finished frames stay: {row.done}."
         bpy.utils.previews.remove(self._thumbnails)
@@ -142,6 +144,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Poll once; returns whether work remains."""
         manager = context.window_manager
         rows = {row.take: row for row in manager.smokelift.jobs}
+        for name in self._jobs.keys() - rows.keys():
+            self._jobs[name].cancel()  # it was taken out of the queue
         for name, row in rows.items():
             if row.outcome == "waiting" and name not in self._jobs:
                 self._start(name, row)
@@ -192,8 +196,11 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         created = 0
         if smoke is not None:
             count = _datablocks()
-            before = self._before.setdefault(row.take, volume.shown_take(smoke))
-            show_while_made(smoke, take, before, job.outcome)
+            began = row.take in self._before
+            before = self._before.get(row.take) if began else volume.shown_take(smoke)
+            if take.read().frames:
+                self._before[row.take] = before
+            show_while_made(smoke, take, before, job.outcome, began)
             created = _datablocks() - count
             if before is None and row.take not in self._seen and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
                 self._seen.add(row.take)

@@ -160,7 +160,7 @@ def present(smoke: bpy.types.Object, take: Take) -> None:
         shot_setup.follow_range(smoke)
 
 
-def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:
+def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome, began: bool) -> None:
     """Show the frames of a take while it is made, unless the artist has chosen another meanwhile.
 
     Parameters
@@ -171,8 +171,10 @@ def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, ou
         What the smoke showed before; it is shown again if the run fails or is stopped.
     outcome
         State of the run.
+    began
+        Whether frames of it were shown already: whatever else is on show then was chosen by the artist.
     """
-    if volume.shown_take(smoke) not in (before, take):
+    if volume.shown_take(smoke) != (take if began else before):
         return
     stopped = outcome in ("failed", "cancelled")
     present(smoke, before if stopped and before is not None else take)

@@ -225,6 +225,11 @@ class Take:
         except OSError:
             return 0.0
 
+    def remove_unless_begun(self) -> None:
+        """Delete its files if the engine never wrote any."""
+        if not self.directory.exists():
+            self.remove()
+
     def remove(self) -> None:
         """Delete all its files."""
         shutil.rmtree(self.directory, ignore_errors=True)

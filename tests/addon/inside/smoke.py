@@ -67,6 +67,21 @@ def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
     assert take.read().resumable
 
 
+def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    rows, written = bpy.context.window_manager.smokelift.jobs, [smoke_takes.write_take(obj) for _ in range(3)]
+    for take in written:
+        row = rows.add()
+        row.take, row.smoke_uid = str(take.directory), obj.session_uid
+    rows[0].outcome = "running"
+    assert bpy.ops.smokelift.cancel(take=str(written[1].directory)) == {"FINISHED"}
+    assert [row.take for row in rows] == [str(written[0].directory), str(written[2].directory)]
+    assert takes(tmp_path) == [written[0], written[2]]
+    assert bpy.ops.smokelift.cancel() == {"FINISHED"}
+    assert [row.cancel for row in rows] == [True, False]
+
+
 @pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
 def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
     cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
