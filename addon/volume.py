@@ -27,6 +27,10 @@ BESIDE = 1.1
 EARLY = 0.001
 """Frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one."""
 
+GOOD_DEGREES = 30
+"""Degrees beside its camera at which smoke of one camera still has what `sentences` calls good, about 28 dB: 29.0 at 20
+and 25.1 at 45 degrees, mean of four scenes, smooth (docs/accuracy.md)."""
+
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
 
@@ -49,7 +53,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     _correct_position(smoke, index["scene"]["domain"])
     fit_look(smoke, index["scene"])
     _play(smoke, scene_of(smoke), take, index)
-    smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
+    smoke.data[PROVENANCE] = _provenance(index.get("provenance", []), bool(index["scene"].get("views")))
     return smoke
 
 
@@ -178,7 +182,7 @@ def provenance_note(smoke: bpy.types.Object) -> str:
     return smoke.data.get(PROVENANCE, "")
 
 
-def _provenance(parts: list[dict[str, Any]]) -> str:
+def _provenance(parts: list[dict[str, Any]], has_further_views: bool) -> str:
     directed = [part["how"] for part in parts if part["what"] in DIRECTIONS]
     parts = [part for part in parts if part["what"] not in DIRECTIONS]
     if not parts:  # the engine of earlier versions did not say
@@ -187,8 +191,10 @@ def _provenance(parts: list[dict[str, Any]]) -> str:
     if made_up is None:
         what = "Nothing is made up: its depth is smooth."
     else:
-        what = f"What it does not see is made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
-    return " ".join(["What the camera sees is measured.", what, *directed])
+        what = f"The rest is made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
+    seen = "What the camera sees is measured"
+    seen += "." if has_further_views else f", and good to about {GOOD_DEGREES} degrees beside it."
+    return " ".join([seen, what, *directed])
 
 
 @persistent

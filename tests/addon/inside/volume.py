@@ -204,11 +204,13 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
                 {"what": "velocity", "origin": "estimated", "how": "", "settings": {}},
                 {"what": "detail", "origin": "made up", "how": "", "settings": {"detail": 0.5, "seed": 3}},
             ],
-            "What the camera sees is measured. What it does not see is made up: Depth Detail 0.5, Variation 3.",
+            "What the camera sees is measured, and good to about 30 degrees beside it. The rest is made up: "
+            "Depth Detail 0.5, Variation 3.",
         ),
         (
             [{"what": "velocity", "origin": "estimated", "how": "", "settings": {}}],
-            "What the camera sees is measured. Nothing is made up: its depth is smooth.",
+            "What the camera sees is measured, and good to about 30 degrees beside it. Nothing is made up: "
+            "its depth is smooth.",
         ),
         ([], ""),
     ],
