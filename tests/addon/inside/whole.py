@@ -191,7 +191,7 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
         assert psnr(picture, wanted) > WANTED_DB + 5
 
 
-def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
+def test_the_check_says_what_a_run_takes_and_assumes(shot, monkeypatch) -> None:
     bpy.ops.smokelift.check()
     state = bpy.context.window_manager.smokelift
     assert state.check_done
@@ -205,8 +205,16 @@ def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
     assert "Background: " in state.notes
     assert len(state.notes.split("\n")) <= 5
     assert bpy.ops.smokelift.show_page() == {"FINISHED"}
-    page = bpy.data.images[shot_check.page_file().name]
+    page = bpy.data.images[Path(state.check_page).name]
     assert page.size[0] > 1000
+    known = draft.seconds, state.notes, state.check_page
+    with monkeypatch.context() as blocked:
+        blocked.setattr(shot_check, "Job", None)  # a shot that was checked before is not measured anew
+        state.notes, state.check_done = "", False
+        state.costs.clear()
+        bpy.ops.smokelift.check()
+        assert state.check_done
+        assert (state.costs[0].seconds, state.notes, state.check_page) == known
     shot.camera = None
     bpy.ops.smokelift.check()
     assert not state.check_done
