@@ -42,7 +42,7 @@ MATCHES = ((34.0, "very good"), (28.0, "good"), (22.0, "fair"))
 is at most 2, 4 and 8 % of the range."""
 
 POOR = "poor"
-"""That of less."""
+"""The word for a PSNR below these."""
 
 OF_RESULT = ("dissolving smoke",)
 """Sentences whose frames are counted from the first of the result, from 1."""
