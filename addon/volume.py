@@ -191,9 +191,9 @@ def _provenance(parts: list[dict[str, Any]], has_further_views: bool) -> str:
     if made_up is None:
         what = "Nothing is made up: its depth is smooth."
     else:
-        what = f"The rest is made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
+        what = f"Made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
     seen = "What the camera sees is measured"
-    seen += "." if has_further_views else f", and good to about {GOOD_DEGREES} degrees beside it."
+    seen += "." if has_further_views else f", good to about {GOOD_DEGREES} degrees beside it."
     return " ".join([seen, what, *directed])
 
 

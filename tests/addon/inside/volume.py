@@ -204,12 +204,12 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
                 {"what": "velocity", "origin": "estimated", "how": "", "settings": {}},
                 {"what": "detail", "origin": "made up", "how": "", "settings": {"detail": 0.5, "seed": 3}},
             ],
-            "What the camera sees is measured, and good to about 30 degrees beside it. The rest is made up: "
+            "What the camera sees is measured, good to about 30 degrees beside it. Made up: "
             "Depth Detail 0.5, Variation 3.",
         ),
         (
             [{"what": "velocity", "origin": "estimated", "how": "", "settings": {}}],
-            "What the camera sees is measured, and good to about 30 degrees beside it. Nothing is made up: "
+            "What the camera sees is measured, good to about 30 degrees beside it. Nothing is made up: "
             "its depth is smooth.",
         ),
         ([], ""),
