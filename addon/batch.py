@@ -110,7 +110,7 @@ def _wait(job: Any) -> None:
 def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
     """The smoke, with its settings overridden by the options; it is active then."""
     from .blender_scene import ShotError
-    from .clip_table import use_frames
+    from .clip_table import number_in_file, unseen_pictures, use_frames
     from .smoke import activate, active_smoke, new_smoke, smokes
 
     scene = bpy.context.scene
@@ -145,6 +145,11 @@ def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
         raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
     if choices.frames:
         use_frames(smoke, *choices.frames)
+    found = unseen_pictures(settings)
+    if found is not None and settings.last < found.count:
+        why = f" ({found.missing_names()} missing)" if found.missing else ""
+        last = number_in_file(settings.clip, settings.last)
+        print(f"The clip is used up to its frame {last} of {found.count - 1}{why}; --frames takes more.", flush=True)
     return smoke
 
 

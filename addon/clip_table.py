@@ -80,6 +80,14 @@ def sequence_of(clip: bpy.types.MovieClip) -> Pictures | None:
     return pictures_from(clip_path(clip)) if clip.source == "SEQUENCE" else None
 
 
+def unseen_pictures(settings: bpy.types.PropertyGroup) -> Pictures | None:
+    """The pictures of a smoke's clip where it is used to its end for Blender or beyond, and there is a gap or more."""
+    found, known = sequence_of(settings.clip), settings.clip.frame_duration
+    if found is None or settings.last < known or (found.count <= known and not found.missing):
+        return None
+    return found
+
+
 def frame_count(clip: bpy.types.MovieClip) -> int:
     """The number of frames of a clip, also of those that Blender does not find; ShotError if it cannot be read."""
     path = clip_path(clip)

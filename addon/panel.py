@@ -9,7 +9,7 @@ from . import presets, shot_check, smoke_takes, volume
 from .automatic import draw_automatic
 from .blender_scene import frame_rate
 from .box_table import box_of, has_inlet
-from .clip_table import clip_path, sequence_of
+from .clip_table import clip_path, unseen_pictures
 from .job import ENDED
 from .proxy import lacks_proxy
 from .smoke import active_smoke, find_smoke, smokes
@@ -17,9 +17,6 @@ from .undistort import is_distorted
 
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
-
-MISSING = 3
-"""Names of missing pictures that are listed."""
 
 CELLS = 0.245, 0.215, 0.18, 0.18
 """Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
@@ -106,17 +103,14 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
 
 def _draw_gaps(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
     """Pictures that are missing in a sequence, and the button that uses those after them."""
-    found, known = sequence_of(settings.clip), settings.clip.frame_duration
-    if found is None or not known <= settings.last or (found.count <= known and not found.missing):
+    found = unseen_pictures(settings)
+    if found is None:
         return
     column = layout.column(align=True)
     if found.missing:
-        names = ", ".join(found.missing[:MISSING])
-        if len(found.missing) > MISSING:
-            names = iface_("{:s} and {:d} more").format(names, len(found.missing) - MISSING)
-        draw_text(column, context, iface_("Missing: {:s}.").format(names), "ERROR")
+        draw_text(column, context, iface_("Missing: {:s}.").format(found.missing_names()), "ERROR")
     if settings.last < found.count:
-        text = iface_("Blender sees {:d} of {:d} frames.").format(known, found.count)
+        text = iface_("Blender sees {:d} of {:d} frames.").format(settings.clip.frame_duration, found.count)
         draw_text(column, context, text, "BLANK1" if found.missing else "INFO")
         column.operator("smokelift.use_all_files")
     else:

@@ -14,6 +14,10 @@ CACHED = 16
 """Sequences that are kept in memory: the panel asks with every redraw."""
 
 
+LISTED = 3
+"""Names of missing pictures that are listed."""
+
+
 @dataclass(frozen=True)
 class Pictures:
     """A sequence of numbered pictures.
@@ -28,6 +32,12 @@ class Pictures:
 
     count: int
     missing: tuple[str, ...]
+
+    def missing_names(self) -> str:
+        """The first names of those that are missing, and how many there are more."""
+        listed = ", ".join(self.missing[:LISTED])
+        more = len(self.missing) - LISTED
+        return f"{listed} and {more} more" if more > 0 else listed
 
 
 def pictures_from(first: Path) -> Pictures | None:

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import pytest
 
-from addon import advanced_panel, direct_panel, element, panel, shot_check, volume
+from addon import advanced_panel, batch, direct_panel, element, panel, shot_check, volume
 from addon.clip_table import clip_table
 from addon.contract import QUALITIES
 from conftest import changed, made
@@ -116,7 +116,7 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     assert getattr(settings, name) == 0
 
 
-def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path) -> None:
+def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> None:
     """And those that Blender does not know of because they were written after it read the first ones."""
     image = bpy.data.images.new("frame", 48, 32)
     for number in (17, 18, 20, 21, 22):
@@ -130,6 +130,8 @@ def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path) -> None:
 
     assert (settings.first, settings.last) == (1, 2)
     assert "Missing: frame_0019.png." in said() and "Blender sees 2 of 6 frames." in said()
+    batch._smoke(batch._parser().parse_args([]))
+    assert "up to its frame 1 of 5 (frame_0019.png missing)" in capsys.readouterr().out
     assert bpy.ops.smokelift.use_all_files() == {"FINISHED"}
     assert clip_table(smoke(scene))["frames"] == [0, 5]
     assert "Missing: frame_0019.png." in said() and "Blender sees" not in said()
