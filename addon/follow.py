@@ -103,6 +103,8 @@ def _after_undo(_scene: bpy.types.Scene) -> None:
         if path.startswith("//") and then != here and then in _folders:
             _set(owner, name, relative(absolute(path, folder=then)))
     _set_saved_as(bpy.data.filepath)
+    if all(folder == here for folder in _folders):  # to ask for every file takes time
+        return
     for data in (data for name in _DATA for data in getattr(bpy.data, name)):
         # a part of Blender's data is as it was, and a part as it is; where there is a file, it is the right one
         path = "" if data.library is not None else data.filepath
@@ -115,7 +117,7 @@ def _after_undo(_scene: bpy.types.Scene) -> None:
 
 def _set_saved_as(file: str) -> None:
     for obj in _smokes():
-        obj.smokelift.saved_as = file
+        _set(obj.smokelift, "saved_as", file)
 
 
 def _set(settings: bpy.types.PropertyGroup, name: str, path: str) -> None:
