@@ -517,6 +517,7 @@ class SmokeliftJob(bpy.types.PropertyGroup):
     warnings: StringProperty()
     icon: IntProperty()
     cancel: BoolProperty()
+    left: BoolProperty(description="The artist chose another result while it runs")
 
 
 class SmokeliftCost(bpy.types.PropertyGroup):

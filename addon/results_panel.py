@@ -30,7 +30,7 @@ class SMOKELIFT_OT_show_take(NeedsClip, bpy.types.Operator):
         if not take.read().frames:
             self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
             return {"CANCELLED"}
-        smoke_takes.present(active_smoke(context.scene), take)
+        smoke_takes.choose(active_smoke(context.scene), take)
         return {"FINISHED"}
 
 
@@ -52,7 +52,7 @@ class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
-        smoke_takes.present(smoke, volume.take_before(smoke))
+        smoke_takes.choose(smoke, volume.take_before(smoke))
         return {"FINISHED"}
 
 

@@ -196,11 +196,9 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         created = 0
         if smoke is not None:
             count = _datablocks()
-            began = row.take in self._before
-            before = self._before.get(row.take) if began else volume.shown_take(smoke)
-            if take.read().frames:
-                self._before[row.take] = before
-            show_while_made(smoke, take, before, job.outcome, began)
+            before = self._before.setdefault(row.take, volume.shown_take(smoke))
+            if not row.left:
+                show_while_made(smoke, take, before, job.outcome)
             created = _datablocks() - count
             if before is None and row.take not in self._seen and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
                 self._seen.add(row.take)

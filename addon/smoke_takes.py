@@ -160,7 +160,15 @@ def present(smoke: bpy.types.Object, take: Take) -> None:
         shot_setup.follow_range(smoke)
 
 
-def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome, began: bool) -> None:
+def choose(smoke: bpy.types.Object, take: Take) -> None:
+    """Show the take that the artist chose; a run that goes on does not take it back."""
+    present(smoke, take)
+    for row in bpy.context.window_manager.smokelift.jobs:
+        if row.smoke_uid == smoke.session_uid and row.outcome == "running":
+            row.left = row.take != str(take.directory)
+
+
+def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:
     """Show the frames of a take while it is made, unless the artist has chosen another meanwhile.
 
     Parameters
@@ -168,13 +176,11 @@ def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, ou
     smoke, take
         The smoke, and the take that is made for it.
     before
-        What the smoke showed before; it is shown again if the run fails or is stopped.
+        What the smoke showed before; it is shown again if the run fails or is stopped. An undo may bring it back, too.
     outcome
         State of the run.
-    began
-        Whether frames of it were shown already: whatever else is on show then was chosen by the artist.
     """
-    if volume.shown_take(smoke) != (take if began else before):
+    if volume.shown_take(smoke) not in (before, take):
         return
     stopped = outcome in ("failed", "cancelled")
     present(smoke, before if stopped and before is not None else take)

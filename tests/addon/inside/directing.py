@@ -259,21 +259,27 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
 def test_frames_of_a_stopped_run_do_not_stay_on_show(result, tmp_path, outcome) -> None:
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
-    smoke_takes.show_while_made(result, take, shown, "running", began=False)
+    smoke_takes.show_while_made(result, take, shown, "running")
     assert volume.shown_take(result) == take
-    smoke_takes.show_while_made(result, take, shown, outcome, began=True)
+    smoke_takes.show_while_made(result, take, shown, outcome)
     assert volume.shown_take(result) == (take if outcome == "done" else shown)
 
 
-@pytest.mark.parametrize("outcome", ["running", "cancelled", "failed", "done"])
-def test_what_the_artist_shows_while_a_run_goes_on_stays(result, tmp_path, outcome) -> None:
-    """Also the result from before, which a run may replace once."""
+def test_what_the_artist_shows_while_a_run_goes_on_stays(result, tmp_path) -> None:
+    """Also the result from before, unless it is an undo that brings that back."""
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
-    smoke_takes.show_while_made(result, take, shown, "running", began=False)
-    smoke_takes.present(result, shown)
-    smoke_takes.show_while_made(result, take, shown, outcome, began=True)
+    rows = bpy.context.window_manager.smokelift.jobs
+    for outcome in ("running", "waiting"):
+        row = rows.add()
+        row.take, row.smoke_uid, row.outcome = str(take.directory), result.session_uid, outcome
+    smoke_takes.show_while_made(result, take, shown, "running")
+    assert [row.left for row in rows] == [False, False]
+    assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
     assert volume.shown_take(result) == shown
+    assert [row.left for row in rows] == [True, False]
+    assert bpy.ops.smokelift.show_take(take=str(take.directory)) == {"FINISHED"}
+    assert [row.left for row in rows] == [False, False]
 
 
 # the pace that is tried out
