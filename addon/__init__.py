@@ -3,8 +3,8 @@
 It knows nothing of the engine but its command line and its files. From what knows no Blender to the interface:
 
 - Without Blender: `take` (the files of a run), `job` (the engine's process), `toml` (the text of a scene file), `pace`
-  (a speed ramp), `sentences` (the engine's messages in the panel's words), `contract` (what the add-on repeats of the
-  engine).
+  (a speed ramp), `pictures` (a sequence with gaps), `sentences` (the engine's messages in the panel's words),
+  `contract` (what the add-on repeats of the engine).
 - Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
   `scene_file` (Blender scene to scene file: `clip_table`, `background`, `strokes`, `camera_table`, `box_table`
   and `light_tables`, of a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `proxy` (what
@@ -26,7 +26,16 @@ from types import ModuleType
 
 
 def register() -> None:
-    """Register all classes, properties and handlers."""
+    """Register all classes, properties and handlers.
+
+    Raises
+    ------
+    EngineMissingError
+        If the zip is for another Blender, which its preferences show when they enable the add-on.
+    """
+    from .job import require_fitting_zip
+
+    require_fitting_zip()
     for module in _modules():
         module.register()
 

@@ -1,4 +1,4 @@
-"""Numbers that are chosen automatically where they are 0: a tick and a word in the panel in place of the 0."""
+"""Numbers that are chosen automatically where they are 0: a ticked word in the panel in place of the 0."""
 
 from collections.abc import Callable
 from typing import Any
@@ -21,11 +21,12 @@ def automatic_unless(name: str, label: str, start: float | Callable[[Any], float
 
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
-    """Draw a number with its tick ``use_NAME``; returns its row."""
-    row = layout.row(heading=settings.bl_rna.properties[name].name)
-    row.prop(settings, f"use_{name}", text="")
+    """Draw a number with a cross that makes it automatic, or that it is; returns its row."""
     if getattr(settings, f"use_{name}"):
-        row.prop(settings, name, text="")
-    else:
-        row.label(text="Automatic")
+        row = layout.row(align=True)
+        row.prop(settings, name)
+        row.prop(settings, f"use_{name}", text="", icon="X", invert_checkbox=True)
+    else:  # ticked, as an empty box before the word would read as off
+        row = layout.row(heading=settings.bl_rna.properties[name].name)
+        row.prop(settings, f"use_{name}", text="Automatic", invert_checkbox=True)
     return row

@@ -42,7 +42,8 @@ def main(words: Sequence[str]) -> int:
         if take is not None:
             smoke_takes.update_moved_files(smoke, take)
         take = take or smoke_takes.write_take(smoke)
-        job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
+        before = volume.frames_before_take(smoke, take)
+        job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT
@@ -109,7 +110,7 @@ def _wait(job: Any) -> None:
 def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
     """The smoke, with its settings overridden by the options; it is active then."""
     from .blender_scene import ShotError
-    from .clip_table import use_frames
+    from .clip_table import number_in_file, unseen_pictures, use_frames
     from .smoke import activate, active_smoke, new_smoke, smokes
 
     scene = bpy.context.scene
@@ -144,18 +145,26 @@ def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
         raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
     if choices.frames:
         use_frames(smoke, *choices.frames)
+    found = unseen_pictures(settings)
+    if found is not None and settings.last < found.count:
+        why = f" ({found.missing_names()} missing)" if found.missing else ""
+        last = number_in_file(settings.clip, settings.last)
+        print(f"The clip is used up to its frame {last} of {found.count - 1}{why}; --frames takes more.", flush=True)
     return smoke
 
 
 def _render(smoke: bpy.types.Object, path: Path) -> None:
     """Render all frames of the smoke if the name has #### for their numbers, else the current frame."""
+    from . import volume
+
     scene = bpy.context.scene
     scene.render.filepath = str(path.absolute())
     if "#" not in path.name:
         bpy.ops.render.render(write_still=True)
         return
-    data = smoke.data
-    scene.frame_start, scene.frame_end = data.frame_start, data.frame_start + data.frame_duration - 1
+    seen = volume.shown_range(smoke)
+    if seen is not None:
+        scene.frame_start, scene.frame_end = seen
     bpy.ops.render.render(animation=True)
 
 

@@ -8,6 +8,7 @@ import bpy
 from .blender_scene import ShotError, frame_rate
 from .contract import PANORAMA_SUFFIXES
 from .paths import absolute
+from .pictures import Pictures, pictures_from
 from .smoke import scene_of
 
 TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}
@@ -74,14 +75,28 @@ def shown_frame(smoke: bpy.types.Object) -> int:
     return now - start + 1
 
 
+def sequence_of(clip: bpy.types.MovieClip) -> Pictures | None:
+    """The pictures of a clip, also those after a gap, at which it ends for Blender; None of a video."""
+    return pictures_from(clip_path(clip)) if clip.source == "SEQUENCE" else None
+
+
+def unseen_pictures(settings: bpy.types.PropertyGroup) -> Pictures | None:
+    """The pictures of a smoke's clip where it is used to its end for Blender or beyond, and there is a gap or more."""
+    found, known = sequence_of(settings.clip), settings.clip.frame_duration
+    if found is None or settings.last < known or (found.count <= known and not found.missing):
+        return None
+    return found
+
+
 def frame_count(clip: bpy.types.MovieClip) -> int:
-    """The number of frames that Blender finds in a clip; ShotError if it cannot be read."""
+    """The number of frames of a clip, also of those that Blender does not find; ShotError if it cannot be read."""
     path = clip_path(clip)
     if not path.is_file():
         raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
     if clip.frame_duration < 1:  # Blender takes any file for a clip
         raise ShotError(f"The clip {path} is no video and no picture that Blender can read: choose another.")
-    return clip.frame_duration
+    found = sequence_of(clip)
+    return clip.frame_duration if found is None else max(clip.frame_duration, found.count)
 
 
 def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
@@ -103,3 +118,10 @@ def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
 def start_frame(settings: bpy.types.PropertyGroup) -> int:
     """The scene's frame that shows the first used frame of the clip."""
     return settings.clip.frame_start + settings.first - 1
+
+
+def used_range(settings: bpy.types.PropertyGroup) -> tuple[int, int] | None:
+    """The scene's frames that show the first and the last used frame of the clip; None without one."""
+    if settings.clip is None:
+        return None
+    return start_frame(settings), settings.clip.frame_start + settings.last - 1

@@ -1,4 +1,4 @@
-"""What the add-on repeats of the engine, which it may not import. Knows nothing of Blender.
+"""What the add-on repeats of the engine and of tools/, which it may not import. Knows nothing of Blender.
 
 `tests/addon/test_contract.py` holds every value to the engine's own. The panel's choices and defaults stand in
 `properties`, because Blender has to know them without a process; `tests/addon/inside/register.py` holds those.
@@ -71,3 +71,16 @@ SLOWEST, FASTEST = 0.01, 100.0
 
 SHORTEST = 4
 """Frames that a take has at least, if something is made of it."""
+
+ZIP_FILE = "smokelift-{version}-{blenders}-{platform}.zip"
+"""Name of the extension's zip; the platform is Blender's, with _ for -."""
+
+BLENDERS = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}
+"""What a zip is called by the version of Python that it is for."""
+
+PLATFORMS = {
+    ("linux", "x86_64"): "linux-x64",
+    ("win32", "amd64"): "windows-x64",
+    ("darwin", "arm64"): "macos-arm64",
+}
+"""Blender's platforms that there are zips for, by Python's names of system and processor."""

@@ -52,7 +52,7 @@ def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]
     if settings.direction == "loop":
         options = ["--overlap", str(settings.overlap)] if settings.overlap else []
         if settings.use_part:
-            first, last = (_frame_of_take(smoke, numbers, f) for f in (settings.part_first, settings.part_last))
+            first, last = (_number_in_take(smoke, numbers, f) for f in (settings.part_first, settings.part_last))
             if last - first + 1 < SHORTEST:
                 raise ShotError(f"A loop needs {SHORTEST} frames at least: choose a later last frame.")
             options = ["--frames", f"{first}:{last}", *options]
@@ -71,28 +71,35 @@ def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[s
     for name in ("buoyancy", "dissipation"):
         if getattr(settings, f"use_{name}"):
             options += [f"--{name}", _number_text(getattr(settings, name))]
-    last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
+    last = numbers[-1]
     if settings.use_start:
-        start = settings.start
-        last = _frame_of_take(smoke, numbers, start)
+        last = _number_in_take(smoke, numbers, settings.start)
         if last < numbers[SHORTEST - 1]:
             raise ShotError(f"{SHORTEST} frames are needed before the smoke reacts: choose a later frame.")
         options += ["--start", str(last)]
     if settings.closed:
         options += ["--closed", *(side for side in SIDES if side in settings.closed)]
     later = [volume.scene_frame(smoke, last + step) for step in range(1, settings.frames + 1)]
-    with at_frame(scene, start) as depsgraph:
+    with at_frame(scene, volume.scene_frame(smoke, last)) as depsgraph:
         options += _air_options(smoke, depsgraph)
         return "continue", options, _obstacles(smoke, depsgraph, later)
 
 
-def _frame_of_take(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
-    """The number in the take that is shown in a frame of the scene."""
-    number = volume.number_at(smoke, frame)
-    if number not in numbers:
-        first, last = (volume.scene_frame(smoke, n) for n in (numbers[0], numbers[-1]))
-        raise ShotError(f"The smoke is not seen in frame {frame}: choose one from {first} to {last}.")
-    return number
+def frames_of_result(smoke: bpy.types.Object) -> tuple[int, int] | None:
+    """The first and the last frame of the result on show, counted as those of the clip; None without one."""
+    take, numbers = volume.shown_take(smoke), volume.shown_numbers(smoke)
+    if take is None or not numbers:
+        return None
+    before = volume.frames_before_take(smoke, take)
+    return before + numbers[0], before + numbers[-1]
+
+
+def _number_in_take(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
+    """The number in the take on show of a frame that is counted as those of the clip."""
+    first, last = frames_of_result(smoke) or (0, -1)
+    if not first <= frame <= last:
+        raise ShotError(f"The result has no frame {frame}: choose one from {first} to {last}.")
+    return frame - first + numbers[0]
 
 
 def _air_options(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:

@@ -8,7 +8,6 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
-from . import shot_check
 from .needs import NeedsClip
 from .smoke import active_smoke
 from .take import Take
@@ -55,13 +54,13 @@ class SMOKELIFT_OT_show_page(NeedsClip, bpy.types.Operator):
             return False
         state = context.window_manager.smokelift
         own = state.check_done and state.check_smoke == active_smoke(context.scene).session_uid
-        if not (own and shot_check.page_file().is_file()):
+        if not (own and state.check_page and Path(state.check_page).is_file()):
             cls.poll_message_set("Check the shot first")
             return False
         return True
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        page = bpy.data.images.load(str(shot_check.page_file()), check_existing=True)
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        page = bpy.data.images.load(context.window_manager.smokelift.check_page, check_existing=True)
         page.reload()
         if not bpy.app.background:
             show_image(page)

@@ -10,17 +10,19 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import platform
 import queue
 import subprocess
 import sys
 import threading
 import time
+import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Literal
 
-from .contract import CANCELLED
+from .contract import BLENDERS, CANCELLED, PLATFORMS, ZIP_FILE
 from .sentences import sentence
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
@@ -66,20 +68,44 @@ def engine_command(arguments: Sequence[str]) -> list[str]:
     EngineMissingError
         If the engine is not installed, or another Python's.
     """
+    require_fitting_zip()
     shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
     found = importlib.util.find_spec("smokelift")
     if shipped[0].is_dir():
         folders = [folder for folder in shipped if folder.is_dir()]
-    elif others := sorted(folder.name for folder in HOME.glob("python3.*")):
-        raise EngineMissingError(
-            f"This extension is for Blenders with {' and '.join(others)}, and this one has {LIBRARIES}: install the "
-            "zip that is named after this Blender."
-        )
     elif found is not None and found.origin is not None:
         folders = [Path(found.origin).parents[1]]
     else:
         raise EngineMissingError("Smokelift's engine is missing: install the extension again.")
     return [sys.executable, "-I", "-c", _START, os.pathsep.join(map(str, folders)), *arguments]
+
+
+def require_fitting_zip() -> None:
+    """Refuse the engine of a zip for another Python or another platform, which Blender installs without a word.
+
+    Raises
+    ------
+    EngineMissingError
+        With the name of the zip that fits.
+    """
+    pythons = sorted(folder.name.removeprefix("python") for folder in HOME.glob("python3.*"))
+    try:
+        manifest = tomllib.loads((HOME / "blender_manifest.toml").read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # it runs without being installed
+        manifest = {}
+    own_python = LIBRARIES.removeprefix("python")
+    system = (sys.platform, platform.machine().lower())
+    own_platform = PLATFORMS.get(system, "-".join(system))
+    platforms = manifest.get("platforms", [own_platform])
+    if own_python in (pythons or [own_python]) and own_platform in platforms:
+        return
+    zip_is = " ".join([*platforms, *(f"with Python {python}" for python in pythons)])
+    this = f"{own_platform} with Python {own_python}"
+    if own_python not in BLENDERS or system not in PLATFORMS:
+        raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}, for which there is none.")
+    names = {"blenders": BLENDERS[own_python], "platform": own_platform.replace("-", "_")}
+    name = ZIP_FILE.format(version=manifest.get("version", "*"), **names)
+    raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
 
 
 class Job:
@@ -91,6 +117,8 @@ class Job:
         What to start.
     log
         File to which all messages are appended.
+    before
+        Number of the clip's frames before the first of the result.
 
     Attributes
     ----------
@@ -112,7 +140,7 @@ class Job:
         The engine's exit status; None before it ends.
     """
 
-    def __init__(self, command: Sequence[str], log: Path) -> None:
+    def __init__(self, command: Sequence[str], log: Path, before: int = 0) -> None:
         self.outcome: Outcome = "waiting"
         self.done = self.total = 0
         self.seconds_left: float | None = None
@@ -123,6 +151,7 @@ class Job:
         self.status: int | None = None
         self._command = list(command)
         self._log_path = log
+        self._before = before
         self._log: IO[bytes] | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._lines: queue.Queue[bytes | None] = queue.Queue(4 * LINES_A_POLL)
@@ -217,7 +246,7 @@ class Job:
     def _handle(self, event: str, message: dict[str, Any]) -> bool:
         match event:
             case "note":
-                self.notes.append(sentence(message))
+                self.notes.append(sentence(message, self._before))
                 if message.get("doubt"):
                     self.warnings.append(self.notes[-1])
                 self._write_log(self.notes[-1])
@@ -226,9 +255,10 @@ class Job:
             case "frame":
                 self.done, self.total = int(message["done"]), int(message["total"])
                 self.seconds_left = float(message["seconds_left"])
-                self._write_log(f"frame {message['frame']}: {self.done} of {self.total}")
+                number = self._before + int(message["frame"])
+                self._write_log(f"frame {number}: {self.done} of {self.total}")
             case "done":
-                self.sentence, self.details = sentence(message), message
+                self.sentence, self.details = sentence(message, self._before), message
                 self._write_log(self.sentence)
             case "error":
                 self._error = str(message["text"])

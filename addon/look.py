@@ -109,7 +109,7 @@ _INPUTS = (
         1e3,
     ),
     Input("Anisotropy", "NodeSocketFloat", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
-    Input("Extinction", "NodeSocketFloat", "Per metre of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
+    Input("Extinction", "NodeSocketFloat", "Per meter of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
     Input("Albedo", "NodeSocketColor", "Scattered share of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
     Input(
         "Edge Density",

@@ -1,16 +1,19 @@
 """The buttons that add a smoke, choose one, make it and stop that."""
 
+from pathlib import Path
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, StringProperty
 
 from . import run, shot_check, smoke_takes
 from .blender_scene import ShotError
+from .clip_table import frame_count
 from .editors import open_tab
 from .needs import NeedsClip
 from .properties import SEEDS
 from .smoke import activate, active_smoke, new_smoke, smokes
-from .take import TakeError
+from .take import Take, TakeError
 
 
 class SMOKELIFT_OT_add(bpy.types.Operator):
@@ -32,11 +35,16 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        text = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
         try:
             clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
         except RuntimeError:
-            text = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
             self.report({"ERROR"}, text.format(self.filepath))
+            return {"CANCELLED"}
+        if clip.frame_duration < 1:  # Blender takes any file for a clip
+            self.report({"ERROR"}, text.format(self.filepath))
+            if clip.users == 0:
+                bpy.data.movieclips.remove(clip)
             return {"CANCELLED"}
         new_smoke(context.scene, clip)
         if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
@@ -45,7 +53,24 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
 
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(SMOKELIFT_OT_add.bl_idname, icon="FILE_MOVIE")
+    menu.layout.operator(SMOKELIFT_OT_add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
+
+
+class SMOKELIFT_OT_use_all_files(NeedsClip, bpy.types.Operator):
+    """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
+
+    bl_idname = "smokelift.use_all_files"
+    bl_label = "Use All Files"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = active_smoke(context.scene).smokelift
+        try:
+            settings.last = frame_count(settings.clip)
+        except ShotError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
 
 
 class SMOKELIFT_OT_run(NeedsClip, bpy.types.Operator):
@@ -133,11 +158,16 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for row in context.window_manager.smokelift.jobs:
-            if row.take == self.take or (not self.take and row.outcome == "running"):
+        jobs = context.window_manager.smokelift.jobs
+        for place in reversed(range(len(jobs))):
+            row = jobs[place]
+            if row.take != self.take and (self.take or row.outcome != "running"):
+                continue
+            if row.outcome == "waiting":  # it leaves nothing behind
+                Take(Path(row.take)).remove_unless_begun()
+                jobs.remove(place)
+            else:
                 row.cancel = True
-                if row.outcome == "waiting":
-                    row.outcome, row.sentence = "cancelled", "Cancelled before it began."
         return {"FINISHED"}
 
 
@@ -177,6 +207,7 @@ class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
 
 _CLASSES = (
     SMOKELIFT_OT_add,
+    SMOKELIFT_OT_use_all_files,
     SMOKELIFT_OT_run,
     SMOKELIFT_OT_vary,
     SMOKELIFT_OT_resume,

@@ -9,7 +9,7 @@ from . import presets, shot_check, smoke_takes, volume
 from .automatic import draw_automatic
 from .blender_scene import frame_rate
 from .box_table import box_of, has_inlet
-from .clip_table import clip_path
+from .clip_table import clip_path, unseen_pictures
 from .job import ENDED
 from .proxy import lacks_proxy
 from .smoke import active_smoke, find_smoke, smokes
@@ -63,7 +63,7 @@ def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active:
         for smoke in found:
             row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
             row.smoke = smoke.name
-    column.operator("smokelift.add", icon="ADD")
+    column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
 
 
 def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -76,6 +76,7 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
+    _draw_gaps(layout, context, settings)
     if is_distorted(clip):
         column = layout.column(align=True)
         draw_text(
@@ -100,6 +101,22 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         column.operator("smokelift.match_clip")
 
 
+def _draw_gaps(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+    """Pictures that are missing in a sequence, and the button that uses those after them."""
+    found = unseen_pictures(settings)
+    if found is None:
+        return
+    column = layout.column(align=True)
+    if found.missing:
+        draw_text(column, context, iface_("Missing: {:s}.").format(found.missing_names()), "ERROR")
+    if settings.last < found.count:
+        text = iface_("Blender sees {:d} of {:d} frames.").format(settings.clip.frame_duration, found.count)
+        draw_text(column, context, text, "BLANK1" if found.missing else "INFO")
+        column.operator("smokelift.use_all_files")
+    else:
+        draw_text(column, context, "A neighboring picture stands in for each.", "BLANK1")
+
+
 def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
     row = layout.row(align=True)
@@ -121,8 +138,8 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     row = layout.row()
     row.active = not has_inlet(smoke)  # that says it
     draw_automatic(row, settings, "distance").operator("smokelift.place", text="", icon="EYEDROPPER")
-    draw_closed(layout, settings)
     layout.prop(settings, "light_mode")
+    draw_closed(layout, settings)
 
 
 def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -216,7 +233,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     if all(row.outcome in ENDED for row in own):
         begun = smoke_takes.unfinished(smoke)
         if begun is not None and begun.read().frames:
-            text = iface_("Resume after Frame {:d}").format(begun.read().frames)
+            last = volume.frames_before_take(smoke, begun) + begun.read().frames
+            text = iface_("Resume after Frame {:d}").format(last)
             column.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
             column.operator("smokelift.run", text="Start Again", icon="PLAY")
         else:
@@ -226,11 +244,11 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     for row in jobs:
         _draw_job(layout, context, smoke, row)
     if volume.shown_take(smoke) is not None:
-        data = smoke.data
-        last = data.frame_start + data.frame_duration - 1
-        if data.sequence_mode == "CLIP" and not data.frame_start <= context.scene.frame_current <= last:
+        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
+        seen = volume.shown_range(smoke)
+        if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
             text = iface_("The smoke is seen in frames {:d} to {:d}.")
-            draw_text(layout, context, text.format(data.frame_start, last), "INFO")
+            draw_text(layout, context, text.format(*seen), "INFO")
         known = volume.provenance_note(smoke)
         if known:
             draw_text(layout, context, known, "INFO")
@@ -241,7 +259,6 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
                 column = layout.column(align=True)
                 draw_text(column, context, "This smoke is large: a proxy keeps the viewport fast.", "INFO")
                 column.operator("smokelift.make_proxy", icon="MOD_REMESH")
-        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
 def _draw_job(
@@ -252,7 +269,7 @@ def _draw_job(
     if smoke is not None and smoke != shown:
         box.label(text=smoke.name, icon="VOLUME_DATA")
     if row.outcome == "waiting":
-        box.label(text="Waits for the run before it", icon="SORTTIME")
+        box.label(text="Queued", icon="SORTTIME")
     elif row.outcome == "running":
         draw_progress(box, row)
     else:

@@ -10,7 +10,7 @@ PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.ver
 """Options of properties that hold a path."""
 
 
-def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
+def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
     """The absolute path, without the ``..`` that Blender's relative paths begin with: so it can be compared.
 
     Parameters
@@ -19,8 +19,10 @@ def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
         As Blender keeps it; ``//`` is the folder of the .blend, or of the library.
     library
         The .blend that the owner of the path is linked from.
+    folder
+        Of the .blend; by default of the open one, or of the library.
     """
-    found = bpy.path.abspath(path, library=library)
+    found = bpy.path.abspath(path, start=None if folder is None else str(folder), library=library)
     return Path(os.path.abspath(found))  # noqa: PTH100 - resolve() follows links, which Blender keeps
 
 

@@ -18,6 +18,7 @@ from . import shot_check, volume
 from .automatic import automatic_unless
 from .box_table import box_of
 from .contract import BOX_VOXELS, FASTEST, SIDES, SLOWEST
+from .directing import frames_of_result
 from .paths import PATH_OPTIONS
 from .smoke import free_folder, scene_of
 
@@ -61,6 +62,20 @@ def _speed_chosen(_settings: "SmokeliftSettings", _context: bpy.types.Context) -
     volume.keep_step()
 
 
+def _start_chosen(settings: "SmokeliftDirecting", _context: bpy.types.Context) -> None:
+    """Begin with the last frame of the result, unless a frame of it was chosen before."""
+    frames = frames_of_result(settings.id_data)
+    if frames is not None and not frames[0] <= settings.start <= frames[1]:
+        settings.start = frames[1]
+
+
+def _part_chosen(settings: "SmokeliftDirecting", _context: bpy.types.Context) -> None:
+    """Begin with the whole result, unless a part of it was chosen before."""
+    frames = frames_of_result(settings.id_data)
+    if frames is not None and not frames[0] <= settings.part_first < settings.part_last <= frames[1]:
+        settings.part_first, settings.part_last = frames
+
+
 def _closed(description: str, **options: Any) -> Any:
     """A row of buttons, one for each side of the box."""
     items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
@@ -92,10 +107,12 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     frames: IntProperty(name="Frames", description="Number of frames to add", default=48, min=1, max=100_000)
     fade: IntProperty(name="Fade", description="Frames at the end in which the smoke fades to nothing", min=0)
     use_start: BoolProperty(
-        name="Start", description="Simulate from a frame of the clip on, in place of the frames that follow it"
+        name="Start",
+        description="Simulate from a frame of the clip on, in place of the frames that follow it",
+        update=_start_chosen,
     )
     start: IntProperty(
-        name="Start", description="Last frame that stays as it is, counted in the scene", default=1, min=-1_000_000
+        name="Start", description="Last frame that stays as it is, counted as Frames of the clip", default=1
     )
     closed: _closed("Sides of the result's box, along its own axes, that are walls for the frames that are added")
     room: FloatProperty(
@@ -184,11 +201,15 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
         "frames in between",
         update=_speed_chosen,
     )
-    use_part: BoolProperty(name="Part", description="Loop a part of the result, in which the smoke is steady")
-    part_first: IntProperty(
-        name="First", description="First frame of the part, in the scene", default=1, min=-1_000_000
+    use_part: BoolProperty(
+        name="Part",
+        description="Loop a part of the result, in which the smoke is steady",
+        update=_part_chosen,
     )
-    part_last: IntProperty(name="Last", description="Last frame of the part, in the scene", default=48, min=-1_000_000)
+    part_first: IntProperty(
+        name="First", description="First frame of the part, counted as Frames of the clip", default=1
+    )
+    part_last: IntProperty(name="Last", description="Last frame of the part, counted as Frames of the clip", default=48)
     overlap: IntProperty(
         name="Overlap",
         description="Frames in which the end becomes the start; automatic is a third of the loop, 24 at most",
@@ -209,6 +230,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     results: StringProperty(
         name="Results",
         description="Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend",
+        options={"HIDDEN"},
+    )
+    saved_as: StringProperty(
+        name="Saved As",
+        description="The .blend as it was last saved or opened, which may have been copied or renamed meanwhile",
         options={"HIDDEN"},
     )
     before: StringProperty(name="Before", description="The result that was shown before", options={"HIDDEN"})
@@ -400,7 +426,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties", update=_changed)
     extinction: FloatProperty(
         name="Extinction",
-        description="Extinction coefficient per metre of smoke of density 1",
+        description="Extinction coefficient per meter of smoke of density 1",
         default=5.0,
         min=0.001,
         max=1e9,
@@ -449,7 +475,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     set_up_range: BoolProperty(
         name="Size, Rate and Range",
-        description="Give the scene the clip's resolution, frame rate and length",
+        description="Give the scene the clip's resolution and frame rate, and the length of the result",
         default=True,
     )
     set_up_camera: BoolProperty(
@@ -512,6 +538,7 @@ class SmokeliftJob(bpy.types.PropertyGroup):
     warnings: StringProperty()
     icon: IntProperty()
     cancel: BoolProperty()
+    left: BoolProperty(description="The artist chose another result while it runs")
 
 
 class SmokeliftCost(bpy.types.PropertyGroup):
@@ -530,6 +557,7 @@ class SmokeliftState(bpy.types.PropertyGroup):
     jobs: CollectionProperty(type=SmokeliftJob)
     check_smoke: IntProperty()
     check_place: StringProperty(description="Corners of the box that was checked; empty without one")
+    check_page: StringProperty(description="Picture of what was found in the shot that was checked")
     check_ticks: IntProperty()
     check_done: BoolProperty()
     check_error: StringProperty()

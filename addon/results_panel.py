@@ -11,7 +11,7 @@ from . import smoke_takes, volume
 from .job import ENDED
 from .needs import NeedsClip, NeedsResult
 from .panel import draw_text, size
-from .smoke import active_smoke
+from .smoke import active_smoke, smokes
 from .subpanel import OfClip, redraw
 from .take import Take, TakeError, takes
 
@@ -30,7 +30,7 @@ class SMOKELIFT_OT_show_take(NeedsClip, bpy.types.Operator):
         if not take.read().frames:
             self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
             return {"CANCELLED"}
-        smoke_takes.present(active_smoke(context.scene), take)
+        smoke_takes.choose(active_smoke(context.scene), take)
         return {"FINISHED"}
 
 
@@ -38,7 +38,7 @@ class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
     """Show the result that was shown before. Press again to come back"""
 
     bl_idname = "smokelift.switch_take"
-    bl_label = "Switch"
+    bl_label = "Previous Result"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -52,7 +52,7 @@ class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
-        smoke_takes.present(smoke, volume.take_before(smoke))
+        smoke_takes.choose(smoke, volume.take_before(smoke))
         return {"FINISHED"}
 
 
@@ -105,7 +105,9 @@ class SMOKELIFT_OT_remove_take(bpy.types.Operator):
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return _confirm(self, context, event, [Take(Path(self.take))])
+        take = Take(Path(self.take))
+        message = " ".join([_frees([take]), *consequences(context, take)])
+        return _confirm(self, context, event, message)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         take = Take(Path(self.take))
@@ -117,45 +119,89 @@ class SMOKELIFT_OT_remove_take(bpy.types.Operator):
 
 
 class SMOKELIFT_OT_remove_takes(NeedsClip, bpy.types.Operator):
-    """Delete the files of all results in the output folder except those that a Volume of this file shows"""
+    """Delete results that nothing needs."""
 
     bl_idname = "smokelift.remove_takes"
+    bl_description = (
+        "Delete the files of the results before the one on show. What a Volume of this file shows, what another result "
+        "was made of and what other files may show stays"
+    )
     bl_label = "Delete Earlier Results?"
 
+    asked: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return _confirm(self, context, event, unused_takes(context))
+        doomed = earlier_takes(context)
+        self.asked = "\n".join(str(take.directory) for take in doomed)
+        return _confirm(self, context, event, _frees(doomed))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for take in unused_takes(context):
-            take.remove()
+        for take in earlier_takes(context):
+            if not self.asked or str(take.directory) in self.asked.split("\n"):
+                take.remove()
         return {"FINISHED"}
 
 
-def unused_takes(context: bpy.types.Context) -> list[Take]:
-    """The results in the active smoke's folder that no Volume of this file shows and no run needs."""
-    kept, folder = _in_use(context), smoke_takes.output_folder(active_smoke(context.scene))
-    return [take for take in takes(folder) if take.directory.resolve() not in kept]
+def earlier_takes(context: bpy.types.Context) -> list[Take]:
+    """The results of this file before the one on show that nothing needs: no Volume, no run, no other result or file.
+
+    What an earlier version of the add-on made stays too, since nothing says which files show it.
+    """
+    smoke = active_smoke(context.scene)
+    own, shown, kept = smoke_takes.own_takes(smoke), volume.shown_take(smoke), _in_use(context)
+    earlier = own[: own.index(shown)] if shown in own else []
+    doomed = [
+        take
+        for take in earlier
+        if take.directory.resolve() not in kept and smoke_takes.foreign_files(smoke, take) == []
+    ]
+    while True:  # what is made of a result that goes needs nothing
+        needed = {source for take in _known_takes() if take not in doomed and (source := take.read().source)}
+        if not needed.intersection(doomed):
+            return doomed
+        doomed = [take for take in doomed if take not in needed]
+
+
+def consequences(context: bpy.types.Context, take: Take) -> list[str]:
+    """What the loss of a result would mean for other results and files, a sentence each."""
+    said = []
+    made = [other.read().title for other in _known_takes() if other.read().source == take]
+    if made:
+        said.append(rpt_("Made of it: {:s}.").format(", ".join(made)))
+    files = smoke_takes.foreign_files(active_smoke(context.scene), take)
+    if files is None:
+        said.append(rpt_("An earlier version of Smokelift made it: other files may show it."))
+    elif files:
+        said.append(rpt_("It may be shown by {:s}.").format(", ".join(file.name for file in files)))
+    return said
+
+
+def _known_takes() -> list[Take]:
+    """All results in the folders of the file's smokes, also those of other files."""
+    found = [smoke for scene in bpy.data.scenes for smoke in smokes(scene) if smoke.smokelift.clip is not None]
+    folders = {smoke_takes.output_folder(smoke) for smoke in found}
+    return [take for folder in folders for take in takes(folder)]
 
 
 def _in_use(context: bpy.types.Context) -> set[Path]:
     """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
-    shown = {take.directory for data in bpy.data.volumes if (take := volume.take_of(data)) is not None}
     rows = context.window_manager.smokelift.jobs
     queued = {Take(Path(row.take)) for row in rows if row.outcome not in ENDED}
     read = {source for take in queued if (source := take.read().source) is not None}
-    return {directory.resolve() for directory in shown | {take.directory for take in queued | read}}
+    return volume.directories_on_show() | {take.directory.resolve() for take in queued | read}
 
 
 def _confirm(
-    operator: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event, doomed: list[Take]
+    operator: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event, message: str
 ) -> set[str]:
-    """Ask before files are deleted; the question says how large they are."""
-    if len(doomed) == 1:
-        message = rpt_("{:s} frees {:s}.").format(doomed[0].read().title, freed(doomed))
-    else:
-        message = rpt_("{:d} results free {:s}.").format(len(doomed), freed(doomed))
+    """Ask before files are deleted."""
     manager = context.window_manager
     return manager.invoke_confirm(operator, event, message=message, confirm_text="Delete", icon="WARNING")
+
+
+def _frees(doomed: list[Take]) -> str:
+    """What is deleted, by its names, and how large that is."""
+    return rpt_("{:s}: {:s}.").format(", ".join(take.read().title for take in doomed), freed(doomed))
 
 
 def freed(doomed: list[Take]) -> str:
@@ -170,7 +216,7 @@ class _Results(OfClip):
         layout = self.layout
         smoke = active_smoke(context.scene)
         shown = volume.shown_take(smoke)
-        found = takes(smoke_takes.output_folder(smoke))
+        found = smoke_takes.own_takes(smoke)
         column = layout.column(align=True)
         for take in found:
             row = column.row(align=True)
@@ -187,7 +233,7 @@ class _Results(OfClip):
                 column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
         if found:
             draw_text(layout, context, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
-        doomed = unused_takes(context)
+        doomed = earlier_takes(context)
         row = layout.row()
         row.enabled = bool(doomed)
         text = iface_("Delete Earlier Results: {:s}").format(freed(doomed))

@@ -132,6 +132,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._check.kill()
         for row in context.window_manager.smokelift.jobs:
             row.icon = 0
+            if row.outcome == "waiting" and find_smoke(row.smoke_uid) is not None:  # a deleted one may come back
+                Take(Path(row.take)).remove_unless_begun()
             if row.outcome not in ENDED:
                 row.outcome, row.sentence = "cancelled", f"Stopped; finished frames stay: {row.done}."
         bpy.utils.previews.remove(self._thumbnails)
@@ -142,6 +144,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Poll once; returns whether work remains."""
         manager = context.window_manager
         rows = {row.take: row for row in manager.smokelift.jobs}
+        for name in self._jobs.keys() - rows.keys():
+            self._jobs[name].cancel()  # it was taken out of the queue
         for name, row in rows.items():
             if row.outcome == "waiting" and name not in self._jobs:
                 self._start(name, row)
@@ -165,9 +169,10 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         return bool(self._jobs or self._not_shown) or self._check.running or manager.smokelift.check_ticks > 0
 
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
-        take = Take(Path(name))
+        take, smoke = Take(Path(name)), find_smoke(row.smoke_uid)
+        before = volume.frames_before_take(smoke, take) if smoke is not None else 0
         try:
-            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
+            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
         except (EngineMissingError, TakeError) as error:
             row.outcome, row.sentence = "failed", str(error)
             return
@@ -192,7 +197,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         if smoke is not None:
             count = _datablocks()
             before = self._before.setdefault(row.take, volume.shown_take(smoke))
-            show_while_made(smoke, take, before, job.outcome)
+            if not row.left:
+                show_while_made(smoke, take, before, job.outcome)
             created = _datablocks() - count
             if before is None and row.take not in self._seen and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
                 self._seen.add(row.take)

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 SENTENCES = {
-    "reconstructed": "{frames} made in {seconds:.0f} s. They match the clip to {psnr:.1f} dB; more is closer.",
-    "written": "{frames} made in {seconds:.0f} s.",
-    "continued": "{frames} made in {seconds:.0f} s, {simulated} of them simulated.",
-    "looped": "{frames} made in {seconds:.0f} s, which repeat.",
+    "reconstructed": "Match to the clip: {psnr}. {frames} in {seconds}.",
+    "written": "{frames} in {seconds}.",
+    "continued": "{frames} in {seconds}, {simulated} of them simulated.",
+    "looped": "{frames} in {seconds}, which repeat.",
     "proxy": "The proxy of {frames} is made.",
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
@@ -27,26 +27,61 @@ SENTENCES = {
         "The picture changes at once between frames {before} and {after}, as at a cut, so no single background fits "
         "both sides. Choose Frames {first} to {before} or {after} to {last}."
     ),
+    "dissolving smoke": (
+        "From frame {frame} on the smoke dissolves before it reaches the end of its box, because the box cannot grow "
+        "any more. Give it more Room than {room:g}, or move the camera or lamp in its way."
+    ),
 }
 """Sentences by kind, with the figures that the engine gives."""
 
 FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
 """Figures that the engine counts from 0, and the panel from 1."""
 
+MATCHES = ((34.0, "very good"), (28.0, "good"), (22.0, "fair"))
+"""Words for how well smoke matches its clip, by the least PSNR inside the smoke (dB), set by hand: the difference there
+is at most 2, 4 and 8 % of the range."""
 
-def sentence(message: Mapping[str, Any]) -> str:
+POOR = "poor"
+"""The word for a PSNR below these."""
+
+OF_RESULT = ("dissolving smoke",)
+"""Sentences whose frames are counted from the first of the result, from 1."""
+
+
+def sentence(message: Mapping[str, Any], before: int = 0) -> str:
     """A message of the engine, as the panel shows it.
 
     Parameters
     ----------
     message
         With the engine's ``text``; with its ``kind`` and ``figures`` if it has those.
+    before
+        Number of the clip's frames before the first of the result.
     """
-    words = SENTENCES.get(message.get("kind", ""))
+    kind = message.get("kind", "")
+    words, add = SENTENCES.get(kind), before if kind in OF_RESULT else 1
     if words is None:
         return str(message["text"])
     figures = dict(message["figures"])
-    figures |= {name: figures[name] + 1 for name in FRAME_NUMBERS if name in figures}
+    figures |= {name: figures[name] + add for name in FRAME_NUMBERS if name in figures}
     if "frames" in figures:
         figures["frames"] = "1 frame" if figures["frames"] == 1 else f"{figures['frames']} frames"
+    if "seconds" in figures:
+        figures["seconds"] = spent(figures["seconds"])
+    if "psnr" in figures:
+        figures["psnr"] = f"{match(figures['psnr'])} ({figures['psnr']:.1f} dB)"
     return words.format(**figures)
+
+
+def match(psnr: float) -> str:
+    """How well smoke matches its clip, in words, by the PSNR inside the smoke (dB)."""
+    return next((word for least, word in MATCHES if psnr >= least), POOR)
+
+
+def spent(seconds: float) -> str:
+    """A time that something took, in words."""
+    whole = max(1, round(seconds))
+    if whole < 60:
+        return f"{whole} s"
+    minutes, rest = divmod(whole, 60)
+    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

@@ -13,7 +13,7 @@ TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_
 
 
 class SMOKELIFT_OT_match_clip(NeedsClip, bpy.types.Operator):
-    """Set the scene's resolution, frame rate and length to the clip's"""
+    """Set the scene's resolution and frame rate to the clip's, and its length to the result's or its part in use"""
 
     bl_idname = "smokelift.match_clip"
     bl_label = "Match Scene to Clip"
@@ -31,7 +31,7 @@ class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
     bl_idname = "smokelift.set_up"
     bl_description = (
         "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
-        "and colors. The old world stays in the file"
+        "and colors, with samples for about a minute in a new file. The old world stays in the file"
     )
     bl_label = "Set Up Shot"
     bl_options = {"REGISTER", "UNDO"}
@@ -48,12 +48,18 @@ class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
         if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
             self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
             return {"CANCELLED"}
-        shot_setup.set_up(smoke, take, index)
+        hidden, further = shot_setup.set_up(smoke, take, index)
         if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "CAMERA"
         volume.show(smoke, take)  # the frame rate may have changed
         shot_check.check_again(context)
-        self.report({"INFO"}, "The shot is set up: press F12 for a render that matches the clip.")
+        said = [rpt_("The shot is set up: press F12 for a render that matches the clip.")]
+        if hidden:
+            said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
+        if further:
+            text = rpt_("Beside the clip's light the smoke has that of {:s}: hide it from renders for a match.")
+            said.append(text.format(", ".join(further)))
+        self.report({"INFO"}, " ".join(said))
         return {"FINISHED"}
 
 

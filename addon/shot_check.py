@@ -1,10 +1,12 @@
 """The check of a shot before its run: the engine's forecast of time, memory and disk, and what it assumes.
 
-It starts by itself once the settings rest, and its result is shown in the panel.
+It starts by itself once the settings rest, and its result is shown in the panel. A shot that was checked before in this
+session is not measured anew.
 """
 
+import hashlib
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,9 @@ import bpy
 from . import preferences
 from .blender_scene import ShotError
 from .box_table import box_corners, box_of
+from .clip_table import clip_path
 from .job import EngineMissingError, Job, engine_command
+from .paths import absolute
 from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
 from .take import Take, TakeError
@@ -22,9 +26,8 @@ TICKS = 4
 """Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
 
 
-def page_file() -> Path:
-    """Where the engine shows in pictures what it found of the shot that was checked last."""
-    return Path(bpy.app.tempdir) / "smokelift_inspect.png"
+_known: dict[str, Mapping[str, Any]] = {}
+"""What the engine said of the shots of this session, by their fingerprints."""
 
 
 WORDS = {
@@ -82,6 +85,7 @@ class ShotCheck:
 
     def __init__(self) -> None:
         self._job: Job | None = None
+        self._shot = ""
         self._began = 0.0
 
     @property
@@ -110,12 +114,11 @@ class ShotCheck:
             before, state.check_seconds = state.check_seconds, int(time.monotonic() - self._began)
             return state.check_seconds != before
         job, self._job = self._job, None
-        details = job.details
-        state.check_done = job.outcome == "done"
-        state.check_error = "" if state.check_done else job.sentence
-        state.notes = "\n".join(found_lines(details.get("facts", ())))
-        if state.check_done:
-            keep_costs(state, state.check_smoke, details)
+        if job.outcome == "done":
+            _known[self._shot] = job.details
+            _keep(state, job.details)
+        else:
+            state.check_error = job.sentence
         return True
 
     def _start(self, state: bpy.types.PropertyGroup) -> None:
@@ -126,16 +129,38 @@ class ShotCheck:
             return
         folder = Path(bpy.app.tempdir)
         try:
-            take = Take(folder / "smokelift_check")
+            take, words = Take(folder / "smokelift_check"), options(smoke) + preferences.thread_options()
             take.write(shot_tables(smoke, quick=True), options(smoke))
-            arguments = ["inspect", str(take.scene_file), "--page", str(page_file()), "--progress", "json"]
-            arguments += options(smoke) + preferences.thread_options()
+            self._shot = _fingerprint(take.scene_file.read_bytes(), words, smoke)
+            page = folder / f"smokelift_inspect_{self._shot}.png"
+            state.check_page = str(page)
+            if self._shot in _known:
+                _keep(state, _known[self._shot])
+                return
+            arguments = ["inspect", str(take.scene_file), "--page", str(page), "--progress", "json", *words]
             self._job = Job(engine_command(arguments), take.log_file)
         except (ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)
             return
         self._began = time.monotonic()
         self._job.start()
+
+
+def _keep(state: bpy.types.PropertyGroup, details: Mapping[str, Any]) -> None:
+    """Show what the engine said of the shot."""
+    state.check_done = True
+    state.notes = "\n".join(found_lines(details.get("facts", ())))
+    keep_costs(state, state.check_smoke, details)
+
+
+def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -> str:
+    """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads."""
+    settings = smoke.smokelift
+    paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]
+    if settings.strokes is not None:
+        paths.append(absolute(settings.strokes.filepath, settings.strokes.library))
+    states = [(path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None for path in paths]
+    return hashlib.sha256(tables + repr((list(words), states)).encode()).hexdigest()[:16]
 
 
 def place(smoke: bpy.types.Object) -> str:

@@ -5,9 +5,12 @@ import os.path
 from pathlib import Path
 
 import bpy
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from . import preferences
+
+LAMP_OF_A_NEW_FILE = (4.0762453, 1.0054539, 5.9038620), 1000.0
+"""Place (m) and power (W) of the point light that Blender's own new file begins with."""
 
 ASSUMED_CAMERA = "Smokelift Camera"
 """Name of a camera that stands where the engine assumed the clip's."""
@@ -124,3 +127,18 @@ def hide_default_cube(scene: bpy.types.Scene) -> None:
     places = {tuple(vertex.co) for vertex in cube.data.vertices}
     if places == {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
         cube.hide_viewport = cube.hide_render = True
+
+
+def hide_default_lamp(scene: bpy.types.Scene) -> bool:
+    """Hide the lamp of a new file, which would light smoke that has its own light; returns whether it was seen."""
+    lamp = scene.objects.get("Light")
+    if lamp is None or lamp.type != "LIGHT" or lamp.data.type != "POINT" or lamp.hide_render:
+        return False
+    if lamp.parent or lamp.children or lamp.constraints or lamp.animation_data or lamp.data.animation_data:
+        return False
+    place, power = LAMP_OF_A_NEW_FILE
+    same_place = (lamp.location - Vector(place)).length < 1e-4
+    if not same_place or lamp.data.energy != power or tuple(lamp.data.color) != (1.0, 1.0, 1.0):
+        return False
+    lamp.hide_viewport = lamp.hide_render = True
+    return True

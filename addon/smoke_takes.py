@@ -1,4 +1,8 @@
-"""The takes of a smoke: where they lie, how a new one is written, which can be resumed, and which is on show."""
+"""The takes of a smoke: where they lie, how a new one is written, which can be resumed, and which is on show.
+
+Several .blend files may keep their takes in one folder, since one is saved as another. Every take has a list of the
+files that may show it, to which each of them adds itself when it is saved.
+"""
 
 from pathlib import Path
 
@@ -11,7 +15,7 @@ from .job import ENDED, Outcome
 from .paths import absolute, relative
 from .scene_file import options as engine_options
 from .scene_file import shot_tables
-from .smoke import hide_default_cube, scene_of, separate_duplicate
+from .smoke import hide_default_cube, is_smoke, scene_of, separate_duplicate
 from .take import Take, new_take, takes
 
 
@@ -32,6 +36,40 @@ def output_folder(smoke: bpy.types.Object) -> Path:
     return clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
 
 
+def own_takes(smoke: bpy.types.Object) -> list[Take]:
+    """The takes in a smoke's folder that belong to this file, oldest first.
+
+    Those are what it shows, what was made or shown in it, and what no file is known of that is there.
+    """
+    here, shown, before = _names_of_file(smoke), volume.directories_on_show(), volume.take_before(smoke)
+
+    def belongs(take: Take) -> bool:
+        files = take.read().files
+        if files is None or take == before or take.directory.resolve() in shown:
+            return True
+        return bool(files & here) or not any(file.is_file() for file in files)
+
+    return [take for take in takes(output_folder(smoke)) if belongs(take)]
+
+
+def foreign_files(smoke: bpy.types.Object, take: Take) -> list[Path] | None:
+    """Other .blend files that may show a take; None where that is unknown."""
+    files = take.read().files
+    return None if files is None else sorted(files - _names_of_file(smoke))
+
+
+def _names_of_file(smoke: bpy.types.Object) -> set[Path]:
+    """The open .blend, and what it was called when it was saved: it may have been copied or renamed."""
+    return {Path(file).resolve() for file in (bpy.data.filepath, smoke.smokelift.saved_as) if file}
+
+
+def takes_of_file() -> list[Take]:
+    """All takes that belong to this file, those of other files that it links included."""
+    with_clip = [obj for obj in bpy.data.objects if is_smoke(obj) and obj.smokelift.clip is not None]
+    own = [take for obj in with_clip for take in own_takes(obj)]
+    return [*own, *map(Take, volume.directories_on_show())]
+
+
 def write_take(smoke: bpy.types.Object) -> Take:
     """Write the files of a new take.
 
@@ -45,6 +83,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
         hide_default_cube(scene_of(smoke))
     take = _next_take(smoke)
     take.write(tables, engine_options(smoke))
+    _note_file(take)
     return take
 
 
@@ -64,6 +103,7 @@ def write_directed(smoke: bpy.types.Object) -> Take:
     direction, options, meshes = directing.engine_request(smoke)
     take = _next_take(smoke)
     take.write_directed(direction, source, options, meshes)
+    _note_file(take, source)
     return take
 
 
@@ -74,6 +114,13 @@ def _next_take(smoke: bpy.types.Object) -> Take:
     if not smoke.smokelift.output:
         smoke.smokelift.results = relative(folder)
     return new_take(folder)
+
+
+def _note_file(*used: Take) -> None:
+    """Keep in mind that the open .blend may show these takes; one that was never saved does so when it is."""
+    if bpy.data.filepath:
+        for take in used:
+            take.note_file(Path(bpy.data.filepath))
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
@@ -100,7 +147,7 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
     """The take that can be resumed: the one on show, else the newest."""
     if smoke.smokelift.clip is None:
         return None
-    newest = takes(output_folder(smoke))[-1:]
+    newest = own_takes(smoke)[-1:]
     candidates = [take for take in (volume.shown_take(smoke), *newest) if take is not None]
     return next((take for take in candidates if take.read().resumable), None)
 
@@ -113,6 +160,14 @@ def present(smoke: bpy.types.Object, take: Take) -> None:
         shot_setup.follow_range(smoke)
 
 
+def choose(smoke: bpy.types.Object, take: Take) -> None:
+    """Show the take that the artist chose; a run that goes on does not take it back."""
+    present(smoke, take)
+    for row in bpy.context.window_manager.smokelift.jobs:
+        if row.smoke_uid == smoke.session_uid and row.outcome == "running":
+            row.left = row.take != str(take.directory)
+
+
 def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:
     """Show the frames of a take while it is made, unless the artist has chosen another meanwhile.
 
@@ -121,7 +176,7 @@ def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, ou
     smoke, take
         The smoke, and the take that is made for it.
     before
-        What the smoke showed before; it is shown again if the run fails or is stopped.
+        What the smoke showed before; it is shown again if the run fails or is stopped. An undo may bring it back, too.
     outcome
         State of the run.
     """

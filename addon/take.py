@@ -4,7 +4,7 @@ Every take has the next free number, so no run overwrites another:
 
     take_0003/        the sequence, written by the engine
     take_0003.toml    its scene file
-    take_0003.json    the engine's further options
+    take_0003.json    the engine's further options, and the .blend files that may show it
     take_0003.log     the engine's messages
     take_0003.png     a thumbnail of the last frame, input beside reconstruction
 
@@ -23,6 +23,7 @@ import re
 import shutil
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -97,8 +98,7 @@ class Take:
         TakeError
             If the folder cannot be written to.
         """
-        text = json.dumps({"options": list(options)}) + "\n"
-        self._write({self.scene_file: toml.dumps(tables).encode(), self.request_file: text.encode()})
+        self._write({self.scene_file: toml.dumps(tables).encode(), self.request_file: _request(options)})
 
     def write_directed(
         self, direction: str, source: Take, options: Sequence[str], meshes: Sequence[bytes] = ()
@@ -121,16 +121,12 @@ class Take:
         TakeError
             If the folder cannot be written to.
         """
-        try:  # so that a project can be moved
-            there = os.path.relpath(source.directory, self.directory.parent)
-        except ValueError:  # on another drive
-            there = str(source.directory)
-        request = {"direction": direction, "source": there, "options": list(options)}
+        request = _request(options, direction=direction, source=_way(self.directory.parent, source.directory))
         name = self.moving_mesh.name.replace("####", "{:04d}")
         files = {self.directory.with_name(name.format(n)): content for n, content in enumerate(meshes)}
         if len(meshes) == 1:
             files = {self.mesh_file: meshes[0]}
-        self._write({**files, self.request_file: (json.dumps(request) + "\n").encode()})
+        self._write({**files, self.request_file: request})
 
     def _write(self, files: Mapping[Path, bytes]) -> None:
         try:
@@ -206,10 +202,21 @@ class Take:
             If its files are missing or damaged, or the name cannot be written.
         """
         try:
-            request = json.loads(self.request_file.read_text(encoding="utf-8"))
-            self.request_file.write_text(json.dumps({**request, "title": title}) + "\n", encoding="utf-8")
+            self._change_request("title", title)
         except (OSError, ValueError, TypeError, RecursionError) as error:
             raise TakeError(f"{self.request_file} cannot be changed, so the result keeps its name.") from error
+
+    def note_file(self, blend: Path) -> None:
+        """Keep in mind that a .blend may show it, where it can be written; one of an earlier version knows of none."""
+        known = self.read().files
+        if known is not None and blend.resolve() not in known:
+            folder = self.directory.parent.resolve()
+            with suppress(OSError, ValueError, TypeError, RecursionError):
+                self._change_request("files", [_way(folder, file) for file in sorted({*known, blend.resolve()})])
+
+    def _change_request(self, key: str, value: Any) -> None:
+        request = json.loads(self.request_file.read_text(encoding="utf-8"))
+        self.request_file.write_text(json.dumps({**request, key: value}) + "\n", encoding="utf-8")
 
     def size(self) -> float:
         """Size of its sequence on the disk (MB)."""
@@ -217,6 +224,11 @@ class Take:
             return _size_at(self.directory, self.directory.stat().st_mtime_ns)
         except OSError:
             return 0.0
+
+    def remove_unless_begun(self) -> None:
+        """Delete its files if the engine never wrote any."""
+        if not self.directory.exists():
+            self.remove()
 
     def remove(self) -> None:
         """Delete all its files."""
@@ -244,6 +256,8 @@ class Snapshot:
         The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one.
     begun
         Whether it has what a run needs.
+    files
+        The .blend files that may show it, without links; None of one that an earlier version made, which kept no list.
     """
 
     direction: str | None
@@ -252,6 +266,7 @@ class Snapshot:
     title: str
     index: dict[str, Any] | None
     begun: bool
+    files: frozenset[Path] | None
 
     @property
     def frames(self) -> int:
@@ -288,10 +303,12 @@ def _snapshot_at(take: Take, request_state: State, _index_state: State, scene_st
     direction, there, options = (request.get(key) for key in ("direction", "source", "options"))
     if not isinstance(direction, str) or direction not in DIRECTIONS:
         direction = None
-    source = Take(Path(os.path.normpath(take.directory.parent / there))) if isinstance(there, str) else None
+    folder = take.directory.parent
+    source = Take(Path(os.path.normpath(folder / there))) if isinstance(there, str) else None
     if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
         options = None
     number = take.directory.name.rpartition("_")[2].lstrip("0")
+    files = request.get("files")
     return Snapshot(
         direction=direction,
         source=source,
@@ -299,7 +316,21 @@ def _snapshot_at(take: Take, request_state: State, _index_state: State, scene_st
         title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
         index=index if "complete" in index and isinstance(index.get("frames"), dict) else None,
         begun=request_state is not None and (direction is not None or scene_state is not None),
+        files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
     )
+
+
+def _way(folder: Path, path: Path) -> str:
+    """A path as files in a folder keep it: relative, so that a project can be moved, unless it is on another drive."""
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:
+        return str(path)
+
+
+def _request(options: Sequence[str], **further: str) -> bytes:
+    """The content of the request of a new take, which no file shows yet."""
+    return (json.dumps({**further, "options": list(options), "files": []}) + "\n").encode()
 
 
 def _json(file: Path) -> dict[str, Any]:

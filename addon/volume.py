@@ -27,6 +27,10 @@ BESIDE = 1.1
 EARLY = 0.001
 """Frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one."""
 
+GOOD_DEGREES = 30
+"""Degrees beside its camera at which smoke of one camera still has what `sentences` calls good, about 28 dB: 29.0 at 20
+and 25.1 at 45 degrees, mean of four scenes, smooth (docs/accuracy.md)."""
+
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
 
@@ -49,7 +53,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     _correct_position(smoke, index["scene"]["domain"])
     fit_look(smoke, index["scene"])
     _play(smoke, scene_of(smoke), take, index)
-    smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
+    smoke.data[PROVENANCE] = _provenance(index.get("provenance", []), bool(index["scene"].get("views")))
     return smoke
 
 
@@ -87,6 +91,36 @@ def _step(smoke: bpy.types.Object) -> tuple[int, float]:
     return _numbers(index)[0], ratio if _real_time(smoke, ratio, index) else 1.0
 
 
+def frames_before_take(smoke: bpy.types.Object, take: Take) -> int:
+    """Number of the clip's frames before a take's first: with it, the take's numbers are the clip's, and go on.
+
+    One that is made of another take, and has no frame yet, has the other's.
+    """
+    index = take.read().index
+    while index is None and (source := take.read().source) is not None:
+        take = source
+        index = take.read().index
+    return frames_before(smoke.smokelift, index) if index else smoke.smokelift.first - 1
+
+
+def shown_range(smoke: bpy.types.Object) -> tuple[int, int] | None:
+    """The first and the last frame of its scene in which a smoke shows its take, those that are still made included."""
+    take, data = shown_take(smoke), smoke.data
+    index = take.read().index if take is not None else None
+    if index is None or not index["frames"]:
+        return None
+    last = data.frame_start + data.frame_duration - 1
+    if not index["complete"] and "direct" not in index.get("settings", {}):
+        last = max(last, scene_frame(smoke, _last_planned(index)))
+    return data.frame_start, last
+
+
+def _last_planned(index: dict[str, Any]) -> int:
+    """The number of the last frame that a take made of a clip will have."""
+    finished, used = _numbers(index), index["scene"]["clip"].get("frames")
+    return finished[0] + used[1] - used[0] if used else finished[-1]
+
+
 def go_to_smoke(smoke: bpy.types.Object) -> bool:
     """Go to the first frame that shows smoke unless the current one does, or will; returns whether there is any yet."""
     take, scene = shown_take(smoke), scene_of(smoke)
@@ -94,10 +128,8 @@ def go_to_smoke(smoke: bpy.types.Object) -> bool:
     smoky = [int(n) for n, figures in index["frames"].items() if figures.get("mass", 1.0) > 0.0] if index else []
     if not smoky:
         return False
-    finished, used = _numbers(index), index["scene"]["clip"].get("frames")
-    last = finished[0] + used[1] - used[0] if used else finished[-1]
     number = number_at(smoke, scene.frame_current)
-    if number not in smoky and not finished[-1] < number <= last:
+    if number not in smoky and not _numbers(index)[-1] < number <= _last_planned(index):
         scene.frame_set(scene_frame(smoke, min(smoky)))
     return True
 
@@ -139,12 +171,18 @@ def take_of(volume: bpy.types.Volume) -> Take | None:
     return Take(path.parent) if path.suffix == ".vdb" else None
 
 
+def directories_on_show() -> set[Path]:
+    """Directories, without links, of the takes that Volumes of this file show."""
+    shown = (take_of(data) for data in bpy.data.volumes)
+    return {take.directory.resolve() for take in shown if take is not None}
+
+
 def provenance_note(smoke: bpy.types.Object) -> str:
     """What of a smoke is measured and what is not, as a line for the panel; empty if that is unknown."""
     return smoke.data.get(PROVENANCE, "")
 
 
-def _provenance(parts: list[dict[str, Any]]) -> str:
+def _provenance(parts: list[dict[str, Any]], has_further_views: bool) -> str:
     directed = [part["how"] for part in parts if part["what"] in DIRECTIONS]
     parts = [part for part in parts if part["what"] not in DIRECTIONS]
     if not parts:  # the engine of earlier versions did not say
@@ -153,8 +191,10 @@ def _provenance(parts: list[dict[str, Any]]) -> str:
     if made_up is None:
         what = "Nothing is made up: its depth is smooth."
     else:
-        what = f"What it does not see is made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
-    return " ".join(["What the camera sees is measured.", what, *directed])
+        what = f"Made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
+    seen = "What the camera sees is measured"
+    seen += "." if has_further_views else f", good to about {GOOD_DEGREES} degrees beside it."
+    return " ".join([seen, what, *directed])
 
 
 @persistent

@@ -45,9 +45,15 @@ GPU = {"name": "Smokelift GPU", "tagline": "Lets Smokelift render on the graphic
 
 GPU_ADD_ON = '''"""Taichi for the extension Smokelift, which finds it here: there is nothing to register."""
 
+import sys
+from pathlib import Path
+
+PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
+
 
 def register() -> None:
-    pass
+    if not Path(__file__).with_name(f"python{PYTHON}").is_dir():
+        raise RuntimeError(f"This zip is not for Python {PYTHON}: install the one that ends as that of Smokelift does.")
 
 
 def unregister() -> None:

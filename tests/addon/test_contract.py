@@ -13,9 +13,13 @@ from hypothesis import strategies as st
 
 from addon import contract
 from addon.pace import paced
+from addon.pictures import Pictures, pictures_from
 from addon.toml import dumps
+from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.commands import continue_, loop, retime
 from smokelift.direct import new_sequence, playback
+from smokelift.footage.frame_source import ClipError
+from smokelift.footage.image_sequence import numbered_pictures
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.layout import INDEX, frame_path, proxy_path
@@ -37,6 +41,18 @@ def test_names_are_the_engines() -> None:
     assert contract.MADE_UP in get_args(Origin)
     assert contract.QUALITIES == QUALITIES
     assert sorted(contract.SIDES) == sorted(SIDES)
+
+
+def test_zips_are_called_as_they_are_built() -> None:
+    assert contract.BLENDERS == NAMED
+    assert sorted(contract.PLATFORMS.values()) == sorted(platform.name for platform in PLATFORMS)
+    for (system, processor), name in contract.PLATFORMS.items():
+        (platform,) = (each for each in PLATFORMS if each.name == name)
+        assert (platform.markers["sys_platform"], platform.markers["platform_machine"].lower()) == (system, processor)
+        for python in NAMED:
+            names = {"blenders": contract.BLENDERS[python], "platform": name.replace("-", "_")}
+            built = Product("smokelift", "1.2.3", platform, python)
+            assert contract.ZIP_FILE.format(version="1.2.3", **names) == built.file
 
 
 def test_resolutions() -> None:
@@ -74,6 +90,33 @@ def test_pictures() -> None:
         else:
             with pytest.raises(SceneError, match="image"):
                 EnvironmentLight(Path(f"sky{suffix}"))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"frame_{n:04d}.png" for n in range(17, 30) if n not in (23, 26)],
+        ["a9.png", "a10.png", "a12.png"],
+        ["a09.png", "a10.png", "a7.png", "a00012.png"],
+        ["shot2_7.exr", "shot2_8.exr", "shot1_9.exr", "shot2_9.png"],
+        ["scan_1.png", "scan_2.png", "scan_90.png"],
+        ["one.png"],
+        ["a-1.png", "a0.png", "a1.png"],
+    ],
+)
+def test_a_sequence_has_the_pictures_that_the_engine_finds(tmp_path, names) -> None:
+    """From any of its pictures on, with those that are missing."""
+    for name in names:
+        (tmp_path / name).touch()
+    for name in names:
+        found = pictures_from(tmp_path / name)
+        try:
+            files = numbered_pictures(tmp_path / name)
+        except ClipError:
+            assert found is None
+            continue
+        if found is not None:  # of the others nothing is said
+            assert found == Pictures(len(files), tuple(file.name for file in files if not file.is_file()))
 
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]))

@@ -12,6 +12,7 @@ from textwrap import indent
 
 import pytest
 
+import addon
 import smokelift_command
 from addon import job as module
 from addon.job import EngineMissingError, Job, Queue, engine_command
@@ -290,11 +291,36 @@ def test_libraries_that_are_shipped_come_first(tmp_path, monkeypatch) -> None:
     assert os.pathsep.join(map(str, (own, gpu))) in engine_command([])
 
 
-def test_the_zip_for_another_blender(tmp_path, monkeypatch) -> None:
-    (tmp_path / "python3.9").mkdir()
+@pytest.mark.parametrize(
+    ("folder", "platforms", "said"),
+    [
+        ("python3.9", '["linux-x64"]', r"Python 3\.9, .* install smokelift-1\.2\.3-blender4\.2-5\.0-linux_x64\.zip\."),
+        ("python3.11", '["windows-x64"]', r"for windows-x64 .* install smokelift-1\.2\.3-.*-linux_x64\.zip\."),
+        ("python3.11", '["linux-x64"]', None),
+    ],
+)
+def test_the_zip_for_another_blender_is_not_enabled(tmp_path, monkeypatch, folder, platforms, said) -> None:
+    """The error names the one that fits; a run says the same."""
+    (tmp_path / folder).mkdir()
+    (tmp_path / "blender_manifest.toml").write_text(f'version = "1.2.3"\nplatforms = {platforms}\n')
     monkeypatch.setattr(module, "HOME", tmp_path)
-    with pytest.raises(EngineMissingError, match=r"Blenders with python3\.9, and this one has python3"):
-        engine_command([])
+    monkeypatch.setattr(module, "LIBRARIES", "python3.11")
+    monkeypatch.setattr(module.sys, "platform", "linux")
+    monkeypatch.setattr(module.platform, "machine", lambda: "x86_64")
+    if said is None:
+        assert str(tmp_path / folder) in engine_command([])
+        return
+    for ask in (addon.register, lambda: engine_command([])):
+        with pytest.raises(EngineMissingError, match=said):
+            ask()
+
+
+def test_a_blender_that_there_is_no_zip_for(tmp_path, monkeypatch) -> None:
+    (tmp_path / "python3.11").mkdir()
+    monkeypatch.setattr(module, "HOME", tmp_path)
+    monkeypatch.setattr(module, "LIBRARIES", "python3.14")
+    with pytest.raises(EngineMissingError, match=r"with Python 3\.14, for which there is none\."):
+        addon.register()
 
 
 # queues

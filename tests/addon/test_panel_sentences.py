@@ -7,7 +7,7 @@ from string import Formatter
 
 import pytest
 
-from addon.sentences import SENTENCES, sentence
+from addon.sentences import SENTENCES, match, sentence, spent
 from smokelift.report.sentences import SENTENCES as OWN
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
@@ -55,11 +55,11 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
         ({"text": "As it is.", "kind": "black background", "figures": {}}, "As it is."),
         (
             {"text": "", "kind": "reconstructed", "figures": {"frames": 12, "seconds": 28.2, "psnr": 26.44}},
-            "12 frames made in 28 s. They match the clip to 26.4 dB; more is closer.",
+            "Match to the clip: fair (26.4 dB). 12 frames in 28 s.",
         ),
         (
             {"text": "", "kind": "looped", "figures": {"frames": 1, "seconds": 9, "first": 1, "last": 2}},
-            "1 frame made in 9 s, which repeat.",
+            "1 frame in 9 s, which repeat.",
         ),
         (
             {"text": "", "kind": "cut", "figures": {"before": 4, "after": 5, "first": 0, "last": 9}},
@@ -70,3 +70,20 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
 )
 def test_a_sentence(message, said) -> None:
     assert sentence(message) == said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.2, "1 s"), (59.4, "59 s"), (59.6, "1 min 0 s"), (387, "6 min 27 s"), (7380, "2 h 3 min")]
+)
+def test_a_time_in_words(seconds, said) -> None:
+    assert spent(seconds) == said
+
+
+@pytest.mark.parametrize(("psnr", "said"), [(41.0, "very good"), (34.0, "very good"), (33.9, "good"), (9.0, "poor")])
+def test_a_match_in_words(psnr, said) -> None:
+    assert match(psnr) == said
+
+
+def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
+    message = {"text": "", "kind": "dissolving smoke", "figures": {"frame": 70, "room": 8.0}}
+    assert sentence(message, before=39).startswith("From frame 109 on")

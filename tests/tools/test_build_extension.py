@@ -3,12 +3,13 @@
 import hashlib
 import os
 import tomllib
+from typing import Any
 
 import pytest
 
 import build_extension
 import extension_products
-from build_extension import pack
+from build_extension import GPU_ADD_ON, pack
 from engine_wheels import PYTHONS
 from extension_libraries import PINS
 from extension_products import PLATFORMS, Product
@@ -63,3 +64,13 @@ def test_an_artist_finds_the_zip_by_its_blender() -> None:
     assert len({product.file for product in products}) == len(products)
     assert products[0].file == "smokelift-1.0.0-blender4.2-5.0-linux_x64.zip"
     assert products[1].file == "smokelift-1.0.0-blender5.1-linux_x64.zip"
+
+
+def test_taichi_for_another_python_is_not_enabled(tmp_path) -> None:
+    (tmp_path / "__init__.py").write_text(GPU_ADD_ON)
+    found: dict[str, Any] = {"__file__": str(tmp_path / "__init__.py")}
+    exec(GPU_ADD_ON, found)
+    with pytest.raises(RuntimeError, match="not for Python 3"):
+        found["register"]()
+    (tmp_path / f"python{found['PYTHON']}").mkdir()
+    found["register"]()

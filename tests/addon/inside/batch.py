@@ -49,7 +49,7 @@ def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert [line for line in lines if line.startswith("frame ")][-1] == "frame 4 of 4"
-    assert any("4 frames made in" in line for line in lines)
+    assert any("4 frames in" in line for line in lines)
     take = Take(saved.parent / "smokelift" / "clip" / "take_0001")
     assert take.read().complete
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))

@@ -12,6 +12,7 @@ from addon import directing, smoke_takes, volume
 from addon.blender_scene import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
+from conftest import changed
 from smokelift.direct import BoxObstacle, Mesh
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import DOMAIN, write_plume
@@ -94,7 +95,10 @@ def solid(content: bytes, tmp_path) -> np.ndarray:
 # what the scene tells the engine
 
 
-def test_frames_are_those_of_the_scene(shot, result) -> None:
+def test_frames_are_those_of_the_clip(shot, result) -> None:
+    """Wherever the smoke stands in the scene's time, and whichever frames of the clip it was made of."""
+    with changed(volume.shown_take(result)) as index:
+        index["scene"]["clip"]["frames"] = [39, 44]
     settings = result.smokelift.directing
     settings.frames, settings.fade = 10, 4
     assert directing.engine_request(result) == ("continue", ["--frames", "10", "--fade", "4", "--room", "8.000000"], [])
@@ -102,9 +106,11 @@ def test_frames_are_those_of_the_scene(shot, result) -> None:
     settings.use_dissipation = True
     assert directing.engine_request(result)[1][-4:] == ["--buoyancy", "-0.500000", "--dissipation", "0.000000"]
     result.data.frame_start = 101
-    settings.use_start, settings.start = True, 105
+    settings.use_start = True
+    assert settings.start == 45
+    settings.start = 44
     assert directing.engine_request(result)[1][-2:] == ["--start", "5"]
-    for frame, said in ((102, "4 frames are needed"), (107, "from 101 to 106")):
+    for frame, said in ((41, "4 frames are needed"), (46, "from 40 to 45")):
         settings.start = frame
         with pytest.raises(ShotError, match=said):
             directing.engine_request(result)
@@ -225,7 +231,9 @@ def test_retime_and_loop(result) -> None:
     assert len(directing.engine_request(result)[1]) == 4
     settings.direction = "loop"
     assert directing.engine_request(result)[:2] == ("loop", [])
-    settings.use_part, settings.part_first, settings.part_last, settings.overlap = True, 2, 6, 2
+    settings.use_part = True
+    assert (settings.part_first, settings.part_last) == (1, 6)
+    settings.part_first, settings.part_last, settings.overlap = 2, 6, 2
     assert directing.engine_request(result)[1] == ["--frames", "2:6", "--overlap", "2"]
     settings.part_last = 4
     with pytest.raises(ShotError, match="4 frames"):
@@ -258,6 +266,23 @@ def test_frames_of_a_stopped_run_do_not_stay_on_show(result, tmp_path, outcome) 
     assert volume.shown_take(result) == take
     smoke_takes.show_while_made(result, take, shown, outcome)
     assert volume.shown_take(result) == (take if outcome == "done" else shown)
+
+
+def test_what_the_artist_shows_while_a_run_goes_on_stays(result, tmp_path) -> None:
+    """Also the result from before, unless it is an undo that brings that back."""
+    shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
+    shutil.copytree(shown.directory, take.directory)
+    rows = bpy.context.window_manager.smokelift.jobs
+    for outcome in ("running", "waiting"):
+        row = rows.add()
+        row.take, row.smoke_uid, row.outcome = str(take.directory), result.session_uid, outcome
+    smoke_takes.show_while_made(result, take, shown, "running")
+    assert [row.left for row in rows] == [False, False]
+    assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
+    assert volume.shown_take(result) == shown
+    assert [row.left for row in rows] == [True, False]
+    assert bpy.ops.smokelift.show_take(take=str(take.directory)) == {"FINISHED"}
+    assert [row.left for row in rows] == [False, False]
 
 
 # the pace that is tried out

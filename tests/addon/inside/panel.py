@@ -6,7 +6,8 @@ from typing import Any
 import bpy
 import pytest
 
-from addon import advanced_panel, direct_panel, element, panel, shot_check, volume
+from addon import advanced_panel, batch, direct_panel, element, panel, shot_check, volume
+from addon.clip_table import clip_table
 from addon.contract import QUALITIES
 from conftest import changed, made
 from tests.example_shot import smoke
@@ -103,12 +104,44 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     settings = smoke(shot).smokelift.directing if name == "overlap" else smoke(shot).smokelift
     smoke(shot).smokelift.directing.direction = "loop"
     panels = (advanced_panel.SMOKELIFT_PT_view_advanced, direct_panel.SMOKELIFT_PT_view_direct)
-    words = drawn(shot, *panels).count("Automatic")
+
+    def words() -> int:
+        return [text.strip() for text in drawn(shot, *panels)].count("Automatic")
+
+    before = words()
     setattr(settings, f"use_{name}", True)
     assert getattr(settings, name) > 0
-    assert drawn(shot, *panels).count("Automatic") == words - 1
+    assert words() == before - 1
     setattr(settings, f"use_{name}", False)
     assert getattr(settings, name) == 0
+
+
+def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> None:
+    """And those that Blender does not know of because they were written after it read the first ones."""
+    image = bpy.data.images.new("frame", 48, 32)
+    for number in (17, 18, 20, 21, 22):
+        image.save(filepath=str(tmp_path / f"frame_{number:04d}.png"))
+    settings = smoke(scene).smokelift
+    settings.clip = bpy.data.movieclips.load(str(tmp_path / "frame_0017.png"))
+
+    def said() -> str:
+        bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
+        return " ".join(text.strip() for text in drawn(scene, panel.SMOKELIFT_PT_view))
+
+    assert (settings.first, settings.last) == (1, 2)
+    assert "Missing: frame_0019.png." in said() and "Blender sees 2 of 6 frames." in said()
+    batch._smoke(batch._parser().parse_args([]))
+    assert "up to its frame 1 of 5 (frame_0019.png missing)" in capsys.readouterr().out
+    assert bpy.ops.smokelift.use_all_files() == {"FINISHED"}
+    assert clip_table(smoke(scene))["frames"] == [0, 5]
+    assert "Missing: frame_0019.png." in said() and "Blender sees" not in said()
+    image.save(filepath=str(tmp_path / "frame_0023.png"))
+    assert "Blender sees 2 of 7 frames." in said()
+    (tmp_path / "frame_0019.png").touch()
+    bpy.ops.smokelift.use_all_files()
+    assert "Missing" not in said() and "Blender sees" not in said()
+    settings.last = 1
+    assert "Missing" not in said()
 
 
 def test_every_quality_says_what_it_takes_and_loses(shot) -> None:

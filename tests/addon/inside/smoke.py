@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon import paths, run, smoke_takes, volume
+from addon import paths, run, shot_setup, smoke_takes, volume
 from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke
 from addon.take import Take, takes
 from conftest import changed, made
@@ -67,6 +67,21 @@ def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
     assert take.read().resumable
 
 
+def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    rows, written = bpy.context.window_manager.smokelift.jobs, [smoke_takes.write_take(obj) for _ in range(3)]
+    for take in written:
+        row = rows.add()
+        row.take, row.smoke_uid = str(take.directory), obj.session_uid
+    rows[0].outcome = "running"
+    assert bpy.ops.smokelift.cancel(take=str(written[1].directory)) == {"FINISHED"}
+    assert [row.take for row in rows] == [str(written[0].directory), str(written[2].directory)]
+    assert takes(tmp_path) == [written[0], written[2]]
+    assert bpy.ops.smokelift.cancel() == {"FINISHED"}
+    assert [row.cancel for row in rows] == [True, False]
+
+
 @pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
 def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
     cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
@@ -80,6 +95,46 @@ def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
         cube.data.vertices[0].co.x = -2.0
     hide_default_cube(scene)
     assert cube.hide_render == cube.hide_viewport == (change is None)
+
+
+@pytest.mark.parametrize("change", [None, "location", "energy", "animated", "hidden", "scene"])
+def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(scene, clip, tmp_path, change) -> None:
+    """Set Up Shot hides it and says so; a lamp that anybody changed, or that the smoke was made with, stays."""
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    lamp, obj = scene.objects["Light"], new_smoke(scene, bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4")))
+    for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
+        setattr(obj.smokelift, name, False)
+    if change == "location":
+        lamp.location.x += 1.0
+    elif change == "energy":
+        lamp.data.energy = 100.0
+    elif change == "animated":
+        lamp.keyframe_insert("location", frame=1)
+    elif change == "hidden":
+        lamp.hide_render = True
+    elif change == "scene":
+        obj.smokelift.light_mode = "SCENE"
+    take = made(tmp_path)
+    with changed(take) as index:
+        index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
+    volume.show(obj, take)
+    hidden, further = shot_setup.set_up(obj, take, take.read().index)
+    assert hidden == (change is None)
+    assert lamp.hide_viewport == (change is None)
+    assert lamp.hide_render == (change in (None, "hidden"))
+    assert further == (["Light"] if change in ("location", "energy", "animated") else [])
+    assert scene.cycles.samples == shot_setup.SAMPLES
+
+
+def test_samples_that_the_artist_chose_stay(shot, tmp_path) -> None:
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    for samples, wanted in ((4096, shot_setup.SAMPLES), (4096, shot_setup.SAMPLES), (128, 128)):
+        shot.cycles.samples = samples
+        smoke(shot).smokelift.set_up_plate = smoke(shot).smokelift.set_up_camera = False
+        assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+        assert shot.cycles.samples == wanted
 
 
 def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
@@ -162,12 +217,12 @@ def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:
 
 
 def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
-    """The range is the clip's and follows a longer result; the playhead goes to smoke unless it shows some."""
+    """The range is the result's, also of one that is still made; the playhead goes to smoke unless it shows some."""
     obj = new_smoke(scene, clip)
     obj.smokelift.camera_mode = "SCENE"
     take = with_masses(tmp_path, [0.0, 0.0, 1.0, 1.0])
     smoke_takes.present(obj, take)
-    assert (scene.frame_start, scene.frame_end) == (1, clip.frame_duration)
+    assert (scene.frame_start, scene.frame_end) == (11, 14)
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 13
     scene.frame_set(14)
@@ -175,17 +230,38 @@ def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
     assert scene.frame_current == 14
     scene.frame_set(16)
     begun = with_masses(tmp_path / "begun", [1.0, 1.0], planned=6)
+    with changed(begun) as index:
+        index["complete"] = False
     smoke_takes.present(obj, begun)
+    assert (scene.frame_start, scene.frame_end) == (11, 16)
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 16
     longer = with_masses(tmp_path / "longer", [1.0] * 80)
     smoke_takes.present(obj, longer)
     assert scene.frame_end == 90
     bpy.ops.smokelift.match_clip()
-    assert (scene.frame_start, scene.frame_end) == (1, 90)
+    assert (scene.frame_start, scene.frame_end) == (11, 90)
     scene.frame_end = 60
     smoke_takes.present(obj, take)
     assert scene.frame_end == 60
     empty = with_masses(tmp_path / "empty", [0.0, 0.0])
     smoke_takes.present(obj, empty)
     assert not volume.go_to_smoke(obj)
+
+
+def test_the_range_is_that_of_what_is_used_or_shown(scene, clip, tmp_path) -> None:
+    """Before a run that of the used frames, then the result's; of several smokes all; a longer one of a result is."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.camera_mode = "SCENE"
+    obj.smokelift.first, obj.smokelift.last = 10, 20
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (10, 20)
+    smoke_takes.present(obj, with_masses(tmp_path, [1.0] * 8))
+    assert (scene.frame_start, scene.frame_end) == (11, 18)
+    continued = with_masses(tmp_path / "continued", [1.0] * 30, planned=8)
+    smoke_takes.present(obj, continued)
+    assert (scene.frame_start, scene.frame_end) == (11, 40)
+    other = new_smoke(scene, clip)
+    other.smokelift.first, other.smokelift.last = 3, 5
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (3, 40)

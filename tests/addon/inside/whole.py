@@ -130,7 +130,7 @@ def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
 def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None:
     """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead goes to it."""
     bpy.ops.mesh.primitive_cube_add(size=2.0)
-    cube = scene.objects["Cube"]
+    cube, lamp = scene.objects["Cube"], lamp_of_a_new_file(scene)
     scene.frame_set(7)
     activate(smoke(scene), scene)
     smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
@@ -145,10 +145,18 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
     assert not row.warnings
     whole, within = look_alike(scene, tmp_path)
+    assert lamp.hide_render and lamp.hide_viewport
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
     assert whole > WANTED_DB + 5
     assert within > WANTED_DB
     assert scene.camera.name == "Smokelift Camera"
+
+
+def lamp_of_a_new_file(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Add it."""
+    lamp = add(scene, "Light", bpy.data.lights.new("Light", "POINT"))
+    lamp.location, lamp.data.energy = (4.0762453, 1.0054539, 5.9038620), 1000.0
+    return lamp
 
 
 def test_a_camera_that_moves(shot, tmp_path) -> None:
@@ -183,7 +191,7 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
         assert psnr(picture, wanted) > WANTED_DB + 5
 
 
-def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
+def test_the_check_says_what_a_run_takes_and_assumes(shot, monkeypatch) -> None:
     bpy.ops.smokelift.check()
     state = bpy.context.window_manager.smokelift
     assert state.check_done
@@ -197,8 +205,16 @@ def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
     assert "Background: " in state.notes
     assert len(state.notes.split("\n")) <= 5
     assert bpy.ops.smokelift.show_page() == {"FINISHED"}
-    page = bpy.data.images[shot_check.page_file().name]
+    page = bpy.data.images[Path(state.check_page).name]
     assert page.size[0] > 1000
+    known = draft.seconds, state.notes, state.check_page
+    with monkeypatch.context() as blocked:
+        blocked.setattr(shot_check, "Job", None)  # a shot that was checked before is not measured anew
+        state.notes, state.check_done = "", False
+        state.costs.clear()
+        bpy.ops.smokelift.check()
+        assert state.check_done
+        assert (state.costs[0].seconds, state.notes, state.check_page) == known
     shot.camera = None
     bpy.ops.smokelift.check()
     assert not state.check_done
@@ -266,7 +282,8 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     for obj in (left, right):
         activate(obj, shot)
         assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
-    assert [[take.directory.name for take in takes(folder)] for folder in folders] == [["take_0002"], ["take_0002"]]
+    names = [[take.directory.name for take in takes(folder)] for folder in folders]
+    assert names == [["take_0001", "take_0002"], ["take_0001", "take_0002"]]  # the file before may show them
     bpy.ops.wm.save_mainfile()
 
     moved = (tmp_path / "root").rename(tmp_path / "moved")

@@ -99,6 +99,18 @@ sys.exit(batch.main(sys.argv[1:]))
     return [sys.executable, "-c", start, *words]
 
 
+def test_a_zip_for_another_blender_is_not_enabled() -> None:
+    """It says so at once; where Blender's own version is the wrong one, Blender does."""
+    (other,) = set(ZIP.parent.glob("smokelift-*-linux_x64.zip")) - {ZIP}
+    with pytest.raises(RuntimeError) as refused:
+        install(other)
+    said = str(refused.value)
+    assert f"install {ZIP.name}" in said or "This zip" not in said
+    assert MODULE not in bpy.context.preferences.addons
+    if extension().exists():
+        uninstall("smokelift")
+
+
 def test_installs_from_disk() -> None:
     """The zip is all that is needed, Blender's own numpy stays the only one, and little of the disk is taken."""
     assert not extension().exists()

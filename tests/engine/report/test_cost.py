@@ -1,9 +1,12 @@
 """Costs: what a run takes; a grid that does not fit is refused before it is made, with one that fits."""
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
+import psutil
 import pytest
 
 from smokelift.report import cost
@@ -165,3 +168,16 @@ def test_time_without_detail_and_of_the_papers_method(monkeypatch) -> None:
     detailed, smooth, papers = (estimate_cost(SIZES["cube"], work, PREPARED).seconds for work in (WORK, SMOOTH, paper))
     assert 1.5 * smooth < detailed < 2.5 * smooth
     assert papers > 5 * smooth
+
+
+def test_other_work_on_the_machine_does_not_change_a_forecast() -> None:
+    """Three busy programs for each processor make a solve take several times as long, and no more of the processor."""
+    alone = cost._seconds_a_voxel.__wrapped__()
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(3 * (psutil.cpu_count() or 1))]
+    try:
+        beside = cost._seconds_a_voxel.__wrapped__()
+    finally:
+        for program in busy:
+            program.kill()
+            program.wait()
+    assert beside == pytest.approx(alone, rel=0.6)
