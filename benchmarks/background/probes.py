@@ -116,7 +116,7 @@ def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
     clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
     plates = known_plate(plate, clip) if given else find_backdrop(clip, None, None).plates
     samples = sample_smoke(clip, plates)
-    _, source = with_source(Backdrop("given", clip, plates), clip, samples.smoky, None)
+    _, source = with_source(Backdrop("given", clip, plates), clip, samples.smoky)
     bright = source_radiance(samples)
     return ["undetermined" if source is None else f"{source.mean() / true:.2f}", f"{bright.mean() / true:.2f}"]
 

@@ -245,7 +245,7 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     picture, plate = observation.image, observation.plate
     if observation.element is not None or backdrop_colour(plate.image) is not None:
         return observation
-    source = usual_source([(picture, plate)], np.array(scene.medium.color), camera.size)
+    source = usual_source([(picture, plate)], camera.size)
     return replace(observation, element=extract_element(picture, plate, source, camera.size))
 
 

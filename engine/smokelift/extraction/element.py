@@ -136,11 +136,11 @@ def source_of(fields: Picture, source: Picture) -> Picture:
     return np.asarray(source * brightness * np.exp(fields[..., 2:] @ CHROMA_BASIS.T), np.float32)
 
 
-def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture | None, size: tuple[int, int]) -> Picture:
+def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int]) -> Picture:
     """Return the usual J (3,) of a clip's smoke from some of its pictures: S over opacity, by least squares.
 
-    It is first what brightens the plates most, or as bright as the brightest pixels if nothing does; and of a ``color``
-    (3,), if that is given. The pictures are reduced to a ``size`` (columns, rows).
+    It is first what brightens the plates most, or white and as bright as the brightest pixels if nothing does. The
+    pictures are reduced to a ``size`` (columns, rows).
     """
     finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
     seen = [Cells.of(picture, plate, size, finer) for picture, plate in pictures]
@@ -150,8 +150,6 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], color: Picture | Non
     else:
         brightest = [np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]
         first = np.full(3, np.mean(brightest))
-    if color is not None:
-        first = np.asarray(color, np.float64) / np.mean(color) * np.mean(first)
     source = np.asarray(np.maximum(first, MIN_SOURCE), np.float32)
     for _ in range(SOURCE_ROUNDS):
         total, squares = np.zeros(3), 0.0

@@ -18,7 +18,6 @@ from smokelift.extraction.source import clip_source
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, reduced_size
 from smokelift.footage.plate import Plate, Plates
-from smokelift.scene import Medium
 
 FRAMES, SIDE, TURNS = 8, 96, 4
 """Frames that are extracted, cells along their longer side, and turns. More frames and turns change T rms by .001,
@@ -34,18 +33,16 @@ CLEAR_TRANSMITTANCE = 0.02
 """Lower bound of T, for division."""
 
 
-def plates_and_source(
-    clip: Clip, shot: Clip, plates: Plates, smoky: Sequence[int], medium: Medium | None
-) -> tuple[Plates, Picture]:
+def plates_and_source(clip: Clip, shot: Clip, plates: Plates, smoky: Sequence[int]) -> tuple[Plates, Picture]:
     """Return the plates of a clip, better known if they were found in its ``shot``, and its smoke's source radiance.
 
-    Both clips are at the plates' exposure; ``smoky`` and ``medium`` are those of `clip_source`.
+    Both clips are at the plates' exposure; ``smoky`` are the frames of `clip_source`.
     """
-    source = clip_source(clip, plates, smoky, medium)
+    source = clip_source(clip, plates, smoky)
     if not isinstance(plates, Plate):
         return plates, source
     better = plate_in_turn(shot, plates, source)
-    return better, source if better is plates else clip_source(clip, better, smoky, medium)
+    return better, source if better is plates else clip_source(clip, better, smoky)
 
 
 def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:

@@ -10,7 +10,6 @@ from smokelift.extraction.element import MODEL_ERROR, extract_element, usual_sou
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, reduced_size
 from smokelift.footage.plate import Plates
-from smokelift.scene import Medium
 
 SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and cells along their longer side, from which the source radiance is found."""
@@ -24,15 +23,13 @@ HUE = 2 * MODEL_ERROR
 model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
 
 
-def clip_source(clip: Clip, plates: Plates, frames: Sequence[int], medium: Medium | None) -> Picture:
+def clip_source(clip: Clip, plates: Plates, frames: Sequence[int]) -> Picture:
     """Return the usual source radiance (3,) of a clip's smoke before its plates, from the first of some frames.
 
-    ``frames`` (one at least) have those with the most smoke first. A ``medium`` that is given has the color that the
-    search starts from.
+    ``frames`` (one at least) have those with the most smoke first.
     """
     shown = [(clip.stored(frame).linear(), plates.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
-    color = None if medium is None else np.array(medium.color, np.float32)
-    return usual_source(shown, color, reduced_size(*clip.size, SOURCE_SIDE))
+    return usual_source(shown, reduced_size(*clip.size, SOURCE_SIDE))
 
 
 def brightest_smoke(clip: Clip, plates: Plates, frame: int, source: Picture) -> float:

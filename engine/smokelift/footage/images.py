@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import struct
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -51,6 +52,7 @@ FOREIGN_ERRORS = (
     ValueError,
     LookupError,
     SyntaxError,
+    struct.error,
     OSError,
     Image.DecompressionBombError,
 )

@@ -99,7 +99,7 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     clip
         The footage; it has to stay open while elements are computed.
     scene
-        Whatever is known of the shot; its background and the color of its medium count.
+        Whatever is known of the shot; its background counts.
 
     Returns
     -------
@@ -126,4 +126,4 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     found = find_backdrop(clip, scene.camera, scene.background)
     exposed = evened(found.clip, found.plates)
     smoky = sample_smoke(found.clip, found.plates).smoky or range(len(clip))
-    return Extraction(exposed, *plates_and_source(exposed, found.shot_of(exposed), found.plates, smoky, scene.medium))
+    return Extraction(exposed, *plates_and_source(exposed, found.shot_of(exposed), found.plates, smoky))

@@ -139,7 +139,7 @@ def first_estimate(
         light = firelight(exposed, doused)
         fire, exposed = Fire(hot.share, light, flame_color or fire_colour(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
-    plates, source = with_source(found, exposed, samples.smoky, medium)
+    plates, source = with_source(found, exposed, samples.smoky)
     if plates is not found.plates:
         # what no frame shows clear is unknown, although turns say what is behind it
         again = sample_smoke(exposed, plates)
@@ -147,9 +147,7 @@ def first_estimate(
     return FirstEstimate(exposed, found, plates, samples, fire, hot, source)
 
 
-def with_source(
-    found: Backdrop, clip: Clip, smoky: Sequence[int], medium: Medium | None
-) -> tuple[Plates, Picture | None]:
+def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plates, Picture | None]:
     """Return the plates of a clip, found in turn with its smoke, and the usual source radiance (3,) of that.
 
     There is none before what does not show T: black, one color, or a picture that is as good as one; and without
@@ -157,7 +155,7 @@ def with_source(
     """
     if not smoky or backdrop_colour(found.plates.at(smoky[0]).image) is not None:
         return found.plates, None
-    plates, source = plates_and_source(clip, found.shot_of(clip), found.plates, smoky, medium)
+    plates, source = plates_and_source(clip, found.shot_of(clip), found.plates, smoky)
     return (plates, source) if shows_transmittance(plates.at(smoky[0]).image, source) else (found.plates, None)
 
 

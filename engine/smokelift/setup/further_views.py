@@ -99,7 +99,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     found = find_backdrop(opened, camera, background)
     try:
         exposed, smoky = evened(found.clip, found.plates), sample_smoke(found.clip, found.plates).smoky
-        plates, source = with_source(found, exposed, smoky, scene.medium)
+        plates, source = with_source(found, exposed, smoky)
         shown = replace(ShotView.before(scene.domain, exposed, camera, plates), source=source)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
