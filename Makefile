@@ -54,6 +54,7 @@ lint: $(VENV)/tools.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror cpp/*.cpp cpp/*.h
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 $(VENV)/pip.stamp: pyproject.toml
 	@[ -n "$(PYTHON)" ] || { echo "Smokelift needs Python 3.11, 3.12 or 3.13 with venv; install one, or say make PYTHON=/path/to/python3." >&2; exit 2; }
