@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from ctypes.util import find_library
 from pathlib import Path
 
 import smokelift
@@ -37,6 +38,11 @@ def why_it_ended(ended: subprocess.CompletedProcess[str]) -> str:
     if status < 0:
         return f"Crashed with {signal.Signals(-status).name}."
     return ((ended.stderr or "").strip().splitlines() or [f"Ended with status {status}."])[-1]
+
+
+def finds_llvm() -> bool:
+    """Whether Dr.Jit finds its compiler; without one it aborts the process."""
+    return "DRJIT_LIBLLVM_PATH" in environment() or find_library("LLVM") is not None
 
 
 def _llvm() -> dict[str, str]:

@@ -180,9 +180,8 @@ class _Stage:
     def row(self, peer: str, lights: int = 1) -> Row:
         """Run a peer in a process of its own and score its image and gradient, unless there are several lights."""
         row = replace(self._empty, peer=peer, lights=lights)
-        missing = PEERS[peer].missing
-        if missing:
-            return replace(row, failure=f"not installed: pip install {' '.join(missing)}")
+        if needs := PEERS[peer].needs:
+            return replace(row, failure=needs)
         result = run_apart(peer, self._folder, lights, self._device)
         if result.failure:
             row = replace(row, failure=result.failure)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from benchmarks import process
-from benchmarks.renderer import reference, worker
-from benchmarks.renderer.peers import OURS, PEERS
+from benchmarks.renderer import peers, reference, worker
+from benchmarks.renderer.peers import OURS, PEERS, Peer
 from benchmarks.renderer.run import EXACT
 from benchmarks.renderer.scene import bench_scene, plume
 
@@ -53,13 +53,23 @@ def once(peer: str, folder: Path) -> dict[str, np.ndarray]:
 
 
 def test_exact_peer(stage):
-    if PEERS["drjit"].missing:
-        pytest.skip(f"pip install {' '.join(PEERS['drjit'].missing)}")
+    if needs := PEERS["drjit"].needs:
+        pytest.skip(needs)
     folder, scene = stage
     out = once("drjit", folder)
     image, gradient = reference.image_and_gradient(scene)
     assert distance(out["image"], image) < 1e-6
     assert distance(out["gradient"], gradient) < EXACT / 10
+
+
+def test_a_peer_says_what_it_needs(monkeypatch):
+    """Dr.Jit aborts the process where it finds no LLVM, so that is asked before."""
+    python = Peer("a module that there is", "ours", ("numpy",))
+    monkeypatch.setattr(peers, "finds_llvm", lambda: True)
+    assert not python.needs and not PEERS[OURS].needs
+    assert replace(python, packages=("nowhere",)).needs == "not installed: pip install nowhere"
+    monkeypatch.setattr(peers, "finds_llvm", lambda: False)
+    assert python.needs.startswith("Dr.Jit finds no LLVM") and not PEERS[OURS].needs
 
 
 def test_paper_has_nearly_the_image_and_another_derivative(stage):
@@ -71,8 +81,8 @@ def test_paper_has_nearly_the_image_and_another_derivative(stage):
 
 
 def test_mitsuba_sees_the_same_smoke(stage):
-    if PEERS["mitsuba-16"].missing:
-        pytest.skip(f"pip install {' '.join(PEERS['mitsuba-16'].missing)}")
+    if needs := PEERS["mitsuba-16"].needs:
+        pytest.skip(needs)
     folder, scene = stage
     result = worker.run_apart("mitsuba-16", folder)
     assert not result.failure

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.process import finds_llvm
+
 
 @dataclass(frozen=True)
 class Iteration:
@@ -64,6 +66,15 @@ class Peer:
     def missing(self) -> tuple[str, ...]:
         """The packages that are not installed."""
         return tuple(name for name in self.packages if find_spec(name) is None)
+
+    @property
+    def needs(self) -> str:
+        """What has to be installed before it can run, one sentence; else empty."""
+        if self.missing:
+            return f"not installed: pip install {' '.join(self.missing)}"
+        if self.packages and not finds_llvm():  # they all compile with Dr.Jit
+            return "Dr.Jit finds no LLVM: install one (Debian: apt install llvm), or set DRJIT_LIBLLVM_PATH to libLLVM."
+        return ""
 
 
 OURS = "smokelift"
