@@ -134,7 +134,7 @@ def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, 
 def test_one_sentence_says_that_a_buoyancy_contradicts_the_clip(finished, tmp_path, capsys, monkeypatch) -> None:
     figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
     monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(7, figures), (8, figures)]))
-    start = ("continue", finished, "--out", tmp_path / "out", "--frames", 2, "--progress", "json")
+    start = ("continue", finished, "--out", tmp_path / "out", "--frames", 2, "--npz", "--progress", "json")
     assert command(*start) == 0
     (sentence,) = [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
     assert "without buoyancy: one of -0.4 m/s2 was fitted, but the smoke of the clip rises" in sentence
