@@ -100,11 +100,13 @@ sys.exit(batch.main(sys.argv[1:]))
 
 
 def test_a_zip_for_another_blender_is_not_enabled() -> None:
-    """It says so at once; where Blender's own version is the wrong one, Blender does."""
+    """It says so at once; where Blender's own version is the wrong one, Blender does, in 5.2 without an exception."""
     (other,) = set(ZIP.parent.glob("smokelift-*-linux_x64.zip")) - {ZIP}
-    with pytest.raises(RuntimeError) as refused:
+    said = ""
+    try:
         install(other)
-    said = str(refused.value)
+    except RuntimeError as refused:
+        said = str(refused)
     assert f"install {ZIP.name}" in said or "This zip" not in said
     assert MODULE not in bpy.context.preferences.addons
     if extension().exists():
