@@ -57,11 +57,10 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
     pictures = [clip.stored(frame).averaged(*finer) for frame in clip.spread(FRAMES)]
     pixels = clip.size[0] * clip.size[1] / (finer[0] * finer[1])
     first = found = plate.through(lambda part: area_average(part, *finer), pixels)
-    behind, unknown = (area_average(part, *size) for part in (first.image, (1 - first.confidence)[..., None]))
+    behind = area_average(first.image, *size)
     variance = float(np.trace(plate.errors)) / 3
-    change, left = np.zeros_like(behind), np.ones_like(unknown)
     for _ in range(TURNS):
-        best, clearest = np.zeros_like(unknown), behind
+        best, clearest = np.zeros_like(behind[..., :1]), behind
         for picture in pictures:
             shown, weight = _shown(Cells.of(picture, found, size), source)
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
