@@ -5,7 +5,7 @@ hides. ``images`` reads and resizes single pictures; ``colour`` knows how files 
 
 ``backdrop`` decides on a small copy of the file (``proxy``) what stands behind the smoke: what ``given_background``
 reads, or one colour or a picture, as ``background_kind`` ranks them. ``clear_picture`` makes the picture from frames
-that show it clear, and ``behind_smoke`` continues it where none does. If the camera moves (``camera_motion``), frames
+that show it clear, and ``inpainting`` continues it where none does. If the camera moves (``camera_motion``), frames
 are ``registered`` by a ``similarity`` each.
 ``noise`` measures the clip's noise. ``matte`` finds the smoke: it differs from the ``plate`` by more than noise.
 ``working_picture`` cuts out the small picture that a grid is fitted to.

@@ -18,12 +18,12 @@ import numpy as np
 
 from smokelift.checks.array_types import Mask
 from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
-from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.given_background import given_plates, one_picture
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
+from smokelift.footage.inpainting import DETAIL
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.images import (
     Picture,
     area_average,
@@ -27,6 +26,7 @@ from smokelift.footage.images import (
     reduced_size,
     srgb_to_linear,
 )
+from smokelift.footage.inpainting import DETAIL
 from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, median_of_seen, spread_about
 from smokelift.footage.proxy import Proxy
 

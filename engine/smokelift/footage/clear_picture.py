@@ -25,10 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.behind_smoke import ISLAND, continuation_errors, in_one_piece, mostly_beside, push_pull
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Edges
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
+from smokelift.footage.inpainting import ISLAND, continuation_errors, in_one_piece, mostly_beside, push_pull
 from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 from smokelift.footage.proxy import Proxy

@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.behind_smoke import push_pull
 from smokelift.footage.frame_source import ClipError, StoredPicture
 from smokelift.footage.image_sequence import is_pattern, is_video, numbered_pictures
 from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image, reduced_size
+from smokelift.footage.inpainting import push_pull
 from smokelift.footage.video import Video
 
 HALF = 0.5

@@ -13,11 +13,11 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.behind_smoke import continuation_errors, push_pull
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_layer, srgb_to_linear
+from smokelift.footage.inpainting import continuation_errors, push_pull
 from smokelift.footage.plate import Plate, exposures, shown_behind
 
 PAINTED = 0.5
