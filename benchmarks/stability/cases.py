@@ -17,6 +17,7 @@ from benchmarks.stability.shot import TinyShot
 from smokelift.app.cli import main
 
 INSPECT = ("inspect", "scene.toml", "--quality", "draft", "--device", "cpu")
+EXTRACT = ("extract", "scene.toml", "--out", "new_####.exr", "--plate", "new.exr", "--device", "cpu")
 RENDER = ("render", "out", "--frame", "2", "--out", "new.png", "--device", "cpu")
 RESUME = ("reconstruct", "scene.toml", "--quality", "draft", "--device", "cpu", "--out", "out", "--npz", "--resume")
 
@@ -87,6 +88,18 @@ def state(shot: TinyShot, folder: Path, random: Damage) -> tuple[str, ...]:
     return RESUME
 
 
+def painted(shot: TinyShot, folder: Path, random: Damage) -> tuple[str, ...]:
+    """A damaged plate, mask, stroke or picture of what is extracted, or a scene file that says other things of them."""
+    shutil.copytree(shot.painted, folder)
+    names = ("plate.exr", "mask.png", "strokes.png", "frame_0001.png", "scene.toml")
+    path = folder / names[int(random.integers(len(names)))] if random else folder / "scene.toml"
+    if random and path.suffix == ".toml":
+        path.write_text(damaged_text(path.read_text(), random))
+    else:
+        _damage(path, random)
+    return EXTRACT
+
+
 DAMAGED: Mapping[str, tuple[Prepare, str]] = {
     "NumPy twin": (twin, "new"),
     "OpenVDB": (vdb, "new"),
@@ -97,6 +110,9 @@ DAMAGED: Mapping[str, tuple[Prepare, str]] = {
     "sequence.json": (index, "new"),
 }
 """How a case of each class of damaged files is made, and how the names begin that its command may write."""
+
+EXTRACTED: Mapping[str, tuple[Prepare, str]] = {"extraction": (painted, "new")}
+"""The same of those that came after the failing systems."""
 
 
 def damaged(prepare: Prepare, out: str, shot: TinyShot, place: Path, random: Damage) -> tuple[Ended, str]:
@@ -129,6 +145,7 @@ def damaged(prepare: Prepare, out: str, shot: TinyShot, place: Path, random: Dam
 CLASSES: Mapping[str, Callable[[TinyShot, Path, Damage], tuple[Ended, str]]] = {
     **{name: partial(damaged, *damage) for name, damage in DAMAGED.items()},
     **{name: partial(recovered, environment) for name, environment in ENVIRONMENTS.items()},
+    **{name: partial(damaged, *damage) for name, damage in EXTRACTED.items()},
 }
 """Each class by what runs one case of it. New ones go to the end: a class's place decides how its cases are drawn."""
 

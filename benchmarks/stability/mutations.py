@@ -46,6 +46,8 @@ def damaged_bytes(content: bytes, random: np.random.Generator) -> bytes:
     if kind == 0:
         return bytes(data[: int(random.integers(len(data)))])
     for _ in range(1 + int(random.integers(8))):
+        if not data:  # all of a small file is cut out
+            break
         near = int(min(random.exponential(200), len(data) - 1)) if random.random() < 0.5 else random.integers(len(data))
         place = int(near)
         if kind == 1:

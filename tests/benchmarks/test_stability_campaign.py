@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from benchmarks.stability.__main__ import failures, main
-from benchmarks.stability.cases import DAMAGED
+from benchmarks.stability.cases import DAMAGED, EXTRACTED
 from benchmarks.stability.environments import ENVIRONMENTS, Failure, lacking
 from benchmarks.stability.forked import Ended, Limits, run
 from benchmarks.stability.judge import verdict
@@ -50,7 +50,7 @@ def open_folder() -> Iterator[Path]:
         yield folder
 
 
-@pytest.mark.parametrize("name", DAMAGED)
+@pytest.mark.parametrize("name", [*DAMAGED, *EXTRACTED])
 def test_damaged_files_end_in_one_line(shot, tmp_path, name) -> None:
     statuses, failed = failures(shot, name, 1, tmp_path)
     assert failed == []
