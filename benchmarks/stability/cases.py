@@ -112,7 +112,7 @@ DAMAGED: Mapping[str, tuple[Prepare, str]] = {
 """How a case of each class of damaged files is made, and how the names begin that its command may write."""
 
 EXTRACTED: Mapping[str, tuple[Prepare, str]] = {"extraction": (painted, "new")}
-"""The same of those that came after the failing systems."""
+"""Classes of damaged files that came after the failing systems, made in the same way."""
 
 
 def damaged(prepare: Prepare, out: str, shot: TinyShot, place: Path, random: Damage) -> tuple[Ended, str]:
