@@ -12,7 +12,8 @@ from .paths import absolute, relative
 def copy_of(obj: bpy.types.Object, name: str) -> bpy.types.Object:
     """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made."""
     copy = bpy.data.objects.new(name, obj.data.copy())
-    copy.matrix_basis, copy.delta_location = obj.matrix_basis, obj.delta_location
+    copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
+    copy.matrix_basis = obj.matrix_basis
     return copy
 
 
