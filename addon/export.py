@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringPropert
 
 from . import smoke_takes, volume
 from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
-from .instances import copy_of, remove_scattered, scatter
+from .instances import copy_of
 from .job import EngineMissingError, Job
 from .needs import NeedsResult
 from .panel import draw_text
@@ -20,9 +20,6 @@ from .subpanel import OfResult
 
 REST_SECONDS = 0.4
 """Time without a change of settings before the size is estimated."""
-
-ASSET_TIMES = 8
-"""Different times that the instances in the asset have at most, spread over the sequence."""
 
 
 def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
@@ -124,27 +121,18 @@ def megabytes(count: float) -> str:
 
 
 def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
-    """Write a .blend beside an export with paths to the files there: the smoke as an asset, and instances of it."""
+    """Write a .blend beside an export with paths to the files there: the smoke as an asset."""
     copy = copy_of(smoke, smoke.name)
     copy.delta_location = (0.0, 0.0, 0.0)
     copy.data.filepath = str(folder / FRAME_FILE.format(_first(folder)))
     # as it is when the asset is used; nothing of this file but its material goes with it
     copy.location = (0.0, 0.0, 0.0)
-    frames = copy.data.frame_duration
-    times = min(ASSET_TIMES, frames)
-    points = scatter(copy, max(smoke.dimensions.xy), times, frames // times, True)
+    copy.asset_mark()
+    copy.asset_data.description = volume.provenance_note(smoke)
     try:
-        for asset in (copy, points):
-            asset.asset_mark()
-            asset.asset_data.description = volume.provenance_note(smoke)
-        bpy.data.libraries.write(str(folder / ASSET_FILE), {copy, points}, path_remap="RELATIVE_ALL", compress=True)
+        bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
     finally:
-        remove_scattered(points)
-        _remove(copy)
-
-
-def _remove(obj: bpy.types.Object) -> None:
-    bpy.data.volumes.remove(obj.data)  # takes the object with it
+        bpy.data.volumes.remove(copy.data)  # takes the object with it
 
 
 def _first(folder: Path) -> int:
@@ -200,7 +188,6 @@ class _ExportPanel(OfResult):
             draw_text(layout, context, _estimate.size, "DISK_DRIVE")
         draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
         layout.operator("smokelift.add_instance", icon="DUPLICATE")
-        layout.operator("smokelift.scatter", icon="GEOMETRY_NODES")
 
 
 class SMOKELIFT_PT_view_export(_ExportPanel, bpy.types.Panel):

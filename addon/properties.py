@@ -468,7 +468,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Device",
         description="Device that renders",
         items=[
-            ("auto", "Automatic", "The GPU if it is usable"),
+            ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
             ("cpu", "CPU", "The CPU only"),
             ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
         ],

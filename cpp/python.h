@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <memory>
 #include <stdexcept>
+#include <type_traits>
+#include <vector>
 
 namespace smokelift {
 
@@ -84,6 +86,20 @@ template <class Work> Array filled(const Shape &n, const Work &work) {
     Array result = new_array(n);
     const Out values = out(result);
     released([&](Workers &workers) { work(values, workers); });
+    return result;
+}
+
+// A new array of any kind and shape that work(values, workers), or work(values) on one thread, fills.
+template <class T = float, class Work>
+py::array_t<T> made(const std::vector<py::ssize_t> &shape, const Work &work) {
+    py::array_t<T> result(shape);
+    T *const values = result.mutable_data();
+    if constexpr (std::is_invocable_v<Work, T *, Workers &>) {
+        released([&](Workers &workers) { work(values, workers); });
+    } else {
+        const py::gil_scoped_release unlocked;
+        work(values);
+    }
     return result;
 }
 

@@ -125,10 +125,9 @@ void register_places(py::module_ &module) {
         [](const Marks &voxels) {
             const Mask mask = mask_of(voxels);
             const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
-            py::array_t<std::int64_t> indices({py::ssize_t(3), py::ssize_t(first.back())});
-            std::int64_t *const result = indices.mutable_data();
-            released([&](Workers &workers) { find_marked(mask, first, result, workers); });
-            return indices;
+            return made<std::int64_t>({3, py::ssize_t(first.back())}, [&](auto *indices, Workers &workers) {
+                find_marked(mask, first, indices, workers);
+            });
         },
         "voxels"_a);
 
@@ -154,10 +153,9 @@ void register_places(py::module_ &module) {
                 require_fit(picture.ndim() == 2 && picture.shape(0) == map.rows &&
                             picture.shape(1) == map.columns);
                 const Shape n = map.shape();
-                py::array_t<bool> result({n[0], n[1], n[2]});
-                bool *const shown = result.mutable_data();
-                released([&](Workers &workers) { mark_shown(map, bytes_of(picture), shown, workers); });
-                return result;
+                return made<bool>({n[0], n[1], n[2]}, [&](bool *shown, Workers &workers) {
+                    mark_shown(map, bytes_of(picture), shown, workers);
+                });
             },
             "picture"_a)
         .def_property_readonly("nearest", [](const PictureMap &map) {
@@ -181,12 +179,9 @@ void register_places(py::module_ &module) {
                                  most,
                                  share};
             const SeenAt seen_at{rows.data(), columns.data(), visible.data()};
-            Array scaled(count);
-            float *const result = scaled.mutable_data();
-            released([&](Workers &workers) {
-                scale_along_rays(scale, seen_at, values.data(), std::size_t(count), result, workers);
+            return made({count}, [&](float *scaled, Workers &workers) {
+                scale_along_rays(scale, seen_at, values.data(), std::size_t(count), scaled, workers);
             });
-            return scaled;
         },
         "values"_a, "plausible"_a, "logarithm"_a, "rows"_a, "columns"_a, "visible"_a, "faint"_a, "most"_a,
         "share"_a);
@@ -209,13 +204,10 @@ void register_places(py::module_ &module) {
         "read_bilinearly",
         [](const Doubles &picture, const Array &rows, const Array &columns) {
             require_fit(picture.ndim() == 2 && picture.size() > 0 && rows.size() == columns.size());
-            Array values(rows.size());
-            float *const result = values.mutable_data();
-            released([&](Workers &workers) {
+            return made({rows.size()}, [&](float *values, Workers &workers) {
                 read_bilinearly(picture.data(), int(picture.shape(0)), int(picture.shape(1)), rows.data(),
-                                columns.data(), std::size_t(rows.size()), result, workers);
+                                columns.data(), std::size_t(rows.size()), values, workers);
             });
-            return values;
         },
         "picture"_a, "rows"_a, "columns"_a);
 }
@@ -264,10 +256,9 @@ void register_halves(py::module_ &module) {
                 for (int y = 0; y < marked.n[1]; ++y)
                     first[x + 1] += std::count(marked.row(x, y), marked.row(x, y) + marked.n[2], true);
             }
-            Array prolonged(py::ssize_t(first.back()));
-            float *const result = prolonged.mutable_data();
-            released([&](Workers &workers) { prolong_values(coarse, marked, first, result, workers); });
-            return prolonged;
+            return made({py::ssize_t(first.back())}, [&](float *prolonged, Workers &workers) {
+                prolong_values(coarse, marked, first, prolonged, workers);
+            });
         },
         py::arg("values").noconvert(), py::arg("voxels").noconvert());
 
@@ -295,13 +286,8 @@ void register_codes(py::module_ &module) {
             const CodedLines coded = lines_of(picture);
             require_fit(table.size() == 256);
             const LineWeights summed = weights_of(first, lines, weights, coded.lines);
-            Array sums({py::ssize_t(summed.count), picture.shape(1), picture.shape(2)});
-            float *const result = sums.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                sum_lines(coded, table.data(), summed, result);
-            }
-            return sums;
+            return made({summed.count, picture.shape(1), picture.shape(2)},
+                        [&](float *sums) { sum_lines(coded, table.data(), summed, sums); });
         },
         "picture"_a, "table"_a, "first"_a, "lines"_a, "weights"_a);
 
@@ -311,13 +297,8 @@ void register_codes(py::module_ &module) {
             require_fit(values.ndim() == 3);
             const Extent extent{int(values.shape(0)), int(values.shape(1)), int(values.shape(2))};
             const LineWeights summed = weights_of(first, columns, weights, extent.columns);
-            Array sums({values.shape(0), py::ssize_t(summed.count), values.shape(2)});
-            float *const result = sums.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                sum_columns(values.data(), extent, summed, result);
-            }
-            return sums;
+            return made({values.shape(0), summed.count, values.shape(2)},
+                        [&](float *sums) { sum_columns(values.data(), extent, summed, sums); });
         },
         "values"_a, "first"_a, "columns"_a, "weights"_a);
 
@@ -349,13 +330,8 @@ void register_codes(py::module_ &module) {
                             std::equal(plane.shape(), plane.shape() + 2, channels[0].shape()));
                 planes[c] = {plane.data(), plane.strides(0), int(plane.shape(0)), int(plane.shape(1))};
             }
-            py::array_t<unsigned char> codes({channels[0].shape(0), channels[0].shape(1), py::ssize_t(3)});
-            unsigned char *const result = codes.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                interleave(planes, result);
-            }
-            return codes;
+            return made<unsigned char>({channels[0].shape(0), channels[0].shape(1), 3},
+                                       [&](unsigned char *codes) { interleave(planes, codes); });
         },
         "channels"_a);
 }
@@ -370,13 +346,8 @@ void register_filters(py::module_ &module) {
             const int channels = picture.ndim() == 3 ? int(picture.shape(2)) : 1;
             const Extent extent{int(picture.shape(0)), int(picture.shape(1)), channels};
             const std::vector<double> outwards = values_of(weights);
-            Array blurred(std::vector<py::ssize_t>(picture.shape(), picture.shape() + picture.ndim()));
-            float *const result = blurred.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                blur_picture(picture.data(), extent, outwards, result);
-            }
-            return blurred;
+            return made({picture.shape(), picture.shape() + picture.ndim()},
+                        [&](float *blurred) { blur_picture(picture.data(), extent, outwards, blurred); });
         },
         "picture"_a, "weights"_a);
 
@@ -389,13 +360,9 @@ void register_filters(py::module_ &module) {
                 require_fit(rank >= 0 && rank < lines);
             std::vector<py::ssize_t> shape(values.shape(), values.shape() + values.ndim());
             shape[0] = py::ssize_t(ranks.size());
-            Array found(shape);
-            float *const result = found.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                at_ranks(values.data(), lines, std::size_t(values.size() / lines), ranks, result);
-            }
-            return found;
+            return made(shape, [&](float *found) {
+                at_ranks(values.data(), lines, std::size_t(values.size() / lines), ranks, found);
+            });
         },
         "values"_a, "ranks"_a);
 }
@@ -408,12 +375,9 @@ void register_turning(py::module_ &module) {
         [](const Array &lattice, const Array &places) {
             const In nodes = view(lattice);
             require_fit(places.ndim() == 2 && places.shape(0) == 3);
-            Array values(places.shape(1));
-            float *const result = values.mutable_data();
-            released([&](Workers &workers) {
-                read_lattice(nodes, places.data(), std::size_t(places.shape(1)), result, workers);
+            return made({places.shape(1)}, [&](float *values, Workers &workers) {
+                read_lattice(nodes, places.data(), std::size_t(places.shape(1)), values, workers);
             });
-            return values;
         },
         "lattice"_a, "places"_a);
 
@@ -421,10 +385,8 @@ void register_turning(py::module_ &module) {
         "filled_spans",
         [](const Array &volume) {
             const In voxels = view(volume);
-            py::array_t<int> spans({volume.shape(0), volume.shape(1), py::ssize_t(2)});
-            int *const result = spans.mutable_data();
-            released([&](Workers &workers) { find_filled(voxels, result, workers); });
-            return spans;
+            return made<int>({volume.shape(0), volume.shape(1), 2},
+                             [&](int *spans, Workers &workers) { find_filled(voxels, spans, workers); });
         },
         "volume"_a);
 
@@ -435,12 +397,10 @@ void register_turning(py::module_ &module) {
             const In voxels = view(volume);
             require_spans(spans, voxels.n);
             require_fit(columns > 0);
-            Array picture({py::ssize_t(columns), volume.shape(2)});
-            float *const result = picture.mutable_data();
             const Turned turned{first, steps[0], steps[1], columns};
-            released(
-                [&](Workers &workers) { project_turned(voxels, spans.data(), turned, result, workers); });
-            return picture;
+            return made({columns, volume.shape(2)}, [&](float *picture, Workers &workers) {
+                project_turned(voxels, spans.data(), turned, picture, workers);
+            });
         },
         "volume"_a, "spans"_a, "first"_a, "steps"_a, "columns"_a);
 
@@ -479,12 +439,9 @@ void register_patches(py::module_ &module) {
         [](const Array &picture, const Integers &at, int size) {
             require_fit(picture.ndim() == 2);
             const Patches patches = patches_at(at, size, picture.shape(0), picture.shape(1));
-            Array pixels({py::ssize_t(size) * size, at.shape(1)});
-            float *const result = pixels.mutable_data();
-            released([&](Workers &workers) {
-                unfold(picture.data(), int(picture.shape(1)), patches, result, workers);
+            return made({py::ssize_t(size) * size, at.shape(1)}, [&](float *pixels, Workers &workers) {
+                unfold(picture.data(), int(picture.shape(1)), patches, pixels, workers);
             });
-            return pixels;
         },
         "picture"_a, "at"_a, "size"_a);
 
@@ -494,13 +451,8 @@ void register_patches(py::module_ &module) {
             const Patches patches = patches_at(at, size, shape[0], shape[1]);
             require_fit(pixels.ndim() == 2 && pixels.shape(0) == py::ssize_t(size) * size &&
                         pixels.shape(1) == at.shape(1));
-            Array picture({py::ssize_t(shape[0]), py::ssize_t(shape[1])});
-            float *const result = picture.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                fold(pixels.data(), patches, shape[0], shape[1], result);
-            }
-            return picture;
+            return made({shape[0], shape[1]},
+                        [&](float *picture) { fold(pixels.data(), patches, shape[0], shape[1], picture); });
         },
         "pixels"_a, "at"_a, "size"_a, "shape"_a);
 

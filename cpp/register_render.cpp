@@ -82,8 +82,9 @@ Strided<T> box_of(const py::array_t<float> &a, Data data, const Support &support
 // An array over blocks, [field][x][y][z].
 using OverBlocks = py::array_t<float, py::array::c_style>;
 
-OverBlocks over_blocks(int fields, const Shape &n) {
-    return OverBlocks({py::ssize_t(fields), py::ssize_t(n[0]), py::ssize_t(n[1]), py::ssize_t(n[2])});
+// A new one that work(values, workers) fills.
+template <class Work> auto over_blocks(int fields, const Shape &n, const Work &work) {
+    return made({fields, n[0], n[1], n[2]}, work);
 }
 
 Shape blocks_shape(const OverBlocks &a, int fields) {
@@ -308,10 +309,10 @@ void register_blocks(py::module_ &module) {
         [](Floats medium, const Support &support, const Blocks &blocks) {
             const Voxels voxels = voxels_of(medium, support);
             require_around(blocks, support);
-            OverBlocks means = over_blocks(1 + (voxels.width - 1) * Blocks::FIELDS, blocks.n);
-            float *const to = means.mutable_data();
-            released([&](Workers &workers) { average(voxels, support.spans, blocks, to, workers); });
-            return means;
+            const int fields = 1 + (voxels.width - 1) * Blocks::FIELDS;
+            return over_blocks(fields, blocks.n, [&](float *means, Workers &workers) {
+                average(voxels, support.spans, blocks, means, workers);
+            });
         },
         "medium"_a.noconvert(), "support"_a, "blocks"_a);
 
@@ -349,13 +350,11 @@ void register_blocks(py::module_ &module) {
         [](Floats gradient, const Support &support, float factor, const Blocks &blocks) {
             const Voxels gradients = voxels_of(gradient, support);
             require_around(blocks, support);
-            OverBlocks values_gradient = over_blocks((gradients.width - 1) * Blocks::FIELDS, blocks.n);
-            float *const to = values_gradient.mutable_data();
-            released([&](Workers &workers) {
+            const int fields = (gradients.width - 1) * Blocks::FIELDS;
+            return over_blocks(fields, blocks.n, [&](float *values_gradient, Workers &workers) {
                 fold_border(gradients);
-                interpolate_adjoint(gradients, support.spans, factor, blocks, to, workers);
+                interpolate_adjoint(gradients, support.spans, factor, blocks, values_gradient, workers);
             });
-            return values_gradient;
         },
         "gradient"_a.noconvert(), "support"_a, "factor"_a, "blocks"_a);
 }
@@ -368,16 +367,13 @@ void register_diffuse_light(py::module_ &module) {
         [](const OverBlocks &means, float albedo, float edge) {
             const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
             const Shape n = blocks_shape(means, 1 + fields);
-            OverBlocks radiance = over_blocks(fields, n);
-            float *const phi = radiance.mutable_data();
-            released([&](Workers &workers) {
+            return over_blocks(fields, n, [&](float *phi, Workers &workers) {
                 const std::size_t count = volume(n);
                 const DiffuseLight light(means.data(), albedo, n, edge);
                 for (int channel = 0; channel < channels; ++channel)
                     light.solve(means.data() + (1 + channel * Blocks::FIELDS) * count,
                                 phi + channel * Blocks::FIELDS * count, workers);
             });
-            return radiance;
         },
         "means"_a.noconvert(), "albedo"_a, "edge"_a);
 
@@ -388,9 +384,7 @@ void register_diffuse_light(py::module_ &module) {
             const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
             const Shape n = blocks_shape(means, 1 + fields);
             require_fit(blocks_shape(radiance, fields) == n && blocks_shape(radiance_gradient, fields) == n);
-            OverBlocks means_gradient = over_blocks(1 + fields, n);
-            float *const result = means_gradient.mutable_data();
-            released([&](Workers &workers) {
+            return over_blocks(1 + fields, n, [&](float *result, Workers &workers) {
                 const std::size_t count = volume(n);
                 const DiffuseLight light(means.data(), albedo, n, edge);
                 std::fill_n(result, count, 0.0f);
@@ -400,7 +394,6 @@ void register_diffuse_light(py::module_ &module) {
                                         radiance_gradient.data() + at, result + count + at, result, workers);
                 }
             });
-            return means_gradient;
         },
         "means"_a.noconvert(), "radiance"_a.noconvert(), "radiance_gradient"_a.noconvert(), "albedo"_a,
         "edge"_a);

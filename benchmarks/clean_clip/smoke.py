@@ -15,7 +15,7 @@ from smokelift import Camera, Domain, Scene
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import Picture
 from smokelift.render import scene_renderer
-from smokelift.scene import CompleteScene, completed
+from smokelift.scene import completed
 from smokelift.transport import Array
 
 GRID = (24, 24, 36)
@@ -130,7 +130,7 @@ class Baked:
         )
 
 
-def optical_mass(scene: Scene | CompleteScene, densities: npt.NDArray[np.floating[Any]]) -> float:
+def optical_mass(scene: Scene, densities: npt.NDArray[np.floating[Any]]) -> float:
     """Extinction times volume (m2) of densities (frames, x, y, z) that fill the box of a scene."""
     complete = completed(scene)
     sides = np.array(complete.domain.max) - complete.domain.min

@@ -20,7 +20,6 @@ LONG = (
     "compositing.py",
     "directing.py",
     "export.py",
-    "instances.py",
     "projection.py",
     "scene_file.py",
     "volume.py",

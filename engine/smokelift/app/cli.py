@@ -148,7 +148,7 @@ def command_parser() -> argparse.ArgumentParser:
         "--device",
         choices=("auto", "cpu", "gpu"),
         default="auto",
-        help="device that renders; auto (default): a GPU if there is one that Taichi can use well, else the processor",
+        help="device that renders; auto (default): the processor; gpu: one that Taichi can use",
     )
     common.add_argument(
         "--progress",

@@ -3,62 +3,33 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 
-from smokelift.batch.record import Record
 from smokelift.batch.shots import BatchShot
-
-Work = Callable[[BatchShot], Record]
-
-RETRIES = 2
-"""New tries after a crash of the engine."""
+from smokelift.batch.work import Needs, Record, Task
 
 WAKE_SECONDS = 0.5
 """Python handles no signal while it waits on some systems, so that no wait is longer."""
 
 
-@dataclass(frozen=True)
-class Room:
-    """What the shots may take together: bytes of memory, and how many run at a time."""
+def run_here(shots: Needs, task: Task, memory: int, workers: int) -> Iterator[tuple[BatchShot, Record]]:
+    """Run shots side by side, `workers` at most, and yield each when it has ended.
 
-    memory: int
-    shots: int
-
-
-def run_here(
-    shots: Sequence[tuple[BatchShot, Record]], work: Work, room: Room, stop: threading.Event
-) -> Iterator[tuple[BatchShot, Record]]:
-    """Run shots side by side and yield each when it has ended.
-
-    A shot starts as soon as its memory is left, in the order of the list; a small one may overtake a large one. What
-    needs more than all of it, or has no forecast, runs alone. When the caller leaves early `stop` is set: the work
-    ends, and is waited for.
+    A shot starts as soon as its part of `memory` is left, in the order of the list; a small one may overtake a large
+    one. What needs more than all of it runs alone. When the caller leaves early the work ends, and is waited for.
     """
-    waiting = list(shots)
-    running: dict[Future[Record], tuple[BatchShot, int]] = {}
-    with ThreadPoolExecutor(max_workers=room.shots) as pool:
+    stop = threading.Event()
+    waiting, running = list(shots), dict[Future[Record], tuple[BatchShot, int]]()
+    with ThreadPoolExecutor(workers) as pool:
         try:
             while waiting or running:
-                for pair in list(waiting):
-                    taken = [memory for _shot, memory in running.values()]
-                    forecast = pair[1].forecast
-                    memory = forecast.memory if forecast is not None else room.memory
-                    if not taken or (len(taken) < room.shots and sum(taken) + memory <= room.memory):
-                        waiting.remove(pair)
-                        running[pool.submit(_with_retries, work, pair[0])] = pair[0], memory
-                ended, _ = wait(running, WAKE_SECONDS, FIRST_COMPLETED)
-                for future in ended:
-                    shot, _memory = running.pop(future)
-                    yield shot, future.result()
+                for shot, needed in list(waiting):
+                    taken = sum(each for _, each in running.values())
+                    if not running or (len(running) < workers and taken + needed <= memory):
+                        waiting.remove((shot, needed))
+                        running[pool.submit(task, shot, stop)] = shot, needed
+                for future in wait(running, WAKE_SECONDS, FIRST_COMPLETED).done:
+                    yield running.pop(future)[0], future.result()
         finally:
             stop.set()
-
-
-def _with_retries(work: Work, shot: BatchShot) -> Record:
-    for _ in range(RETRIES):
-        record = work(shot)
-        if record.status != "crashed":
-            return record
-    return work(shot)

@@ -1,24 +1,10 @@
-"""The list of a batch, ``shots.toml``: what is reconstructed, and with which settings.
-
-    out = "results"             # folder of everything that is written; "results" if left out
-
-    [defaults]                  # options of every shot that does not have its own
-    quality = "draft"
-
-    [[shots]]
-    input = "steam.mp4"         # or a scene file, or frame_####.png
-    name = "steam"              # of its files in the folder; the input's name if left out
-    frames = [10, 99]
-
-Paths are relative to the file. The options are those of ``smokelift reconstruct``, by the same names.
-"""
+"""The list of a batch, ``shots.toml``, as ``docs/batch.md`` describes it."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,42 +14,21 @@ from smokelift.scene.files import read_text
 from smokelift.scene.toml_lines import Place, find_lines, line_of
 
 OPTIONS = (
-    "quality",
-    "method",
-    "resolution",
-    "scattering",
-    "frames",
-    "mask",
-    "distance",
-    "detail",
-    "seed",
-    "device",
-    "start_number",
-    "npz",
+    *("quality", "method", "resolution", "scattering", "frames", "mask"),
+    *("distance", "detail", "seed", "device", "start_number", "npz"),
 )
 """Keys of a shot that are options of ``smokelift reconstruct``."""
 
 _NAME = re.compile(r"[^\W.][^\\/:*?\"<>|\x00-\x1f]*")
 """Names that every file system takes and that are no hidden files."""
 
-Check = Callable[[Sequence[str]], None]
-"""Raises ValueError for arguments that ``smokelift reconstruct`` does not take."""
-
 
 @dataclass(frozen=True)
 class BatchShot:
     """A clip that is reconstructed.
 
-    Attributes
-    ----------
-    name
-        Of its files.
-    input
-        A scene file, a video, or a pattern of pictures.
-    options
-        Of ``smokelift reconstruct``, as on its command line.
-    folder
-        Where everything is written that belongs to the batch.
+    The input is a scene file, a video, or a pattern of pictures; the options are those of ``smokelift reconstruct``, as
+    on its command line; and the folder holds everything that belongs to the batch.
     """
 
     name: str
@@ -76,19 +41,21 @@ class BatchShot:
         """Folder of its sequence."""
         return self.folder / self.name
 
-    @property
-    def picture(self) -> Path:
-        """A frame of the clip beside its reconstruction."""
-        return self.folder / f"{self.name}.png"
-
-    @property
-    def log(self) -> Path:
-        """All that its runs said."""
-        return self.folder / f"{self.name}.log"
+    def file(self, extension: str) -> Path:
+        """A file beside the sequence: a frame of the clip beside its smoke (png), what is known (json), the log."""
+        return self.folder / f"{self.name}.{extension}"
 
 
-def read_shots(path: Path, check: Check) -> tuple[BatchShot, ...]:
-    """Read a list of shots, the arguments of each of which `check` judges.
+class _ListError(ValueError):
+    """What is wrong in a list, and in which table or key."""
+
+    def __init__(self, message: str, *place: str | int) -> None:
+        super().__init__(message)
+        self.place: Place = place
+
+
+def read_shots(path: Path, check: Callable[[Sequence[str]], None]) -> tuple[BatchShot, ...]:
+    """Read a list of shots; `check` raises ValueError for arguments that ``smokelift reconstruct`` does not take.
 
     It raises ValueError with the file, the line and what was expected, and OSError if the file cannot be read.
     """
@@ -97,74 +64,66 @@ def read_shots(path: Path, check: Check) -> tuple[BatchShot, ...]:
         data = tomllib.loads(text)
     except (RecursionError, ValueError) as error:
         raise ValueError(f"{path.name}: is not valid TOML: {error}") from error
-    return _Reader(path, find_lines(text)).shots(data, check)
+    try:
+        return tuple(_shots(path.absolute().parent, data, check))
+    except _ListError as error:
+        raise ValueError(f"{path.name}{line_of(error.place, find_lines(text))}: {error}") from error
 
 
-@dataclass(frozen=True)
-class _Reader:
-    path: Path
-    lines: Mapping[Place, int]
-
-    def shots(self, data: Mapping[str, Any], check: Check) -> tuple[BatchShot, ...]:
-        self._known((), data, ("out", "defaults", "shots"))
-        folder = self.path.absolute().parent / self._text((), data, "out", "results")
-        tables, defaults = data.get("shots"), data.get("defaults", {})
-        if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
-            raise self._error((), "lists no shots; write a table [[shots]] with an input for each")
-        if not isinstance(defaults, dict):
-            raise self._error(("defaults",), f"defaults must be a table, not {shown(defaults)}")
-        self._known(("defaults",), defaults, OPTIONS)
-        shots = [self._shot(("shots", n), table, defaults, folder, check) for n, table in enumerate(tables)]
-        counts = Counter(shot.name.casefold() for shot in shots)  # some file systems do not tell a from A
-        for number, shot in enumerate(shots):
-            if counts[shot.name.casefold()] > 1:
-                raise self._error(("shots", number), f"several shots are called {shown(shot.name)}; give each a name")
-        return tuple(shots)
-
-    def _shot(
-        self, place: Place, table: Mapping[str, Any], defaults: Mapping[str, Any], folder: Path, check: Check
-    ) -> BatchShot:
-        self._known(place, table, ("name", "input", *OPTIONS))
-        given = Path(self._text(place, table, "input"))
-        name = self._text(place, table, "name", given.stem.rstrip("#_-. ") or "shot")
+def _shots(base: Path, data: Mapping[str, Any], check: Callable[[Sequence[str]], None]) -> Iterator[BatchShot]:
+    _require_known(data, ("out", "defaults", "shots"))
+    folder = base / _text(data.get("out", "results"), "out")
+    tables, defaults = data.get("shots"), data.get("defaults", {})
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
+        raise _ListError("lists no shots; write a table [[shots]] with an input for each")
+    if not isinstance(defaults, dict):
+        raise _ListError(f"defaults must be a table, not {shown(defaults)}", "defaults")
+    _require_known(defaults, OPTIONS, "defaults")
+    names = set()
+    for place, table in ((("shots", index), table) for index, table in enumerate(tables)):
+        _require_known(table, ("name", "input", *OPTIONS), *place)
+        if "input" not in table:
+            raise _ListError("input is missing", *place)
+        source = base / _text(table["input"], *place, "input")
+        name = _text(table.get("name", source.stem.rstrip("#_-. ") or "shot"), *place, "name")
         if not _NAME.fullmatch(name):
-            raise self._error((*place, "name"), f"{shown(name)} cannot be the name of a file; choose another name")
+            raise _ListError(f"{shown(name)} cannot be the name of a file; choose another name", *place, "name")
+        if name.casefold() in names:  # some file systems do not tell a from A
+            raise _ListError(f"several shots are called {shown(name)}; give each a name", *place)
+        names.add(name.casefold())
         chosen = {**defaults, **table}
-        options = [word for key in OPTIONS if key in chosen for word in self._words(place, key, chosen[key])]
-        source = self.path.absolute().parent / given
+        options = [word for key in OPTIONS if key in chosen for word in _words(base, chosen[key], *place, key)]
         try:
             check([str(source), "--out", str(folder / name), *options])
         except ValueError as error:
-            raise self._error(place, str(error)) from error
-        return BatchShot(name, source, tuple(options), folder)
+            raise _ListError(str(error), *place) from error
+        yield BatchShot(name, source, tuple(options), folder)
 
-    def _words(self, place: Place, key: str, value: Any) -> list[str]:
-        """The words of the command line that say an option."""
-        if key == "npz":
-            if not isinstance(value, bool):
-                raise self._error((*place, key), f"npz must be true or false, not {shown(value)}")
-            return ["--npz"] * value
-        if key == "mask":
-            return [f"--mask={self.path.absolute().parent / self._text(place, {key: value}, key)}"]
-        between = {"frames": ":", "resolution": ","}.get(key)
-        if isinstance(value, list) and between and all(type(part) is int for part in value):
-            value = between.join(map(str, value))
-        if not isinstance(value, str | int | float) or isinstance(value, bool):
-            raise self._error((*place, key), f"{key} cannot be {shown(value)}")
-        return [f"--{key.replace('_', '-')}={value}"]  # one word, because a number may be negative
 
-    def _text(self, place: Place, table: Mapping[str, Any], key: str, default: str | None = None) -> str:
-        value = table.get(key, default)
-        if value is None:
-            raise self._error(place, f"{key} is missing")
-        if not isinstance(value, str) or not value:
-            raise self._error((*place, key), f"{key} must be a text, not {shown(value)}")
-        return value
+def _words(base: Path, value: Any, *place: str | int) -> list[str]:
+    """The words of the command line that say an option."""
+    key = str(place[-1])
+    if key == "npz":
+        if not isinstance(value, bool):
+            raise _ListError(f"npz must be true or false, not {shown(value)}", *place)
+        return ["--npz"] * value
+    if key == "mask":
+        value = str(base / _text(value, *place))
+    between = {"frames": ":", "resolution": ","}.get(key)
+    if isinstance(value, list) and between and all(type(part) is int for part in value):
+        value = between.join(map(str, value))
+    if not isinstance(value, str | int | float) or isinstance(value, bool):
+        raise _ListError(f"{key} cannot be {shown(value)}", *place)
+    return [f"--{key.replace('_', '-')}={value}"]  # one word, because a number may be negative
 
-    def _known(self, place: Place, table: Mapping[str, Any], keys: Sequence[str]) -> None:
-        for key in table:
-            if key not in keys:
-                raise self._error((*place, key), f"there is no key {shown(key)} here; known are {', '.join(keys)}")
 
-    def _error(self, place: Place, message: str) -> ValueError:
-        return ValueError(f"{self.path.name}{line_of(place, self.lines)}: {message}")
+def _text(value: Any, *place: str | int) -> str:
+    if not isinstance(value, str) or not value:
+        raise _ListError(f"{place[-1]} must be a text, not {shown(value)}", *place)
+    return value
+
+
+def _require_known(table: Mapping[str, Any], keys: Sequence[str], *place: str | int) -> None:
+    for key in table:
+        if key not in keys:
+            raise _ListError(f"there is no key {shown(key)} here; known are {', '.join(keys)}", *place, key)

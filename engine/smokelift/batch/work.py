@@ -1,56 +1,126 @@
-"""The work on one shot, wherever it is done: inspect its clip, and reconstruct it to its end.
+"""The work on one shot, wherever it is done, by a process of the engine; and what is known of it, ``NAME.json``.
 
-It may be called for the same shot by several processes on several machines: one does the work, the others wait for it.
-What decides is on the storage that they share: the lock, the record and the sequence.
+Several processes on several machines may work on the same shot: one does the work, the others wait for it. What
+decides is on the storage that they share: the lock, the record and the sequence.
 """
 
 from __future__ import annotations
 
-import platform
+import json
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, TypedDict
 
-from smokelift.batch.engine import ENGINE, EngineResult, run_engine
-from smokelift.batch.record import Forecast, Record, Status, finished_frames, read_record, read_state
+import psutil
+
 from smokelift.batch.shots import BatchShot
+from smokelift.output.atomic import atomic_path
+from smokelift.output.index import Index, SequenceError
 from smokelift.output.lock import Lock
 from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
+ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
+"""The command line, which ends with the process that started it."""
+
+POLL_SECONDS, GRACE_SECONDS = 0.25, 20.0
+"""Between two measurements of a running engine, and for a cancelled one to end, which kills itself before that."""
+
+RETRIES, PAUSE_SECONDS, PATIENCE_SECONDS = 2, 30.0, 3600.0
+"""New tries after a crash. Seconds between tries while a disk is full, say, and in all without a new frame."""
+
+Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "cancelled"]
+"""``running``: or its machine was lost while it ran; ``refused``: the engine says what is wrong; ``stuck``: what passes
+(a full disk, say) did not pass in time."""
+
+_STATUS: dict[int, Status] = {DONE: "done", CANCELLED: "cancelled", BAD_INPUT: "refused", NO_DEVICE: "refused"}
+
+
+Needs = Sequence[tuple[BatchShot, int]]
+"""Shots with the bytes of memory that each needs; 0 if that is not known."""
+
+
+class Forecast(TypedDict):
+    """What ``smokelift inspect`` foretells of a shot: its frames, seconds, and bytes of memory at the peak."""
+
+    frames: int
+    seconds: float
+    memory: int
+
 
 @dataclass(frozen=True)
-class Patience:
-    """How long to wait for failures that pass: a full disk, a server that is away, memory that others use.
+class Record:
+    """What is known of a shot besides its sequence.
 
-    In seconds: the pause before the first new try, each further one being twice as long up to the longest, and the
-    total without a new frame after which the shot is given up.
+    That is its options and the size and time of change of its input and mask (``of``); how its last run ended, what
+    the engine said then, assumed and noticed; how often it was run; the seconds of all runs and the bytes at the peak.
+    There is no forecast before the clip was inspected.
     """
 
-    pause: float = 5.0
-    longest_pause: float = 120.0
-    total: float = 3600.0
+    of: dict[str, Any]
+    status: Status = "waiting"
+    sentence: str = ""
+    notes: list[str] = field(default_factory=list)
+    runs: int = 0
+    seconds: float = 0.0
+    memory: int = 0
+    forecast: Forecast | None = None
+
+    def write(self, shot: BatchShot) -> None:
+        """Write the file; OSError if that fails."""
+        with atomic_path(shot.file("json")) as aside:
+            aside.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
 
 
-PATIENCE = Patience()
+Task = Callable[[BatchShot, threading.Event], Record]
+"""Work on a shot, and what ends it; a worker of a cluster has to be able to import it."""
+
+
+def read_record(shot: BatchShot) -> Record:
+    """Return the record of a shot as it is now listed; a new one if its options, input or mask have changed."""
+    of: dict[str, Any] = {"options": list(shot.options), "files": []}
+    masks = [word.removeprefix("--mask=") for word in shot.options if word.startswith("--mask=")]
+    for path in (shot.input, *map(Path, masks)):
+        with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
+            of["files"].append([path.stat().st_size, path.stat().st_mtime_ns])
+    with suppress(OSError, ValueError, TypeError):  # a damaged record is none
+        record = Record(**json.loads(shot.file("json").read_text(encoding="utf-8")))
+        if record.of == of:
+            return record
+    return Record(of)
+
+
+def read_index(shot: BatchShot) -> Index:
+    """Return what the sequence of a shot says of its finished frames; of none if there is no sequence."""
+    try:
+        return Index.read(shot.directory)
+    except SequenceError:
+        return Index({}, {})
+
+
+def is_finished(shot: BatchShot, record: Record) -> bool:
+    """Return whether a shot need not be run again."""
+    return record.status == "done" and read_index(shot).complete
 
 
 def look_at_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
-    """Ask the engine what a shot will take, unless that is known.
-
-    The record has a forecast; or it is ``refused`` with the reason, and not kept.
-    """
+    """Ask the engine what a shot will take, unless that is known; a record without a forecast says why not."""
     record = read_record(shot)
-    if record.forecast is not None:
-        return record
-    shot.folder.mkdir(parents=True, exist_ok=True)
-    # `inspect` writes nothing
-    options = [word for word in shot.options if not word.startswith(("--npz", "--start-number"))]
-    result = run_engine(["inspect", str(shot.input), *options], stop, shot.log, engine)
-    if result.status != DONE:
-        return replace(record, status=_status(result), sentence=result.sentence)
-    known = result.details
-    record = replace(record, forecast=Forecast(int(known["frames"]), float(known["seconds"]), int(known["memory"])))
-    record.write(shot)
+    if record.forecast is None:
+        shot.folder.mkdir(parents=True, exist_ok=True)
+        # `inspect` writes nothing
+        options = [word for word in shot.options if not word.startswith(("--npz", "--start-number"))]
+        ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine)
+        if ended.status != "done":
+            return ended
+        forecast = Forecast(frames=said["frames"], seconds=said["seconds"], memory=said["memory"])
+        record = replace(record, forecast=forecast)
+        record.write(shot)
     return record
 
 
@@ -58,83 +128,104 @@ def finish_shot(
     shot: BatchShot,
     stop: threading.Event,
     say: Callable[[str], None] = lambda _text: None,
-    patience: Patience = PATIENCE,
+    pause: float = PAUSE_SECONDS,
     engine: Sequence[str] = ENGINE,
 ) -> Record:
-    """Reconstruct a shot to its end, going on from the frames that are there.
+    """Reconstruct a shot to its end, going on from the frames that are there, and return its record.
 
-    A failure that passes is waited for, and `say` is called with what it is. After a crash the caller decides where to
-    try again. Once `stop` is set the work ends; finished frames stay. The record is returned as it was written beside
-    the sequence.
+    After a crash it is tried again. A failure that passes is waited for: `say` is called with what it is, and `pause`
+    is the seconds until the next try. Once `stop` is set the work ends; finished frames stay.
     """
-    waited, pause, frames = 0.0, patience.pause, -1
+    crashes, waited, frames = 0, 0.0, 0
     while True:
         try:
-            record, retry = _try(shot, stop, engine)
+            record = _try(shot, stop, engine)
         except OSError as error:  # the storage itself
-            record, retry = replace(read_record(shot), status="stuck", sentence=str(error)), True
+            record = replace(read_record(shot), status="stuck", sentence=str(error))
         if stop.is_set() and record.status != "done":
             return replace(record, status="cancelled", sentence="Cancelled; finished frames stay.")
-        if not retry:
+        if (there := len(read_index(shot).frames)) > frames:
+            waited, frames = 0.0, there
+        if record.status == "crashed" and crashes < RETRIES:
+            crashes += 1
+        elif record.status == "stuck" and waited < PATIENCE_SECONDS:
+            say(f"{shot.name}: {record.sentence} It is tried again in {pause:.0f} s.")
+            stop.wait(pause)
+            waited += pause
+        else:
             return record
-        if (there := finished_frames(shot).count) > frames:
-            waited, pause, frames = 0.0, patience.pause, there
-        if waited >= patience.total:
-            return record
-        say(f"{shot.name}: {record.sentence} It is tried again in {pause:.0f} s.")
-        stop.wait(pause)
-        waited, pause = waited + pause, min(2 * pause, patience.longest_pause)
 
 
-def _try(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> tuple[Record, bool]:
-    """Run the engine once, if nobody else does; return what came of it and whether to try again later."""
+def _try(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> Record:
+    """Run the engine once, if nobody else does."""
     shot.folder.mkdir(parents=True, exist_ok=True)
     lock = Lock(shot.folder / f".{shot.name}.lock")
     if not lock.acquire():
         sentence = f"{shot.directory}: another batch is at work on this shot."
-        return replace(read_record(shot), status="stuck", sentence=sentence), True
+        return replace(read_record(shot), status="stuck", sentence=sentence)
     try:
-        before = read_record(shot)
-        if read_state(shot).finished or stop.is_set():
-            return before, False
-        before = replace(before, status="running", sentence="", runs=before.runs + 1, machine=platform.node())
-        before.write(shot)
-        arguments = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.picture)]
-        result = run_engine([*arguments, "--resume", *shot.options], stop, shot.log, engine)
-        record = replace(
-            before,
-            status=_status(result),
-            sentence=result.sentence,
-            notes=tuple(result.notes) or before.notes,
-            seconds=before.seconds + result.seconds,
-            processor_seconds=before.processor_seconds + result.processor_seconds,
-            memory=max(before.memory, result.memory),
-        )
-        _write_with_retries(record, shot, stop)
-        return record, result.retryable and result.status != DONE
+        record = read_record(shot)
+        if not (is_finished(shot, record) or stop.is_set()):
+            record = replace(record, status="running", sentence="", runs=record.runs + 1)
+            record.write(shot)
+            words = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.file("png"))]
+            record, _ = _run(shot, record, [*words, "--resume", *shot.options], stop, engine)
+            record.write(shot)
+        return record
     finally:
         lock.release()
 
 
-WRITE_PAUSES = (0.5, 2.0, 8.0)
-"""Seconds between tries to write a record. A shot without one is prepared once more, and keeps its frames."""
+def _run(
+    shot: BatchShot, record: Record, words: Sequence[str], stop: threading.Event, engine: Sequence[str]
+) -> tuple[Record, dict[str, Any]]:
+    """Run the engine to its end, with arguments of ``smokelift``; return the record then, and its last message.
 
-
-def _write_with_retries(record: Record, shot: BatchShot, stop: threading.Event) -> None:
-    """Write a record; OSError if that fails after all pauses."""
-    for pause in WRITE_PAUSES:
+    All that the engine says is appended to the shot's log; what does not fit on the disk is left out.
+    """
+    began, peak = time.monotonic(), [record.memory]
+    notes, message, last_words = [], {"text": ""}, "it said nothing"
+    command, pipe = [*engine, *words, "--progress", "json"], subprocess.PIPE
+    with (
+        shot.file("log").open("ab", buffering=0) as log,
+        subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT) as process,
+    ):
+        threading.Thread(target=_watch, args=(process, stop, peak), daemon=True).start()
         try:
-            return record.write(shot)
-        except OSError:
-            stop.wait(pause)
-    record.write(shot)
+            for line in process.stdout or ():
+                with suppress(OSError):
+                    log.write(line)
+                text = line.decode("utf-8", "replace").strip()
+                try:
+                    said = json.loads(text)
+                    event = said["event"]
+                except (ValueError, LookupError, TypeError):
+                    last_words = text or last_words
+                    continue
+                if event == "note":
+                    notes.append(said["text"])
+                elif event in ("done", "error"):
+                    message = said
+            code = process.wait()
+        finally:
+            process.kill()  # nothing, unless we are interrupted ourselves
+    status = _STATUS.get(code, "crashed")
+    if message.get("later") and status not in ("done", "cancelled"):
+        status = "stuck"
+    how = f"signal {-code}" if code < 0 else f"status {code}"
+    sentence = message["text"] or f"The engine ended by itself ({how}): {last_words}"
+    seconds = record.seconds + time.monotonic() - began
+    known = notes or record.notes
+    return replace(record, status=status, sentence=sentence, notes=known, seconds=seconds, memory=peak[0]), message
 
 
-def _status(result: EngineResult) -> Status:
-    if result.status == DONE:
-        return "done"
-    if result.status == CANCELLED:
-        return "cancelled"
-    if result.retryable:
-        return "stuck"
-    return "refused" if result.status in (BAD_INPUT, NO_DEVICE) else "crashed"
+def _watch(process: subprocess.Popen[bytes], stop: threading.Event, peak: list[int]) -> None:
+    """Measure the memory of a process, and end it when that is asked."""
+    while process.poll() is None:
+        with suppress(psutil.Error):  # it has ended already
+            peak[0] = max(peak[0], psutil.Process(process.pid).memory_info().rss)
+        if stop.wait(POLL_SECONDS) and process.stdin is not None:
+            with suppress(OSError, subprocess.TimeoutExpired):
+                process.stdin.close()
+                process.wait(GRACE_SECONDS)
+            process.kill()

@@ -167,7 +167,7 @@ class GradientFit:
 
 def reconstruct_density(
     image: Image,
-    scene: Scene | CompleteScene,
+    scene: Scene,
     initial: Volume | None = None,
     settings: DensitySettings | None = None,
     *,

@@ -1,7 +1,6 @@
-"""Which device renders: the processor with compiled code, or a GPU with Taichi.
+"""Which device renders: the processor with compiled code, or, if it is asked for, a GPU with Taichi.
 
-Taichi may be missing. It is only imported where a GPU driver is installed, and, unless a GPU is asked for, where a GPU
-is: that alone takes longer than all that is estimated before a run.
+Taichi may be missing, and importing it takes longer than all that is estimated before a run.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ import ctypes
 import sys
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from smokelift.render.cpu_backend import CpuBackend, RaySupport
@@ -21,17 +19,11 @@ if TYPE_CHECKING:
 
 DeviceName = Literal["auto", "cpu", "gpu"]
 
-_SOFTWARE = ("llvmpipe", "lavapipe", "swiftshader")
-"""Vulkan devices that are programs on the processor, where the compiled code is much faster."""
-
 _DRIVERS = {
     "linux": ("libcuda.so.1", "libvulkan.so.1"),
     "win32": ("nvcuda.dll", "vulkan-1.dll"),
 }
 """Libraries of which one is there where Taichi can use a GPU; macOS always has Metal."""
-
-_NODES = ("dri/renderD*", "nvidia[0-9]*", "dxg")
-"""Files in /dev of which Linux has one for every GPU: by its own drivers, by NVIDIA's, and under Windows."""
 
 _running: str | None = None  # one device a process
 
@@ -61,8 +53,8 @@ def has_taichi() -> bool:
 def start(device: DeviceName = "auto") -> str:
     """Choose the device of this process, once, and return ``"cpu"``, ``"cuda"``, ``"metal"`` or ``"vulkan"``.
 
-    ``"auto"`` takes a GPU if there is one, else the CPU; a Vulkan device in software is taken for ``"gpu"`` only. It
-    raises DeviceError if a GPU is asked for and there is none, or if another device is already in use.
+    ``"auto"`` is the device in use, and the CPU at first: no measurement says that a GPU is faster. It raises
+    DeviceError if a GPU is asked for and there is none, or if another device is already in use.
     """
     global _running
     if _running is not None:
@@ -71,21 +63,19 @@ def start(device: DeviceName = "auto") -> str:
                 f"The renderer already runs on {_running} in this process; start a new process for {device}."
             )
         return _running
-    wanted = device == "gpu" or (device == "auto" and gpu_present())
-    gpu = available_gpu() if wanted else None
-    if device == "gpu" and not has_taichi():
+    if device != "gpu":
+        _running = "cpu"
+        return _running
+    if not has_taichi():
         raise DeviceError(f"A GPU cannot be used, as {NO_TAICHI}, or choose cpu as the device.")
-    if device == "gpu" and gpu is None:
+    gpu = available_gpu()
+    if gpu is None:
         raise DeviceError(
             "No GPU that Taichi can use was found (CUDA, Metal or Vulkan); choose cpu as the device, or update the "
             "driver."
         )
-    if gpu is not None:
-        chip = _taichi().start(gpu)
-        if device == "auto" and any(name in chip.lower() for name in _SOFTWARE):
-            _taichi().stop()
-            gpu = None
-    _running = gpu or "cpu"
+    _taichi().start(gpu)
+    _running = gpu
     return _running
 
 
@@ -99,11 +89,6 @@ def backend(plan: RenderPlan, ray_support: RaySupport | None = None) -> CpuBacke
 
 def _taichi() -> Any:
     return import_module("smokelift.render.gpu.taichi_runtime")
-
-
-def gpu_present() -> bool:
-    """Whether the system lists a GPU, whatever can be done with it; without that list, it is taken to have one."""
-    return sys.platform != "linux" or any(True for nodes in _NODES for _ in Path("/dev").glob(nodes))
 
 
 def driver_installed() -> bool:

@@ -12,13 +12,13 @@ from smokelift.checks import numbers, radiance, require_kind
 from smokelift.footage.given_background import background_picture
 from smokelift.render.optics import scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
-from smokelift.scene import Camera, CompleteScene, Scene, completed, require_scene
+from smokelift.scene import Camera, Scene, completed, require_scene
 
 LARGEST_DEPTH = 1e20
 """Optical depth of a voxel, at most: that of a ray through thousands of them is still a number of 32 bits."""
 
 
-def render(density: Volume, scene: Scene | CompleteScene, camera: Camera | None = None) -> Image:
+def render(density: Volume, scene: Scene, camera: Camera | None = None) -> Image:
     """Render a density as a camera sees it, by the scene's scattering model.
 
     Parameters
@@ -61,15 +61,15 @@ def render(density: Volume, scene: Scene | CompleteScene, camera: Camera | None 
 
 @overload
 def render_gradient(
-    density: Volume, scene: Scene | CompleteScene, target: Image, camera: Camera | None = None
+    density: Volume, scene: Scene, target: Image, camera: Camera | None = None
 ) -> tuple[float, Volume, Image]: ...
 @overload
 def render_gradient(
-    density: Volume, scene: Scene | CompleteScene, target: Sequence[Image], camera: Sequence[Camera]
+    density: Volume, scene: Scene, target: Sequence[Image], camera: Sequence[Camera]
 ) -> tuple[float, Volume, list[Image]]: ...
 def render_gradient(
     density: Volume,
-    scene: Scene | CompleteScene,
+    scene: Scene,
     target: Image | Sequence[Image],
     camera: Camera | Sequence[Camera] | None = None,
 ) -> tuple[float, Volume, Image | list[Image]]:
@@ -122,7 +122,7 @@ def render_gradient(
     return sum(losses), sum(gradients[1:], gradients[0]), list(images)
 
 
-def _renderer(scene: Scene | CompleteScene, camera: Camera | None) -> Renderer:
+def _renderer(scene: Scene, camera: Camera | None) -> Renderer:
     """The renderer of a camera; the scene's own, if it has one, still decides how an environment is sampled."""
     require_scene(scene)
     require_kind(camera, Camera | None, "camera", "a Camera")

@@ -1,12 +1,11 @@
 """What is in front of the lens: camera, domain, medium, lights, background; and its file.
 
-``description`` holds `Scene`, what a user gives, and ``complete`` holds `CompleteScene`, in which nothing is left open.
+``description`` holds `Scene`, what a user gives, and `CompleteScene`, the same with nothing left open.
 """
 
 from smokelift.scene.camera import LARGEST_PICTURE, Camera, as_matrix, look_at_matrix, orbit, shared_part
 from smokelift.scene.checks import SceneError
-from smokelift.scene.complete import CompleteScene, completed, require_scene
-from smokelift.scene.description import Scene, scene_from_dict
+from smokelift.scene.description import CompleteScene, Scene, completed, require_scene, scene_from_dict
 from smokelift.scene.domain import SIDES, Box, Domain, Inlet, Side
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight

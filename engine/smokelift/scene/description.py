@@ -15,10 +15,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from smokelift.checks import listed, require_kind, shown
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, file_path, integer, set_fields
-from smokelift.scene.domain import Box, Inlet, Side, checked_sides
+from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import PointLight
 from smokelift.scene.lights import Light
@@ -172,6 +175,61 @@ class Scene:
             If the file cannot be written.
         """
         write_file(self, file_path(path, "path"), comments)
+
+
+class CompleteScene(Scene):
+    """A scene with every choice made, which is what a renderer needs: no part but the clip is None.
+
+    It is made of a `Scene` that was checked, so what was not given is all that is refused; ValueError.
+    """
+
+    camera: Camera
+    domain: Domain
+    medium: Medium
+    background: Background
+    scattering: Scattering
+
+    def __post_init__(self) -> None:
+        """Check that nothing is left open."""
+        for name in ("camera", "medium", "background", "scattering"):
+            if getattr(self, name) is None:
+                raise ValueError(f"The scene has no {name}; give one.")
+        if not isinstance(self.domain, Domain):
+            lacks = "no domain" if self.domain is None else "a domain without a resolution"
+            raise ValueError(f"The scene has {lacks}; give its corners and its resolution.")
+
+    def inflow(self) -> NDArray[np.bool_] | None:
+        """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
+        if not self.inlets:
+            return None
+        entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets])
+        return entries
+
+
+def require_scene(scene: object) -> None:
+    """Refuse what is no scene; ValueError."""
+    require_kind(scene, Scene, "scene", "a Scene (Scene.load reads one from a file)")
+
+
+def completed(scene: Scene, camera: Camera | None = None) -> CompleteScene:
+    """Complete a description with defaults, without any footage.
+
+    Parameters
+    ----------
+    scene
+        Needs a domain, and a camera unless one is given. A complete scene stays as it is, but for the camera.
+    camera
+        Takes the place of the scene's.
+
+    Raises
+    ------
+    ValueError
+        If there is no camera or no domain.
+    """
+    require_scene(scene)
+    given = {name: value for name, value in {**vars(scene), "camera": camera or scene.camera}.items() if value}
+    defaults = {"medium": Medium(), "background": Background(color=(0.0, 0.0, 0.0)), "scattering": "single"}
+    return CompleteScene(**{**defaults, **given})
 
 
 def scene_from_dict(data: Mapping[str, Any], name: str = "scene", base: Path | None = None) -> Scene:

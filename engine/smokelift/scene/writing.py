@@ -17,14 +17,13 @@ from smokelift.scene.checks import SceneError
 from smokelift.scene.lights import LIGHT_TYPES
 
 if TYPE_CHECKING:
-    from smokelift.scene.complete import CompleteScene
     from smokelift.scene.description import Scene
 
 Table = dict[str, Any]
 _LIGHT_NAMES = {kind: name for name, kind in LIGHT_TYPES.items()}
 
 
-def write_file(scene: Scene | CompleteScene, path: Path, comments: Sequence[str] = ()) -> None:
+def write_file(scene: Scene, path: Path, comments: Sequence[str] = ()) -> None:
     """Write a scene file, whole or not at all, with comments as lines at its top; see `Scene.save`."""
     if path.is_dir():
         raise SceneError(f"{path}: is a folder; give the name of a file")
@@ -42,7 +41,7 @@ def write_file(scene: Scene | CompleteScene, path: Path, comments: Sequence[str]
             aside.unlink(missing_ok=True)
 
 
-def scene_to_dict(scene: Scene | CompleteScene, base: Path | None = None) -> Table:
+def scene_to_dict(scene: Scene, base: Path | None = None) -> Table:
     """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
 
     A complete scene is what `completed` makes of the description that is read back. Paths below the folder `base`

@@ -75,7 +75,10 @@ def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, gre
     """Colour (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
     # only the sum of an environment's directions counts, so one stands for all
     few = tuple(replace(each, directions=1) if isinstance(each, EnvironmentLight) else each for each in lights)
-    source = scene_optics(CompleteScene(camera, domain, grey, few, Background(), "single")).unshadowed_source()
+    scene = CompleteScene(
+        camera=camera, domain=domain, medium=grey, lights=few, background=Background(), scattering="single"
+    )
+    source = scene_optics(scene).unshadowed_source()
     return source / source.max() if source.max() > 0 else np.ones(3)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from smokelift.batch import BatchShot
+from smokelift.batch.shots import BatchShot
 
 FAKE = Path(__file__).parent / "fake_engine.py"
 
@@ -35,4 +35,4 @@ def make_shot(tmp_path: Path) -> Callable[..., BatchShot]:
 @pytest.fixture
 def ledger() -> Callable[[BatchShot], list[int]]:
     """Read the frames of a shot that were finished, in the order in which they were."""
-    return lambda shot: [int(line) for line in (shot.folder / f"{shot.name}.ledger").read_text().split()]
+    return lambda shot: [int(line) for line in shot.file("ledger").read_text().split()]

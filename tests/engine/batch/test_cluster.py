@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import smokelift
-from smokelift.batch import BatchShot, read_record, run_on_cluster
-from smokelift.batch.cluster import ClusterError
-from smokelift.batch.record import Record
+from smokelift.batch.shots import BatchShot
+from smokelift.batch.work import Record
 
-needs_dask = pytest.mark.skipif(
-    importlib.util.find_spec("distributed") is None, reason="Dask distributed is not installed"
-)
+if importlib.util.find_spec("distributed") is None:
+    pytest.skip("Dask distributed is not installed", allow_module_level=True)
+
+import distributed
+
+from smokelift.batch import cluster as batch_cluster
+from smokelift.batch.cluster import Stop, run_on_cluster
+
 posix = pytest.mark.skipif(os.name == "nt", reason="processes are killed by signals")
 
 ENVIRONMENT = {
@@ -29,6 +36,8 @@ ENVIRONMENT = {
     "PYTHONPATH": os.pathsep.join([str(Path(smokelift.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
     "DASK_DISTRIBUTED__COMM__RETRY__COUNT": "0",
 }
+DONE = Record({}, "done")
+
 SECONDS = 120.0
 """For a machine that does much else."""
 
@@ -86,7 +95,6 @@ def until(true: Callable[[], object]) -> None:
         time.sleep(0.02)
 
 
-@needs_dask
 @posix
 def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, make_shot, tmp_path, ledger) -> None:
     """A worker and the scheduler are killed while shots run, and the storage is full for a while."""
@@ -95,7 +103,7 @@ def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, 
     shots = [make_shot(f"shot{n}", frames=12, seconds=0.1, n9=str(full), n4="crash") for n in range(3)]
 
     def frames() -> int:
-        return sum(len(ledger(shot)) for shot in shots if (shot.folder / f"{shot.name}.ledger").exists())
+        return sum(len(ledger(shot)) for shot in shots if shot.file("ledger").exists())
 
     scheduler, first, second = cluster.scheduler(), cluster.worker(), cluster.worker()
     driver = cluster.drive()
@@ -121,9 +129,6 @@ class Given:
     priority: int
     status: str = "finished"
 
-    def exception(self) -> None:
-        """It has none."""
-
     def result(self) -> Record:
         return self.record
 
@@ -142,14 +147,16 @@ class LaterWorker:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def register_plugin(self, _: object) -> None:
+    status = "closed"
+
+    def register_plugin(self, _: object, name: str) -> None:
         pass
 
     def run_on_scheduler(self, _: object) -> bool:
         return False
 
     def submit(self, _: object, shot: BatchShot, *__: object, priority: int = 0, **___: object) -> Given:
-        return Given(read_record(shot), priority)
+        return Given(DONE, priority)
 
 
 def begun(tasks: list[Given], loop: None) -> list[Given]:
@@ -158,16 +165,55 @@ def begun(tasks: list[Given], loop: None) -> list[Given]:
     return [task for _, task in ordered]
 
 
-@needs_dask
 def test_a_worker_that_comes_later_begins_the_shots_in_their_order(make_shot, monkeypatch) -> None:
     monkeypatch.setattr("distributed.Client", LaterWorker)
     monkeypatch.setattr("distributed.as_completed", begun)
     shots = [make_shot(name) for name in ("west", "east", "north")]
-    ended = run_on_cluster([(shot, read_record(shot)) for shot in shots], lambda shot, stop: None, "tcp://", print)
+    ended = run_on_cluster([(shot, 0) for shot in shots], lambda shot, stop: DONE, "tcp://", print)
     assert [shot.name for shot, _ in ended] == ["west", "east", "north"]
 
 
-def test_a_cluster_that_is_not_there_is_said(make_shot, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterError, match=r"--scheduler needs Dask: pip install 'smokelift\[cluster\]'"):
-        list(run_on_cluster([(make_shot(), None)], lambda shot, stop: None, "tcp://127.0.0.1:1", print))
+@pytest.fixture
+def on_worker(make_shot, monkeypatch) -> Callable[..., Record]:
+    """Work on a shot by a task on a worker that has the plugin of the batch."""
+    worker = SimpleNamespace(plugins={"batch": Stop()})
+    worker.plugins["batch"].setup(worker)
+    monkeypatch.setattr(batch_cluster.distributed, "get_worker", lambda: worker)
+    return lambda task: batch_cluster.work(make_shot(), lambda shot, stop: task(worker.plugins["batch"], stop), "batch")
+
+
+def test_a_shot_that_ended_is_returned(on_worker) -> None:
+    assert on_worker(lambda plugin, stop: DONE) == DONE
+
+
+def test_storage_that_fails_is_no_lost_connection(on_worker) -> None:
+    def fail(_plugin: Stop, _stop: threading.Event) -> Record:
+        raise OSError("Read-only file system")
+
+    record = on_worker(fail)
+    assert (record.status, record.sentence) == ("stuck", "Read-only file system")
+
+
+def test_a_worker_that_ends_gives_its_shot_back(on_worker) -> None:
+    def end(plugin: Stop, stop: threading.Event) -> Record:
+        plugin.teardown(None)
+        assert stop.is_set()
+        return replace(DONE, status="cancelled")
+
+    with pytest.raises(distributed.Reschedule):
+        on_worker(end)
+
+
+@posix
+def test_a_batch_that_is_cancelled_ends_its_shots_at_once(cluster, make_shot, tmp_path, ledger) -> None:
+    shots = [make_shot(f"shot{n}", frames=1000, seconds=0.02) for n in range(2)]
+    cluster.scheduler(), cluster.worker()
+    driver = cluster.drive()
+    until(lambda: shots[0].file("ledger").exists())
+    driver.send_signal(signal.SIGINT)
+    said, _ = driver.communicate(timeout=SECONDS)
+    assert said.splitlines()[-1] == "cancelled"
+    until(lambda: not (shots[0].folder / ".shot0.lock").exists())
+    there = ledger(shots[0])
+    assert 0 < len(there) < 1000
+    assert not shots[1].file("ledger").exists()

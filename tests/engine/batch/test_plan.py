@@ -1,55 +1,67 @@
 """What a batch still takes, and its page."""
 
+import json
+
 import pytest
 from PIL import Image
 
-from smokelift.batch import Frames, Record, duration, remaining_work, write_report
-from smokelift.batch.record import Forecast
+from smokelift.batch.plan import duration, remaining_work, write_report
+from smokelift.batch.work import Forecast, Record
 
 
-def test_the_pace_is_measured_scaled_or_foretold(make_shot) -> None:
-    looked = Record(of={}, forecast=Forecast(10, 100.0, 7))
-    half = Frames(4, seconds=[20.0] * 4)
-    new, begun = make_shot("new"), make_shot("begun")
-    (alone,) = remaining_work([(new, looked, Frames())])
+@pytest.fixture
+def filmed(make_shot):
+    """A shot with so many finished frames in its folder."""
+
+    def make(name: str, count: int, seconds: float = 1.0, complete: bool = False, psnr: float = 30.0):
+        shot = make_shot(name)
+        shot.directory.mkdir(parents=True)
+        frames = {str(n + 1): {"psnr": psnr + n, "seconds_density": seconds} for n in range(count)}
+        index = {"format": 1, "scene": {}, "settings": {}, "choices": [], "provenance": [], "frames": frames}
+        rest = {"sources": {}, "checksums": {}, "versions": {}, "complete": complete}
+        (shot.directory / "sequence.json").write_text(json.dumps({**index, **rest}))
+        return shot
+
+    return make
+
+
+def foretold(frames: int, seconds: float, memory: int = 1, **known) -> Record:
+    return Record(of={}, forecast=Forecast(frames=frames, seconds=seconds, memory=memory), **known)
+
+
+def test_the_pace_is_measured_scaled_or_foretold(make_shot, filmed) -> None:
+    looked = foretold(10, 100.0, 7)
+    new, begun = make_shot("new"), filmed("begun", 4, 20.0)
+    (alone,) = remaining_work({new: looked})
     assert (alone.frames, alone.seconds, alone.basis, alone.memory) == (10, 100.0, "foretold", 7)
-    first, second = remaining_work([(begun, looked, half), (new, looked, Frames())])
+    first, second = remaining_work({begun: looked, new: looked})
     assert (first.shot, first.seconds, first.basis) == (new, pytest.approx(200.0), "scaled")
     assert (second.shot, second.frames, second.seconds, second.basis) == (begun, 6, 120.0, "measured")
 
 
-def test_finished_and_unknown_shots_are_left_out(make_shot) -> None:
-    looked = Record(of={}, status="done", forecast=Forecast(2, 1.0, 1))
-    known = [(make_shot("a"), looked, Frames(2, True, [9.0, 9.0])), (make_shot("b"), Record(of={}), Frames())]
-    assert remaining_work(known) == ()
+def test_finished_and_unknown_shots_are_left_out(make_shot, filmed) -> None:
+    done = foretold(2, 1.0, status="done")
+    assert remaining_work({filmed("a", 2, complete=True): done, make_shot("b"): Record(of={})}) == ()
     assert duration((), 3) == 0.0
 
 
 def test_the_longest_go_first_to_whoever_is_free(make_shot) -> None:
-    shots = [
-        (make_shot(f"{seconds}"), Record(of={}, forecast=Forecast(1, seconds, 1)), Frames())
-        for seconds in (1.0, 5.0, 2.0, 3.0, 4.0)
-    ]
-    left = remaining_work(shots)
+    left = remaining_work({make_shot(f"{seconds}"): foretold(1, seconds) for seconds in (1.0, 5.0, 2.0, 3.0, 4.0)})
     assert [each.seconds for each in left] == [5.0, 4.0, 3.0, 2.0, 1.0]
     assert [duration(left, workers) for workers in (1, 2, 3, 9)] == [15.0, 8.0, 5.0, 5.0]
 
 
-def test_a_row_a_shot_with_its_picture(make_shot) -> None:
-    done, broken = make_shot("done"), make_shot("<b>")
-    done.folder.mkdir()
-    Image.new("RGB", (4, 4)).save(done.picture)
-    page = write_report(
-        done.folder,
+def test_a_row_a_shot_with_its_picture(filmed, tmp_path) -> None:
+    done, broken = filmed("done", 3, complete=True), filmed("<b>", 2)
+    Image.new("RGB", (4, 4)).save(done.file("png"))
+    page = tmp_path / "report.html"
+    write_report(
+        page,
         "A & B",
-        [
-            (
-                done,
-                Record(of={}, status="done", notes=("Assumed.",), seconds=61.4),
-                Frames(3, True, [1.0], [30.0, 32.0]),
-            ),
-            (broken, Record(of={}, status="refused", sentence="No <video>.", forecast=Forecast(9, 1, 1)), Frames(2)),
-        ],
+        {
+            done: Record(of={}, status="done", notes=["Assumed."], seconds=61.4),
+            broken: foretold(9, 1, status="refused", sentence="No <video>."),
+        },
     )
     text = page.read_text()
     assert text.count("<tr>") == 3

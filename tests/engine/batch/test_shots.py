@@ -63,7 +63,7 @@ npz = false
         ('[[shots]]\ninput = "a"\nnpz = 1', "shots.toml, line 3: npz must be true or false, not 1"),
         (
             '[[shots]]\ninput = "a/x.mp4"\n[[shots]]\ninput = "b/X.mov"',
-            'shots.toml, line 1: several shots are called "x"',
+            'shots.toml, line 3: several shots are called "X"',
         ),
         ('[[shots]]\ninput = "a"\nname = "../b"', "cannot be the name of a file"),
         ("shots = 3", "lists no shots"),

@@ -1,23 +1,33 @@
 """The work on one shot: nothing is lost, and nothing is done twice."""
 
 import json
+import os
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import psutil
+import pytest
 
-from smokelift.batch import finish_shot, finished_frames, look_at_shot, read_state
-from smokelift.batch.work import Patience
+import smokelift
+from smokelift.batch.shots import BatchShot
+from smokelift.batch.work import ENGINE, finish_shot, is_finished, look_at_shot, read_index, read_record
 
-SHORT = Patience(pause=0.05, longest_pause=0.05, total=5.0)
+PYTHON = (sys.executable, "-c")
+
+
+def finished(shot: BatchShot) -> bool:
+    return is_finished(shot, read_record(shot))
 
 
 def test_a_finished_shot_is_not_run_again(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=3)
     record = finish_shot(shot, threading.Event(), engine=fake)
-    assert (record.status, record.sentence, record.notes) == ("done", "Finished.", ("A fake.",))
-    assert read_state(shot).finished
+    assert (record.status, record.sentence, record.notes) == ("done", "Finished.", ["A fake."])
+    assert finished(shot)
     again = finish_shot(shot, threading.Event(), engine=fake)
     assert (again.runs, ledger(shot)) == (1, [1, 2, 3])
 
@@ -25,18 +35,24 @@ def test_a_finished_shot_is_not_run_again(make_shot, fake, ledger) -> None:
 def test_a_shot_whose_options_changed_is_run_again(make_shot, fake) -> None:
     shot = make_shot()
     finish_shot(shot, threading.Event(), engine=fake)
-    assert not read_state(replace(shot, options=("--quality=fine",))).finished
+    assert not finished(replace(shot, options=("--quality=fine",)))
     shot.input.write_text(shot.input.read_text() + " ")
-    assert not read_state(shot).finished
+    assert not finished(shot)
 
 
-def test_after_a_crash_the_next_run_goes_on(make_shot, fake, ledger) -> None:
+def test_after_a_crash_the_shot_goes_on(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=4, n3="crash")
     record = finish_shot(shot, threading.Event(), engine=fake)
-    assert record.status == "crashed"
-    assert "signal 6" in record.sentence
-    assert finish_shot(shot, threading.Event(), engine=fake).status == "done"
-    assert ledger(shot) == [1, 2, 3, 4]
+    assert (record.status, record.runs, ledger(shot)) == ("done", 2, [1, 2, 3, 4])
+
+
+def test_a_crash_is_tried_again_twice(make_shot) -> None:
+    code = "import sys; print('loading', flush=True); print('no such thing', file=sys.stderr); sys.exit(5)"
+    shot = make_shot()
+    record = finish_shot(shot, threading.Event(), engine=(*PYTHON, code))
+    assert (record.status, record.runs) == ("crashed", 3)
+    assert record.sentence == "The engine ended by itself (status 5): no such thing"
+    assert shot.file("log").read_text().count("no such thing") == 3
 
 
 def test_what_the_engine_refuses_is_not_tried_again(make_shot, fake) -> None:
@@ -56,7 +72,7 @@ def test_a_full_disk_is_waited_for(make_shot, fake, tmp_path, ledger) -> None:
         if len(said) == 2:
             full.unlink()
 
-    record = finish_shot(shot, threading.Event(), hear, SHORT, fake)
+    record = finish_shot(shot, threading.Event(), hear, 0.05, fake)
     assert (record.status, ledger(shot)) == ("done", [1, 2, 3])
     assert said[0] == "shot: The disk is full. It is tried again in 0 s."
 
@@ -65,9 +81,7 @@ def test_two_that_work_on_one_shot_do_it_once(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=4, seconds=0.05)
     records = []
     threads = [
-        threading.Thread(
-            target=lambda: records.append(finish_shot(shot, threading.Event(), patience=SHORT, engine=fake))
-        )
+        threading.Thread(target=lambda: records.append(finish_shot(shot, threading.Event(), pause=0.05, engine=fake)))
         for _ in range(3)
     ]
     for thread in threads:
@@ -83,10 +97,10 @@ def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake) -> None:
     stop = threading.Event()
     threading.Timer(0.4, stop.set).start()
     assert finish_shot(shot, stop, engine=fake).status == "cancelled"
-    there = finished_frames(shot).count
+    there = len(read_index(shot).frames)
     assert 0 < there < 1000
     time.sleep(0.1)
-    assert finished_frames(shot).count == there
+    assert len(read_index(shot).frames) == there
     assert not [child for child in psutil.Process().children() if "fake_engine" in " ".join(child.cmdline())]
 
 
@@ -100,3 +114,27 @@ def test_a_shot_is_forecast_once(make_shot, fake) -> None:
     }
     assert look_at_shot(shot, threading.Event(), ("no such command",)) == record
     assert finish_shot(shot, threading.Event(), engine=fake).forecast == record.forecast
+
+
+def test_a_log_that_cannot_be_written_stops_nothing(make_shot) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no full device here")
+    shot = make_shot()
+    shot.folder.mkdir()
+    shot.file("log").symlink_to("/dev/full")
+    assert (
+        finish_shot(
+            shot, threading.Event(), engine=(*PYTHON, """print('{"event": "done", "text": "Made."}')""")
+        ).sentence
+        == "Made."
+    )
+
+
+def test_the_real_command_ends_when_its_standard_input_closes() -> None:
+    environment = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
+    command = [*ENGINE, "reconstruct", "/dev/null", "--out", "never"]
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, env=environment, check=False, timeout=60
+    )
+    assert done.returncode == 130
+    assert done.stderr.endswith(b"Cancelled.\n")

@@ -7,8 +7,7 @@ import pytest
 from smokelift.checks import Doubt, Remark
 from smokelift.report.facts import boundaries
 from smokelift.report.shortcomings import shortcomings
-from smokelift.scene import Inlet
-from smokelift.scene.complete import completed
+from smokelift.scene import Inlet, completed
 from smokelift.setup.settings import Settings
 
 

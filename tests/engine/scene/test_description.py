@@ -10,6 +10,7 @@ from scene_examples import GOOD, load, moving_camera
 
 from smokelift.scene import (
     Background,
+    Box,
     Camera,
     Domain,
     Inlet,
@@ -113,3 +114,17 @@ def test_a_moving_camera_must_see_the_domain_once() -> None:
     assert Scene(camera=camera, domain=domain).camera == camera
     with pytest.raises(SceneError, match="does not see the domain"):
         Scene(camera=moving_camera((50, -7, 1.5), (40, -7, 1.5)), domain=domain)
+
+
+def test_a_complete_scene_has_nothing_open() -> None:
+    camera = Camera.look_at((0.0, -4.0, 0.5), (0.0, 0.0, 0.5), fov_y_degrees=30, size=(24, 32))
+    domain = Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (12, 12, 12))
+    whole = completed(Scene(domain=domain), camera)
+    assert (whole.camera, whole.scattering, whole.medium) == (camera, "single", Medium())
+    assert completed(whole) == whole
+    with pytest.raises(ValueError, match="no camera"):
+        completed(Scene(domain=domain))
+    with pytest.raises(ValueError, match="a domain without a resolution"):
+        completed(Scene(camera=camera, domain=Box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))))
+    with pytest.raises(ValueError, match="no background"):
+        replace(whole, background=None)

@@ -6,7 +6,7 @@ import argparse
 import math
 import os
 import threading
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, suppress
 from typing import Any, NoReturn
 
@@ -15,22 +15,10 @@ import psutil
 from smokelift.app.commands import reconstruct
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
-from smokelift.batch import (
-    BatchShot,
-    Record,
-    Remaining,
-    Room,
-    ShotState,
-    duration,
-    finish_shot,
-    look_at_shot,
-    read_shots,
-    read_state,
-    remaining_work,
-    run_here,
-    run_on_cluster,
-    write_report,
-)
+from smokelift.batch.local import run_here
+from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
+from smokelift.batch.shots import BatchShot, read_shots
+from smokelift.batch.work import Needs, Record, Task, finish_shot, look_at_shot, read_record
 from smokelift.checks import counted
 from smokelift.report.cost import memory_free
 
@@ -54,105 +42,82 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Run the shots that are not finished; ValueError if the list is wrong, or, at the end, if a shot failed."""
-    shots = read_shots(options.list, _check_arguments)
-    states = {shot.name: read_state(shot) for shot in shots}
-    stop = threading.Event()
+    records = {shot: read_record(shot) for shot in read_shots(options.list, _check_arguments)}
     workers = options.workers or os.cpu_count() or 1
-    try:
-        unfinished = [state for state in states.values() if not state.finished]
-        unknown = [(state.shot, state.record) for state in unfinished if state.record.forecast is None]
-        if unknown:
-            say.note(f"Inspecting {counted(len(unknown), 'clip')} ...")
-        with closing(_look_at_shots(options.scheduler, unknown, stop, say)) as looked_at:
-            for shot, record in looked_at:
-                states[shot.name] = read_state(shot)._replace(record=record)
-                if record.forecast is None:
-                    say.note(f"{shot.name}: {record.sentence}")
-        left = remaining_work(states.values())
-        for line in _forecast_lines(left, workers):
-            say.note(line)
-        if options.plan:
-            say.finish(_summary(left, workers), _as_dict(left, workers))
-            return
-        _run_remaining(options, say, states, left, workers, stop)
-    finally:
-        stop.set()
+    unknown = [(shot, 0) for shot, record in records.items() if record.forecast is None]
+    if unknown:
+        say.note(f"Inspecting {counted(len(unknown), 'clip')} ...")
+    with closing(_run_shots(options.scheduler, unknown, look_at_shot, say.note, 1)) as looked_at:
+        for shot, record in looked_at:
+            records[shot] = record
+            if record.forecast is None:
+                say.note(f"{shot.name}: {record.sentence}")
+    left = remaining_work(records)
+    for line in _forecast_lines(left, workers):
+        say.note(line)
+    if options.plan:
+        say.finish(_summary(left, workers), _as_dict(left, workers))
+    else:
+        _run_remaining(options, say, records, left, workers)
 
 
 def _run_remaining(
     options: argparse.Namespace,
     say: Reporter,
-    states: dict[str, ShotState],
+    records: dict[BatchShot, Record],
     left: Sequence[Remaining],
     workers: int,
-    stop: threading.Event,
 ) -> None:
     """Run what is left and keep the report up to date; ValueError, at the end, if a shot failed."""
-    shots = [(each.shot, states[each.shot.name].record) for each in left]
-    with closing(_run_shots(options.scheduler, shots, workers, stop, say)) as ended:
-        for shot, record in ended:
-            states[shot.name] = read_state(shot)._replace(record=record)
-            say.note(f"{shot.name}: {record.status}. {record.sentence}")
-            with suppress(OSError):  # the storage may be full for a while; the next shot updates the page
-                write_report(shot.folder, options.list.stem, list(states.values()))
-    final = list(states.values())
-    page = write_report(final[0].shot.folder, options.list.stem, final)
-    missing = [state.shot.name for state in final if state.record.status != "done"]
-    if missing:
-        share = f"{len(missing)} of {counted(len(final), 'shot')}"
-        raise ValueError(
-            f"{share} did not come to the end ({', '.join(missing)}); {page} says why. "
-            "Give the same command again to go on."
-        )
-    say.finish(
-        f"Finished: {counted(len(final), 'shot')}; {page} shows the result.",
-        {"report": str(page), "shots": [str(state.shot.directory) for state in final]},
-    )
-
-
-def _look_at_shots(
-    scheduler: str | None, unknown: Sequence[tuple[BatchShot, Record]], stop: threading.Event, say: Reporter
-) -> Generator[tuple[BatchShot, Record], None, None]:
-    """Inspect shots one by one, or on a cluster, and yield each with its forecast."""
-    if scheduler is not None:
-        yield from run_on_cluster(unknown, look_at_shot, scheduler, say.note)
-    else:
-        yield from ((shot, look_at_shot(shot, stop)) for shot, _ in unknown)
-
-
-def _run_shots(
-    scheduler: str | None,
-    shots: Sequence[tuple[BatchShot, Record]],
-    workers: int,
-    stop: threading.Event,
-    say: Reporter,
-) -> Generator[tuple[BatchShot, Record], None, None]:
-    """Run shots, here or on a cluster, and yield each at its end."""
-    if scheduler is not None:
-        yield from run_on_cluster(shots, finish_shot, scheduler, say.note)
-        return
-    room = Room(round(MEMORY_SHARE * memory_free()), workers)
-    total = psutil.virtual_memory().total
-    fitting = []
-    for shot, record in shots:
-        if record.forecast is not None and record.forecast.memory > total:
-            say.note(
-                f"{shot.name}: needs {_gib(record.forecast.memory)} and this machine has {_gib(total)}; choose a lower "
-                "resolution."
-            )
-        else:
-            fitting.append((shot, record))
+    page = next(iter(records)).folder / "report.html"
     one_at_a_time = threading.Lock()
 
     def note(text: str) -> None:
         with one_at_a_time:
             say.note(text)
 
-    def work(shot: BatchShot) -> Record:
+    def work(shot: BatchShot, stop: threading.Event) -> Record:
         note(f"{shot.name}: begins.")
         return finish_shot(shot, stop, note)
 
-    yield from run_here(fitting, work, room, stop)
+    total = psutil.virtual_memory().total
+    large = [each for each in left if options.scheduler is None and each.memory > total]
+    for each in large:
+        needs = f"needs {_gib(each.memory)} and this machine has {_gib(total)}"
+        say.note(f"{each.shot.name}: {needs}; choose a lower resolution.")
+    shots = [(each.shot, each.memory) for each in left if each not in large]
+    task = finish_shot if options.scheduler is not None else work
+    with closing(_run_shots(options.scheduler, shots, task, note, workers)) as ended:
+        for shot, record in ended:
+            records[shot] = record
+            note(f"{shot.name}: {record.status}. {record.sentence}")
+            with suppress(OSError):  # the storage may be full for a while; the next shot updates the page
+                write_report(page, options.list.stem, records)
+    write_report(page, options.list.stem, records)
+    missing = [shot.name for shot, record in records.items() if record.status != "done"]
+    if missing:
+        raise ValueError(
+            f"{len(missing)} of {counted(len(records), 'shot')} did not come to the end ({', '.join(missing)}); {page} "
+            "says why. Give the same command again to go on."
+        )
+    say.finish(
+        f"Finished: {counted(len(records), 'shot')}; {page} shows the result.",
+        {"report": str(page), "shots": [str(shot.directory) for shot in records]},
+    )
+
+
+def _run_shots(
+    scheduler: str | None, shots: Needs, task: Task, say: Callable[[str], None], workers: int
+) -> Generator[tuple[BatchShot, Record], None, None]:
+    """Run shots, here or on a cluster, and yield each at its end."""
+    if scheduler is None:
+        yield from run_here(shots, task, round(MEMORY_SHARE * memory_free()), workers)
+        return
+    try:
+        from smokelift.batch.cluster import run_on_cluster
+    except ImportError as error:
+        raise ValueError("--scheduler needs Dask: pip install 'smokelift[cluster]'.") from error
+    yield from run_on_cluster(shots, task, scheduler, say)
 
 
 def _forecast_lines(left: Sequence[Remaining], workers: int) -> Iterator[str]:

@@ -58,4 +58,7 @@ def _gpu(running: str) -> str:
         return f"{running}; the renderer runs on it"
     if device.driver_installed() and not device.has_taichi():
         return f"not used, as {device.NO_TAICHI}; the renderer runs on the processor"
-    return "none that Taichi can use well; the renderer runs on the processor"
+    gpu = device.available_gpu()
+    return (
+        f"{gpu}, with --device gpu; by itself the renderer runs on the processor" if gpu else "none that Taichi can use"
+    )

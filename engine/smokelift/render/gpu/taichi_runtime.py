@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import io
 import os
-import re
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,34 +26,24 @@ _running: str | None = None  # Taichi itself is one per process
 
 def supported_gpu() -> str | None:
     """Name of the first GPU back end that Taichi can use here, or None."""
-    with Path(os.devnull).open("wb") as nowhere, _diverted(nowhere):
+    with _silenced():
         for name, arch in GPU_BACKENDS.items():
             if ti.lang.misc.is_arch_supported(arch):
                 return name
     return None
 
 
-def start(backend: str) -> str:
+def start(backend: str) -> None:
     """Start Taichi on ``"cpu"`` or one of `GPU_BACKENDS`; on the back end that already runs, do nothing.
 
-    It returns the name of the Vulkan device, if it is one and has just been started, and raises RuntimeError if Taichi
-    already runs on another back end.
+    It raises RuntimeError if Taichi already runs on another back end.
     """
     global _running
-    if _running is not None:
-        if _running != backend:
-            raise RuntimeError(f"Taichi already runs on {_running} in this process; start a new one.")
-        return ""
-    chip = _initialise(GPU_BACKENDS.get(backend, ti.cpu))
-    _running = backend
-    return chip
-
-
-def stop() -> None:
-    """End Taichi, so that it can start on another back end."""
-    global _running
-    ti.reset()
-    _running = None
+    if _running is None:
+        _initialise(GPU_BACKENDS.get(backend, ti.cpu))
+        _running = backend
+    elif _running != backend:
+        raise RuntimeError(f"Taichi already runs on {_running} in this process; start a new one.")
 
 
 def _cache_directory() -> Path:
@@ -63,28 +51,16 @@ def _cache_directory() -> Path:
     return (Path(base) if base else Path.home() / ".cache") / "smokelift" / "taichi"
 
 
-def _initialise(arch: Any) -> str:
-    """Start Taichi on a back end; the name of its Vulkan device, if it has one."""
+def _initialise(arch: Any) -> None:
     cache = _cache_directory()
     try:
         cache.mkdir(parents=True, exist_ok=True)
         where: dict[str, Any] = {"offline_cache_file_path": str(cache)}
     except OSError:
         where = {"offline_cache": False}  # in a shared folder others could put kernels for us
-    with tempfile.TemporaryFile() as log:
-        with _diverted(log):
-            ti.init(
-                arch=arch,
-                default_fp=ti.f32,
-                # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
-                fast_math=False,
-                **where,
-                log_level=ti.TRACE,  # nothing else tells the device's name
-            )
-            ti.set_logging_level(ti.ERROR)
-        log.seek(0)
-        found = re.search(rb'Vulkan Device "([^"]*)"', log.read())
-    return found.group(1).decode(errors="replace") if found else ""
+    with _silenced():
+        # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
+        ti.init(arch=arch, default_fp=ti.f32, fast_math=False, log_level=ti.ERROR, **where)
 
 
 def zeros(shape: tuple[int, ...]) -> Any:
@@ -123,14 +99,15 @@ def download(array: Any) -> np.ndarray[Any, Any]:
 
 
 @contextmanager
-def _diverted(file: IO[bytes]) -> Iterator[None]:
-    """Taichi's greeting and its drivers' complaints go to a file: output may carry JSON, errors are exceptions."""
+def _silenced() -> Iterator[None]:
+    """Taichi's greeting and its drivers' complaints go nowhere: output may carry JSON, errors are exceptions."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     saved = [os.dup(number) for number in (1, 2)]
     try:
-        for number in (1, 2):
-            os.dup2(file.fileno(), number)
+        with Path(os.devnull).open("wb") as nowhere:
+            for number in (1, 2):
+                os.dup2(nowhere.fileno(), number)
         # Python's streams need not be those two: a notebook or a test has put others in their place
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
             yield
