@@ -1,9 +1,10 @@
 """The plate where smoke hides it in every frame, in turn with the smoke: B from I - S and T, these from B.
 
 A plate that was found in a clip is continued from its surroundings where no frame is clear. But smoke lets through some
-of what is there, in each frame another part. What an element leaves of a picture, (I - S) / T, is the plate's; the
-clearest frame says it best. Smoke that stands from the first frame to the last shows next to nothing, and what is
-behind it stays as it was.
+of what is there, in each frame another part. The turns start from the plate that explains all frames best, cell by
+cell: in each of them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T. Then what an element leaves
+of a picture, (I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to
+the last shows next to nothing, and what is behind it stays as it was.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.extraction.element import BRIGHTNESS_RANGE, FINER, Cells, extracted, source_of
+from smokelift.extraction.element import BRIGHTNESS_RANGE, FINER, OUTLIER_FREEDOM, Cells, extracted, source_of
 from smokelift.extraction.source import clip_source
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, reduced_size
+from smokelift.footage.noise import EIGHT_BIT_STEP
 from smokelift.footage.plate import Plate, Plates
 
 FRAMES, SIDE, TURNS = 8, 96, 4
@@ -25,6 +27,15 @@ twice the cells by .004 and .01, for four times the time (docs/experiments/hidde
 
 RANGE = 0.005, 0.995
 """Quantiles of each channel of what is known of a plate, between which the rest of it is."""
+
+MIXTURES = np.linspace(0, 1, 6)
+"""Values of T among which a cell's mixture of smoke and plate is searched."""
+
+CANDIDATES = 1.0, 0.6, 0.36
+"""Values of T for which each frame proposes a plate."""
+
+INDEPENDENT = 3
+"""Number of independent frames that the frames count as: errors of smoke last (.75 to .95 from a frame to the next)."""
 
 MIN_UNKNOWN = 0.01
 """Smallest share of a plate that has to be unknown for turns to change the smoke."""
@@ -59,17 +70,54 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
     first = found = plate.through(lambda part: area_average(part, *finer), pixels)
     behind = area_average(first.image, *size)
     variance = float(np.trace(plate.errors)) / 3
+    start = _likeliest([Cells.of(picture, first, size) for picture in pictures], first, source)
+    found = replace(first, image=_changed(first, start - behind))
     for _ in range(TURNS):
-        best, clearest = np.zeros_like(behind[..., :1]), behind
+        best, clearest = np.zeros_like(behind[..., :1]), start
         for picture in pictures:
             shown, weight = _shown(Cells.of(picture, found, size), source)
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
         left = 1 / (1 + variance * best)
-        change = (1 - left) * (clearest - behind)
+        change = start + (1 - left) * (clearest - start) - behind
         found = replace(first, image=_changed(first, change))
     confidence = 1 - (1 - plate.confidence) * area_average(left[..., 0], *clip.size)
     return replace(plate, image=_changed(plate, change), confidence=confidence)
+
+
+def _likeliest(frames: Sequence[Cells], plate: Plate, source: Picture) -> Picture:
+    """The plate by cell (rows, columns, 3) that best explains all frames as mixtures, beside its continuation.
+
+    A frame's loss is that of the noise's Student t distribution at the likeliest T. J varies in brightness by
+    `BRIGHTNESS_RANGE`, so its variance is 1 - T times that along J; errors of the continuation are normal.
+    """
+    start = frames[0].behind
+    where = frames[0].unknown > MIN_UNKNOWN
+    continued = start[where].astype(np.float64)
+    seen = [(cells.seen[where].astype(np.float64), cells.noise[where].mean(-1, dtype=np.float64)) for cells in frames]
+    light = np.asarray(source, np.float64)
+    precision = np.linalg.inv(plate.errors + np.eye(3) * float(EIGHT_BIT_STEP) ** 2)
+    low, high = _range_of(plate)
+    proposed = (np.clip((values - (1 - t) * light) / t, low, high) for values, _ in seen for t in CANDIDATES)
+    best, least = continued, np.full(len(continued), np.inf)
+    for each in (continued, *proposed):
+        away = each - continued
+        loss = 0.5 * np.einsum("ni,ij,nj->n", away, precision, away)
+        for values, noise in seen:
+            loss += INDEPENDENT / FRAMES * np.min([_misfit(values - t * each, (1 - t) * light, noise) for t in MIXTURES], axis=0)
+        better = loss < least
+        best, least = np.where(better[:, None], each, best), np.minimum(loss, least)
+    found = start.copy()
+    found[where] = best
+    return found
+
+
+def _misfit(left: Picture, sent: Picture, noise: Picture) -> Picture:
+    """The loss (n,) of what smoke should send in cells, ``left`` (n, 3), where it sends ``sent`` (3,) on the mean."""
+    apart, spread = left - sent, np.square(BRIGHTNESS_RANGE)
+    along = spread * np.square(apart @ sent) / (noise + spread * (sent @ sent))
+    squares = (np.square(apart).sum(-1) - along) / noise
+    return np.asarray(0.5 * (OUTLIER_FREEDOM + 3) * np.log1p(squares / OUTLIER_FREEDOM))
 
 
 def _shown(cells: Cells, source: Picture) -> tuple[Picture, Picture]:
@@ -91,8 +139,13 @@ def _changed(plate: Plate, change: Picture) -> Picture:
     rows, columns = plate.confidence.shape
     unknown = (1 - plate.confidence)[..., None]
     changed = np.maximum(plate.image + unknown * area_average(change, columns, rows), 0)
+    return np.where(unknown > 0, np.clip(changed, *_range_of(plate)), changed)
+
+
+def _range_of(plate: Plate) -> tuple[Picture, Picture]:
+    """The least and the largest color (3,) that is known of a plate, but for outliers."""
     known = plate.image[plate.confidence == 1]
     if not len(known):
-        return changed
+        return np.zeros(3, np.float32), np.full(3, np.inf, np.float32)
     low, high = np.quantile(known, RANGE, axis=0).astype(np.float32)
-    return np.where(unknown > 0, np.clip(changed, low, high), changed)
+    return low, high

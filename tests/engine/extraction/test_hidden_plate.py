@@ -69,6 +69,16 @@ def test_smoke_that_drifts_shows_what_is_behind_it() -> None:
     assert better.confidence[plate.confidence < 0.5].mean() > 0.6
 
 
+def test_what_no_mixture_with_the_continuation_explains_is_the_plate() -> None:
+    """Red behind gray smoke that hides a part of it in each frame; what is around it is as gray as the smoke."""
+    behind = wall()
+    red = np.hypot(X - 96, Y - 80) < 30
+    behind[red] *= np.array([1.4, 0.2, 0.1], "f4")
+    plate = replace(continued(wall()), errors=0.03 * np.eye(3, dtype="f4"))
+    better = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0), plate, SOURCE)
+    assert off(better, behind) < 0.5 * off(plate, behind)
+
+
 def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
     behind = wall()
     plate = continued(behind)
