@@ -9,8 +9,9 @@ expected, and g - `PROFILE_CUT` is spread: smoke that is cut off shows a shell. 
 deviation sigma, A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). sigma is the geometric mean of two widths that the picture
 shows. The spread of the smoke's row is right for what rises as a column. The width of balls that fill the silhouette
 (inflated outlines: Igarashi, Matsuoka and Tanaka 1999) is right for what is round and longer than thick in any
-direction. Over four scenes with their axis known the mean was better in new views than either, by 0.4 to 0.9 dB. True
-rays are the longer the darker they are, too, which a smooth answer gains nothing by (docs/experiments/ray-thickness.md).
+direction. Over four scenes with their axis known the mean was better in new views than either, by 0.4 to 0.9 dB. In
+true smoke dark rays are longer than thin ones, by which a smooth answer gains nothing
+(docs/experiments/ray-thickness.md).
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
 density can have, so a ray's middle is moved along it until most of the profile is inside too
