@@ -6,7 +6,8 @@ corrects, in thick smoke, in shadow or of the velocity, a frame takes over no mo
 frame to frame (docs/experiments/temporal-prior.md).
 
 `GuidedSimulation`, for smoke with made-up detail, is a simulation that the clip guides: the detail of the frame before
-moves on with the flow, and the smooth answer of the new picture says how much smoke is where.
+moves on with the flow, and the smooth answer of the new picture says how much smoke is where. A velocity of its own,
+which nothing guides along the rays, makes more lobes there and worse jets (docs/experiments/simulated-carry.md).
 """
 
 from __future__ import annotations
