@@ -72,53 +72,37 @@ Mask mask_of(const Marks &voxels) {
     return {bytes_of(voxels), {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
 }
 
-HeightTable table_of(const std::array<Doubles, 3> &table) {
-    const auto &[heights, laterals, values] = table;
-    require_fit(values.ndim() == 2 && values.shape(0) == heights.size() &&
-                values.shape(1) == laterals.size());
-    return {values_of(heights), values_of(laterals), values.data()};
-}
-
 void register_places(py::module_ &module) {
     using namespace py::literals;
 
     module.def(
         "depth_profile",
-        [](const Marks &voxels, const std::array<Doubles, 3> &places,
-           const std::array<std::array<double, 3>, 3> &directions, const std::array<Array, 2> &at,
-           const std::array<Doubles, 3> &middle, const std::array<Doubles, 3> &across,
-           const std::array<Doubles, 3> &apart, const Doubles &balls, const Doubles &aside, double flatness,
-           double least, double scale) {
+        [](const Marks &voxels, const std::array<Doubles, 3> &places, const std::array<double, 3> &depth,
+           const std::array<Array, 2> &at, const Doubles &middle, const Doubles &width, double flatness) {
             const Mask mask = mask_of(voxels);
-            require_fit(balls.ndim() == 2 && balls.size() > 0 && aside.ndim() == 2 &&
-                        aside.shape(0) == balls.shape(0) && aside.shape(1) == balls.shape(1));
+            require_fit(middle.ndim() == 2 && middle.size() > 0 && width.ndim() == 2 &&
+                        width.shape(0) == middle.shape(0) && width.shape(1) == middle.shape(1));
             const DepthProfile profile{{values_of(places[0]), values_of(places[1]), values_of(places[2])},
-                                       directions,
-                                       table_of(middle),
-                                       table_of(across),
-                                       table_of(apart),
-                                       balls.data(),
-                                       aside.data(),
-                                       int(balls.shape(0)),
-                                       int(balls.shape(1)),
-                                       flatness,
-                                       least,
-                                       scale};
+                                       depth,
+                                       middle.data(),
+                                       width.data(),
+                                       int(middle.shape(0)),
+                                       int(middle.shape(1)),
+                                       flatness};
             for (int axis = 0; axis < 3; ++axis)
                 require_fit(int(profile.places[axis].size()) == mask.n[axis]);
             const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
             const auto count = py::ssize_t(first.back());
             require_fit(at[0].size() == count && at[1].size() == count);
             Array shapes(count), widths(count);
-            float *const shape = shapes.mutable_data(), *const width = widths.mutable_data();
+            float *const found_shapes = shapes.mutable_data(), *const found_widths = widths.mutable_data();
             const SeenAt seen_at{at[0].data(), at[1].data(), nullptr};
             released([&](Workers &workers) {
-                find_profile(profile, mask, first, seen_at, shape, width, workers);
+                find_profile(profile, mask, first, seen_at, found_shapes, found_widths, workers);
             });
             return py::make_tuple(shapes, widths);
         },
-        "voxels"_a, "places"_a, "directions"_a, "at"_a, "middle"_a, "across"_a, "apart"_a, "balls"_a,
-        "aside"_a, "flatness"_a, "least"_a, "scale"_a);
+        "voxels"_a, "places"_a, "depth"_a, "at"_a, "middle"_a, "width"_a, "flatness"_a);
 
     module.def(
         "marked",

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks import tables
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import images
+from smokelift.evaluation.orbit_shapes import SHAPES
 from smokelift.footage.images import area_average
 from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
@@ -38,10 +39,13 @@ ORBIT_COLUMNS: list[Column] = [
 ]
 
 
+SHAPE_COLUMNS: list[Column] = [(f"{name.replace('_', ' ')} (true)", [name, f"{name}_truth"], ".2f") for name in SHAPES]
+
+
 def table_columns(known: KnownScene) -> list[list[Column]]:
-    """Return the columns of a scene's tables: errors, then whether it looks like smoke from all around."""
+    """Return the columns of a scene's tables: errors, whether it looks like smoke from all around, and its shapes."""
     views = list(known.cameras)
-    return [capture_columns(views) if known.truth is None else error_columns(views), ORBIT_COLUMNS]
+    return [capture_columns(views) if known.truth is None else error_columns(views), ORBIT_COLUMNS, SHAPE_COLUMNS]
 
 
 def error_columns(views: list[str]) -> list[Column]:

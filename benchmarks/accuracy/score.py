@@ -20,6 +20,7 @@ from smokelift import Scene
 from smokelift.evaluation import metrics
 from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
 from smokelift.evaluation.orbit_scores import orbit_scores
+from smokelift.evaluation.orbit_shapes import SHAPES
 from smokelift.evaluation.resampling import on_grid, resampled
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Image, scene_renderer
@@ -44,6 +45,9 @@ BLACK = np.zeros(3, np.float32)
 VIEW_FIGURES = ("psnr", "ssim")
 ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "texture", "texture_own", "edges", "halo", "flicker")
 """Figures of the orbit beside the truth's, or beside the front where that is not known."""
+
+SHAPE_FIGURES = (*SHAPES, *(f"{name}_truth" for name in SHAPES))
+"""The same, of shapes along the camera's rays."""
 
 VOLUME_FIGURES = (
     "density_error", "height_mass_error", "mass_ratio", "velocity_error", "velocity_cosine", "velocity_error_around",
@@ -135,7 +139,7 @@ def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
     row |= _view_figures(known, run, folder)
     if (densities := known_densities(known, run, folder)) is not None:
         scores = around(known, densities)
-        row |= {name: scores[name] for name in ORBIT_FIGURES}
+        row |= {name: scores.get(name) for name in (*ORBIT_FIGURES, *SHAPE_FIGURES)}
     if known.truth is None:
         row |= _exposure_figures(known, run, folder)
     elif not baseline:

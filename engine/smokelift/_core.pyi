@@ -447,28 +447,19 @@ class PictureMap:
     def nearest(self) -> float:
         """Least depth (m) of the voxels before the camera; infinite if there are none."""
 
-Table = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]
-"""Heights (n,) and lateral places (m,) in metres, both ascending, and values (n, m), linear between."""
-
 def depth_profile(
     voxels: Mask,
     places: list[npt.NDArray[np.float64]],
-    directions: list[npt.NDArray[np.float64]],
+    depth: npt.NDArray[np.float64],
     at: list[Array],
-    middle: Table,
-    across: Table,
-    apart: Table,
-    balls: Array,
-    aside: Array,
+    middle: npt.NDArray[np.float64],
+    width: npt.NDArray[np.float64],
     flatness: float,
-    least: float,
-    scale: float,
 ) -> tuple[Array, Array]:
-    """exp(-(|depth - middle - aside| / width)^flatness) and width = scale max(least, (across balls + apart^2)^(1/2)).
+    """exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
 
-    Both (n,) at the marked voxels. ``places`` are those of the voxels along x, y and z in metres from a centre,
-    ``directions`` lateral, depth and height; ``at`` rows and columns (n,) where the pictures ``balls`` and
-    ``aside`` are read.
+    ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction; ``at`` rows and
+    columns (n,) where the pictures ``middle`` and ``width`` are read.
     """
 
 def scale_along_rays(

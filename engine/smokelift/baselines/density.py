@@ -133,7 +133,7 @@ class FixedRateDescent:
 class AllCarried:
     """The paper's temporal prior: each fit starts from the carried density as it is."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke, before: Smoke) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke) -> Start:
         """The carried density; see `smokelift.density.TemporalPrior`."""
         return Start(carried.density, {})
 

@@ -24,14 +24,14 @@ class Orbit:
     """
 
     def __init__(self, scene: CompleteScene, *, lights_turn: bool = False) -> None:
-        self._table = Turntable.before(scene.camera.at(0), scene.domain)
+        self.table = Turntable.before(scene.camera.at(0), scene.domain)
         self._optics = scene_optics(scene)
         self._shines = scene.scattering != "absorption" and bool(self._optics.unshadowed_source().max() > 0)
         self._lights_turn = lights_turn
 
     def image(self, density: Volume, degrees: float, rows: int | None = None) -> Image:
         """Render a density (nx, ny, nz), by default at a pixel a voxel; linear radiance (rows, columns, 3)."""
-        camera = self._table.camera(degrees)
+        camera = self.table.camera(degrees)
         if rows is not None:
             columns = round(camera.size[0] * rows / camera.size[1])
             camera = camera.resized(columns, rows)
@@ -48,7 +48,7 @@ class Orbit:
 
     def _turned(self, light: FiniteLight, camera: Camera) -> FiniteLight:
         """Return a light that stands to a camera as it does to the front's."""
-        turn: npt.NDArray[np.float64] = _axes(camera) @ _axes(self._table.camera(0)).T
+        turn: npt.NDArray[np.float64] = _axes(camera) @ _axes(self.table.camera(0)).T
         if isinstance(light, PointLight):
             centre = np.array(self._optics.domain.centre)
             x, y, z = (centre + turn @ (np.array(light.position) - centre)).tolist()

@@ -12,6 +12,7 @@ from scipy import ndimage
 from smokelift.evaluation.frame_means import finite_mean
 from smokelift.evaluation.metrics import PatchStatistics, flicker, mean_gradient
 from smokelift.evaluation.orbit import Orbit
+from smokelift.evaluation.orbit_shapes import SHAPE_AZIMUTHS, OrbitShapes
 from smokelift.render import Volume
 from smokelift.scene import CompleteScene
 from smokelift.transport import Array
@@ -54,17 +55,25 @@ def orbit_scores(
     ``patches_worst``, the largest of an azimuth; ``patches_own`` and ``texture_own``, those of the truth from itself
     `ON` azimuths on, or of the front from the front half the clip on; ``edges`` and ``flicker``, mean gradients and
     second differences in time over the reference's; ``halo``, the share of the light outside the outlines that the
-    truth has at any azimuth. None where there is nothing to say.
+    truth has at any azimuth. The figures of `RayShapes`, along the camera's rays and by azimuth, and the truth's. None
+    where there is nothing to say.
     """
     orbit = Orbit(scene, lights_turn=truth is None)
     moments = _moments(count)
     found: dict[str, list[list[float | None]]] = {name: [] for name in ("patches", "texture", "edges", "halo")}
     own: dict[str, list[list[float | None]]] = {"patches": [], "texture": []}
     fronts: list[PatchStatistics] = []
+    shapes, true_shapes = OrbitShapes(orbit.table), OrbitShapes(orbit.table)
     for moment in moments:
         smoke = density(moment)
+        shapes.add(smoke)
         pictures = _pictures(orbit, smoke, AZIMUTHS)
-        true = _pictures(orbit, smoke, (0,)) if truth is None else _pictures(orbit, truth(moment), AZIMUTHS)
+        if truth is None:
+            true = _pictures(orbit, smoke, (0,))
+        else:
+            true_smoke = truth(moment)
+            true_shapes.add(true_smoke)
+            true = _pictures(orbit, true_smoke, AZIMUTHS)
         references = [PatchStatistics.of(picture) for picture in true]
         sharp = [mean_gradient(picture) for picture in true]
         if truth is None:
@@ -91,6 +100,9 @@ def orbit_scores(
         "azimuths": list(AZIMUTHS),
         **{f"{name}_by_azimuth": by_azimuth[name] for name in ("patches", "texture", "edges")},
         "patches_own_by_azimuth": None if truth is None else _means(own["patches"]),
+        "shape_azimuths": list(SHAPE_AZIMUTHS),
+        **shapes.figures(),
+        **({} if truth is None else true_shapes.figures("_truth")),
     }
 
 

@@ -173,7 +173,7 @@ def _density(
     carried = _carried(before, predicted, shot)
     if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
-    start = method.temporal_prior.start(depth.views, depth, carried, Smoke(before.density, before.smooth))
+    start = method.temporal_prior.start(depth.views, depth, carried)
     # what a moving camera does not see now it may have seen before
     unseen = carried.density if shot.moves else None
     del carried  # the fit needs the memory

@@ -100,8 +100,8 @@ class Settings:
     selection
         How open choices are made.
     transport
-        At most this share (0 to 1) of what a frame's fit starts from is the advected density of the frame before. Every
-        frame takes as much as proves right (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
+        This share (0 to 1) of what a frame's fit starts from is the advected density of the frame before
+        (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
         smear the depth (docs/experiments/temporal-prior.md). Made-up detail is carried on whatever the share, unless it
         is 0. The paper's method takes all.
     distance

@@ -43,6 +43,21 @@ def test_smoke_is_spread_about_its_axis(position, columns) -> None:
         assert density[16, :, 24].sum() * DOMAIN.voxel_size == pytest.approx(1, abs=0.1)
 
 
+@pytest.mark.parametrize("lean", [-0.4, 0.4])
+def test_smoke_stands_where_its_ray_meets_an_axis_that_leans(lean: float) -> None:
+    """A camera from above looks along rays that fall, so each meets the axis at another height than the middle."""
+    camera = Camera.look_at((0, -6, 4), (0, 0, 1.5), fov_y_degrees=40, size=(90, 120))
+    amount = np.zeros((120, 90), np.float32)
+    amount[:, 38:52] = 1
+    axis = SmokeAxis.by_height(HEIGHTS, lean * HEIGHTS)
+    everywhere = np.ones(DOMAIN.resolution, np.bool_)
+    places = project_voxels(camera, DOMAIN).places(everywhere)
+    shape = DepthProfile(amount, camera, DOMAIN, axis).shape(places, everywhere).reshape(DOMAIN.resolution)
+    levels = np.arange(10, 38)
+    found = (np.argmax(shape[16], 0)[levels] + 0.5) / 16 - 1
+    np.testing.assert_allclose(found, lean * ((levels + 0.5) / 16 - 1.5), atol=0.04)
+
+
 @pytest.mark.parametrize("depth", [-0.3, 0.0, 0.3])
 def test_smoke_stands_where_its_ray_is_inside_the_domain(depth: float) -> None:
     """What shows beyond the domain's ends at the axis is nearer to the camera; elsewhere it is at the axis."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.evaluation.orbit_scores import AZIMUTHS, orbit_scores
+from smokelift.evaluation.orbit_shapes import SHAPES
 from smokelift.scene import CompleteScene, completed
 
 
@@ -38,6 +39,22 @@ def test_smoke_drawn_out_in_depth_is_unlike_the_truth_and_outside_it(plume, scen
     assert found["patches_worst"] == max(found["patches_by_azimuth"]) == found["patches_by_azimuth"][5]  # 90 degrees
     assert found["edges"] < 0.9
     assert found["halo"] > 0.05
+
+
+def test_shapes_along_the_cameras_rays_stand_beside_the_truths(plume, scene, perfect):
+    truth = plume.densities.__getitem__
+    for name in SHAPES:
+        assert perfect[f"{name}_by_azimuth"] == perfect[f"{name}_truth_by_azimuth"]
+        assert perfect[name] == perfect[f"{name}_by_azimuth"][0]
+    found = orbit_scores(scene, 5, lambda frame: drawn_out(truth(frame)), truth)
+    assert found["depth_over_width"] > 1.5 * found["depth_over_width_truth"]
+    assert found["ray_length"] > 1.5 * found["ray_length_truth"]
+    across = found["shape_azimuths"].index(90)
+    assert found["ray_length_by_azimuth"][across] < found["ray_length"]
+    turned = orbit_scores(scene, 5, lambda frame: np.ascontiguousarray(np.rot90(truth(frame), 1, (0, 1))))
+    for name in SHAPES:
+        assert turned[f"{name}_by_azimuth"][across] == pytest.approx(perfect[name], rel=1e-3, abs=1e-3)
+    assert "scatter_truth" not in turned
 
 
 def test_without_the_truth_it_is_unlike_its_front_as_well(plume, scene):

@@ -7,10 +7,12 @@ slips into a mean is worse than no figure.
 from smokelift.evaluation.metrics.motion import flicker, mean_divergence, velocity_error, warp_error
 from smokelift.evaluation.metrics.patches import PatchStatistics, mean_gradient
 from smokelift.evaluation.metrics.pictures import psnr, ssim
+from smokelift.evaluation.metrics.shapes import RayShapes
 from smokelift.evaluation.metrics.volumes import height_mass_error, mass, volume_error
 
 __all__ = [
     "PatchStatistics",
+    "RayShapes",
     "flicker",
     "height_mass_error",
     "mass",
