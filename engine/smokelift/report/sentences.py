@@ -293,6 +293,11 @@ SENTENCES: Mapping[str, str] = {
         "of what changes in it. Smoke that fire lights looks like fire, and flames that are clipped to white look "
         "like smoke. Use a copy that is exposed for the flames, frames with less fire, or hide the fire by a mask."
     ),
+    "not all may be smoke": (
+        "Some of what counts as smoke may be something else: a first, coarse fit leaves {error:.0%} of what changes in "
+        "the clip unexplained. Things that move, light that changes and labels look like smoke, too. Hide what is no "
+        "smoke by a mask, crop the clip, use frames in which the light is steady, or give a clean plate as background."
+    ),
     "not all is smoke": (
         "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "
         "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
