@@ -130,8 +130,8 @@ class Job:
         The engine's estimate; None while unknown.
     notes
         The engine's assumptions and warnings, a sentence each.
-    warnings
-        Those of the notes that are doubts: why the result may be nothing, or wrong.
+    doubts
+        Why the result may be nothing, or wrong: the notes that say so, each after the engine's name for it.
     sentence
         The result, or the reason of a failure.
     details
@@ -145,7 +145,7 @@ class Job:
         self.done = self.total = 0
         self.seconds_left: float | None = None
         self.notes: list[str] = []
-        self.warnings: list[str] = []
+        self.doubts: list[tuple[str, str]] = []
         self.sentence = ""
         self.details: Mapping[str, Any] = {}
         self.status: int | None = None
@@ -248,7 +248,7 @@ class Job:
             case "note":
                 self.notes.append(sentence(message, self._before))
                 if message.get("doubt"):
-                    self.warnings.append(self.notes[-1])
+                    self.doubts.append((str(message.get("kind", "")), self.notes[-1]))
                 self._write_log(self.notes[-1])
             case "start":
                 self.done, self.total = int(message["done"]), int(message["total"])

@@ -183,7 +183,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Show a job's progress in the panel."""
         new_frames = job.done != row.done
         row.outcome, row.sentence = job.outcome, job.sentence
-        row.warnings = "\n".join(job.warnings)
+        shot_check.keep_doubts(row, job.doubts)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
         if new_frames or job.ended:
@@ -239,7 +239,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the worker and end its jobs."""
-    shot_check.end_timer()
     if bpy.app.timers.is_registered(_work_later):
         bpy.app.timers.unregister(_work_later)
     manager = bpy.context.window_manager

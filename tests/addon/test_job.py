@@ -115,7 +115,7 @@ def test_progress(engine, log) -> None:
     assert (job.outcome, job.status) == ("done", 0)
     assert (job.done, job.total, job.seconds_left) == (3, 3, 0.0)
     assert job.notes == ["Light not given.", "A cut.", "No smoke found."]
-    assert job.warnings == ["A cut.", "No smoke found."]
+    assert job.doubts == [("", "A cut."), ("", "No smoke found.")]
     assert job.sentence == "3 frames."
     assert job.details == {"text": "3 frames.", "frames": 3}
     text = log.read_text()
