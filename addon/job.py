@@ -119,6 +119,8 @@ class Job:
         File to which all messages are appended.
     before
         Number of the clip's frames before the first of the result.
+    done
+        Frames that are finished already, which a run that is resumed counts too.
 
     Attributes
     ----------
@@ -140,9 +142,9 @@ class Job:
         The engine's exit status; None before it ends.
     """
 
-    def __init__(self, command: Sequence[str], log: Path, before: int = 0) -> None:
+    def __init__(self, command: Sequence[str], log: Path, before: int = 0, done: int = 0) -> None:
         self.outcome: Outcome = "waiting"
-        self.done = self.total = 0
+        self.done, self.total = done, 0
         self.seconds_left: float | None = None
         self.notes: list[str] = []
         self.doubts: list[tuple[str, str]] = []
@@ -252,6 +254,8 @@ class Job:
                 self._write_log(self.notes[-1])
             case "start":
                 self.done, self.total = int(message["done"]), int(message["total"])
+                if "seconds_left" in message:
+                    self.seconds_left = float(message["seconds_left"])
             case "frame":
                 self.done, self.total = int(message["done"]), int(message["total"])
                 self.seconds_left = float(message["seconds_left"])

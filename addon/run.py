@@ -25,7 +25,7 @@ def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> 
         if jobs[place].outcome in ENDED and jobs[place].smoke_uid == smoke.session_uid:
             jobs.remove(place)
     row = jobs.add()
-    row.take, row.smoke_uid = str(take.directory), smoke.session_uid
+    row.take, row.smoke_uid, row.done = str(take.directory), smoke.session_uid, take.read().frames
     work(context)
 
 
@@ -172,7 +172,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         take, smoke = Take(Path(name)), find_smoke(row.smoke_uid)
         before = volume.frames_before_take(smoke, take) if smoke is not None else 0
         try:
-            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
+            words = engine_command(take.arguments() + preferences.thread_options())
+            job = Job(words, take.log_file, before, take.read().frames)
         except (EngineMissingError, TakeError) as error:
             row.outcome, row.sentence = "failed", str(error)
             return
