@@ -189,7 +189,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--distance",
         type=_within(known["distance"], float),
-        metavar="METRES",
+        metavar="METERS",
         help="Distance: from the camera to the lower end of the smoke, level and straight ahead; 0: estimated",
     )
     parser.add_argument("--output", type=Path, help="folder for the results")

@@ -168,7 +168,7 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
 def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """A button for each quality with what it takes and loses; the first drawing of the tab starts the estimate.
 
-    While a change is estimated, the figures of before stay, greyed.
+    While a change is estimated, the figures of before stay, grayed.
     """
     state, settings = context.window_manager.smokelift, smoke.smokelift
     checked = shot_check.is_checked(state, smoke)

@@ -23,7 +23,7 @@ from .paths import PATH_OPTIONS
 from .smoke import free_folder, scene_of
 
 USUAL_DISTANCE = 2.0
-"""Metres from which a distance is given by hand where there is no box."""
+"""Meters from which a distance is given by hand where there is no box."""
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""

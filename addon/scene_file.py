@@ -2,7 +2,7 @@
 
 The engine's axes are those of the box that holds the smoke, because its voxels lie along its world's axes. A rotated
 box rotates the camera and the lights the other way. Without rotation both worlds are the same. One Blender unit is a
-metre.
+meter.
 """
 
 from pathlib import Path

@@ -37,7 +37,7 @@ WORDS = {
     "scale": "Box",
     "light": "Light",
     "sun's direction": "Light",
-    "smoke colour": "Smoke Color",
+    "smoke color": "Smoke Color",
     "place in depth": "Depth",
 }
 """What the engine knows of a shot and the panel shows, in the panel's words; the page of the report has the rest."""

@@ -185,15 +185,15 @@ SENTENCES: Mapping[str, str] = {
         "Medium not given: extinction {extinction:.3g} 1/m (density 1 is thick smoke), albedo {albedo:g}, isotropic."
     ),
     "smoke colour": (
-        "Smoke color: {value} (linear), at least {degrees:.0f} degrees from that of grey smoke; if the light has this "
-        "color and the smoke is grey, give grey as the smoke's color."
+        "Smoke color: {value} (linear), at least {degrees:.0f} degrees from that of gray smoke; if the light has this "
+        "color and the smoke is gray, give gray as the smoke's color."
     ),
     "smoke colour unseen": (
-        "Smoke color: undetermined, so grey is assumed: no smoke is thick, bright and free of clipped pixels enough to "
+        "Smoke color: undetermined, so gray is assumed: no smoke is thick, bright and free of clipped pixels enough to "
         "show a color. Give the color if you know it."
     ),
     "smoke colour near the light's": (
-        "Smoke color: undetermined, so grey is assumed: its color may be {degrees:.0f} degrees from that of grey smoke "
+        "Smoke color: undetermined, so gray is assumed: its color may be {degrees:.0f} degrees from that of gray smoke "
         "or of what is behind it, and colored light alone can make {tolerance:g}. Give the color if you know it."
     ),
     "fire": (
