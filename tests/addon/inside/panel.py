@@ -191,6 +191,23 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     assert "A person moves." not in [text.strip() for text in drawn(shot, panel.SMOKELIFT_PT_view)]
 
 
+def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
+    state = bpy.context.window_manager.smokelift
+    volume.show(smoke(shot), made(tmp_path))
+    for outcome in ("done", "waiting"):
+        row = state.jobs.add()
+        row.smoke_uid, row.outcome, row.sentence = (
+            smoke(shot).session_uid,
+            outcome,
+            "Match to the clip: good (29.0 dB).",
+        )
+    state.check_smoke = smoke(shot).session_uid
+    texts = [text.strip() for text in drawn(shot, panel.SMOKELIFT_PT_view) if text.strip()]
+    end = texts.index("[set_up]")
+    assert texts[end - 4 : end] == ["[open_log]", "Queued", "[cancel]", "Cancel"]
+    assert "Smoke from Video..." in texts
+
+
 def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
     def said() -> bool:
         bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
