@@ -14,7 +14,7 @@ import bpy
 from .blender_scene import ShotError
 from .clip_pictures import picture_scene
 from .clip_table import frame_count
-from .editors import show_mask
+from .editors import open_tab, show_mask
 from .needs import NeedsClip
 from .paths import absolute
 from .smoke import active_smoke, scene_of
@@ -131,12 +131,12 @@ class SMOKELIFT_OT_new_mask(NeedsClip, bpy.types.Operator):
         smoke = active_smoke(context.scene)
         settings = smoke.smokelift
         if settings.drawn_mask is None:
-            mask = bpy.data.masks.new(f"{smoke.name} Mask")
+            mask = bpy.data.masks.new(smoke.name)
             mask.layers.new(name="Smoke")
             mask.frame_start, mask.frame_end = context.scene.frame_start, context.scene.frame_end
             settings.drawn_mask = mask
         if not bpy.app.background:
-            show_mask(settings.clip, settings.drawn_mask)
+            open_tab(show_mask(settings.clip, settings.drawn_mask))
         return {"FINISHED"}
 
 

@@ -154,7 +154,7 @@ def _draw_mask(layout: bpy.types.UILayout, context: bpy.types.Context, settings:
     if drawn:
         draw_text(layout, context, "Smoke may be inside its lines; outside, if its layer is inverted.", "INFO")
     else:
-        layout.prop(settings, "mask", text=" ", placeholder=iface_("or a file: white is smoke"))
+        layout.prop(settings, "mask", text=" ", placeholder=iface_("white is smoke"))
 
 
 def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -333,7 +333,9 @@ def draw_doubt(layout: bpy.types.UILayout, context: bpy.types.Context, kind: str
     """Why a result may be wrong, and the button that helps."""
     draw_text(layout, context, words, "ERROR")
     if kind in MASKED:
-        layout.operator("smokelift.new_mask", icon="MOD_MASK")
+        smoke = active_smoke(context.scene)
+        drawn = smoke is not None and smoke.smokelift.drawn_mask is not None
+        layout.operator("smokelift.new_mask", text="Edit Mask" if drawn else "New Mask", icon="MOD_MASK")
 
 
 def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:

@@ -184,7 +184,8 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     texts = [text.strip() for text in drawn(shot, panel.SMOKELIFT_PT_view)]
     place = texts.index("A person moves.")
     assert "[new_mask]" in texts[:place]  # beside Mask
-    assert texts[place + 1] == "[new_mask]" and "There is a cut." in texts[place + 2 : place + 5]
+    assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
+    assert "There is a cut." in texts[place + 3 : place + 6]
     assert texts.index("There is a cut.") < texts.index("[run]")
     smoke(shot).smokelift.albedo = 0.5
     state.check_smoke = smoke(shot).session_uid
