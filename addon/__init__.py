@@ -6,7 +6,7 @@ It knows nothing of the engine but its command line and its files. From what kno
   (a speed ramp), `pictures` (a sequence with gaps), `sentences` (the engine's messages in the panel's words),
   `contract` (what the add-on repeats of the engine).
 - Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
-  `scene_file` (Blender scene to scene file: `clip_table`, `background`, `strokes`, `camera_table`, `box_table`
+  `scene_file` (Blender scene to scene file: `clip_table`, `background`, `strokes`, `mask`, `camera_table`, `box_table`
   and `light_tables`, of a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `proxy` (what
   viewports show of a large one), `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and
   light that match the clip), `compositing` (smoke over the clip), `projection` (the clip's background on a card),
@@ -61,6 +61,7 @@ def _modules() -> tuple[ModuleType, ...]:
         follow,
         instances,
         look_panel,
+        mask,
         operators,
         panel,
         place,
@@ -70,6 +71,7 @@ def _modules() -> tuple[ModuleType, ...]:
         results_panel,
         run,
         setup_panel,
+        shot_check,
         side_job,
         strokes_panel,
         undistort,
@@ -77,7 +79,8 @@ def _modules() -> tuple[ModuleType, ...]:
         volume,
     )
 
-    data = (preferences, properties, volume, follow, run, side_job)
-    buttons = (operators, background, strokes_panel, box, place, editors, instances, undistort, drop, presets, usd)
+    data = (preferences, properties, volume, follow, shot_check, run, side_job)
+    buttons = (operators, background, mask, strokes_panel, box, place)
+    further = (editors, instances, undistort, drop, presets, usd)
     panels = (panel, element, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
-    return (*data, *buttons, *panels, batch)
+    return (*data, *buttons, *further, *panels, batch)

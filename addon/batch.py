@@ -43,7 +43,8 @@ def main(words: Sequence[str]) -> int:
             smoke_takes.update_moved_files(smoke, take)
         take = take or smoke_takes.write_take(smoke)
         before = volume.frames_before_take(smoke, take)
-        job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
+        words = engine_command(take.arguments() + preferences.thread_options())
+        job = Job(words, take.log_file, before, take.read().frames)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT
@@ -87,7 +88,7 @@ def _has_denoiser() -> bool:
 
 def _wait(job: Any) -> None:
     """Run a job to its end and print its messages; SIGTERM and Ctrl-C cancel it."""
-    printed = done = 0
+    printed, done = 0, job.done
     job.start()
     # Not by KeyboardInterrupt, which could end a poll between taking a message and reading it.
     before = {number: signal.signal(number, lambda *_: job.cancel()) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -188,7 +189,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--distance",
         type=_within(known["distance"], float),
-        metavar="METRES",
+        metavar="METERS",
         help="Distance: from the camera to the lower end of the smoke, level and straight ahead; 0: estimated",
     )
     parser.add_argument("--output", type=Path, help="folder for the results")

@@ -98,14 +98,14 @@ def keep_camera_outside(
 
 def inlet_table(inlet: bpy.types.Object, rotation: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
     """A ball, as large as the Empty is drawn."""
-    centre = rotation.inverted() @ inlet.matrix_world.translation
+    center = rotation.inverted() @ inlet.matrix_world.translation
     radius = inlet.empty_display_size * max(abs(scale) for scale in inlet.matrix_world.to_scale())
     if radius <= 0.0:
         raise ShotError("The inlet has no size: scale up its Empty.")
-    sides = zip(domain["min"], centre, domain["max"], strict=True)
-    if (centre - Vector(min(max(place, low), high) for low, place, high in sides)).length > radius:
+    sides = zip(domain["min"], center, domain["max"], strict=True)
+    if (center - Vector(min(max(place, low), high) for low, place, high in sides)).length > radius:
         raise ShotError("The inlet is outside the box: move it to where the smoke enters.")
-    return {"centre": list(centre), "radius": radius}
+    return {"centre": list(center), "radius": radius}
 
 
 def engine_to_world(smoke: bpy.types.Object) -> Matrix:

@@ -1,5 +1,7 @@
-"""Pictures of a clip, written by Blender's own Movie Clip nodes."""
+"""Pictures of a clip, and of masks drawn over it, written by nodes of Blender's own compositor."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -8,6 +10,29 @@ from .compositing import SINCE_5, compositor
 
 UNDISTORTED_BITS, FILMED_BITS = "16", "8"
 """Bits per channel of a picture that is computed anew, and of one that is shown as it was filmed."""
+
+
+@contextmanager
+def picture_scene(
+    clip: bpy.types.MovieClip,
+) -> Iterator[tuple[bpy.types.Scene, bpy.types.NodeTree, bpy.types.NodeSocket]]:
+    """A scene of its own that renders PNG of a clip's size, the nodes of its compositor, and what they are shown by."""
+    scene = bpy.data.scenes.new("Smokelift Pictures")
+    scene.camera = bpy.data.objects.new("Smokelift Pictures", bpy.data.cameras.new("Smokelift Pictures"))
+    tree, shown = compositor(scene)
+    try:
+        scene.collection.objects.link(scene.camera)
+        render = scene.render
+        render.resolution_x, render.resolution_y, render.resolution_percentage = *clip.size, 100
+        render.image_settings.file_format = "PNG"
+        for node in [node for node in tree.nodes if node.type == "R_LAYERS"]:
+            tree.nodes.remove(node)
+        yield scene, tree, shown
+    finally:
+        bpy.data.objects.remove(scene.camera)
+        bpy.data.scenes.remove(scene)
+        if SINCE_5:
+            bpy.data.node_groups.remove(tree)
 
 
 def write_pictures(clip: bpy.types.MovieClip, first: int, last: int, prefix: Path, undistort: bool = False) -> Path:
@@ -29,41 +54,18 @@ def write_pictures(clip: bpy.types.MovieClip, first: int, last: int, prefix: Pat
     RuntimeError
         If they cannot be written.
     """
-    scene = bpy.data.scenes.new("Smokelift Pictures")
-    try:
-        return _write(scene, clip, first, last, prefix, undistort)
-    finally:
-        tree = scene.compositing_node_group if SINCE_5 else None
-        bpy.data.objects.remove(scene.camera)
-        bpy.data.scenes.remove(scene)
-        if tree is not None:
-            bpy.data.node_groups.remove(tree)
-
-
-def _write(
-    scene: bpy.types.Scene, clip: bpy.types.MovieClip, first: int, last: int, prefix: Path, undistort: bool
-) -> Path:
-    render = scene.render
-    scene.camera = bpy.data.objects.new("Smokelift Pictures", bpy.data.cameras.new("Smokelift Pictures"))
-    scene.collection.objects.link(scene.camera)
-    render.resolution_x, render.resolution_y, render.resolution_percentage = *clip.size, 100
-    scene.frame_start, scene.frame_end = first, last
-    scene.view_settings.view_transform = "Standard"
-    render.filepath = str(prefix)
-    picture = render.image_settings
-    picture.file_format, picture.color_mode = "PNG", "RGB"
-    picture.color_depth = UNDISTORTED_BITS if undistort else FILMED_BITS
-    tree, shown = compositor(scene)
-    source = tree.nodes.new("CompositorNodeMovieClip")
-    source.clip = clip
-    pictures = source.outputs["Image"]
-    if undistort:
-        pictures = _undistorted(tree, clip, pictures)
-    tree.links.new(pictures, shown)
-    for node in [node for node in tree.nodes if node.type == "R_LAYERS"]:
-        tree.nodes.remove(node)
-    bpy.ops.render.render(animation=True, scene=scene.name)
-    return Path(render.frame_path(frame=first))
+    with picture_scene(clip) as (scene, tree, shown):
+        scene.frame_start, scene.frame_end = first, last
+        scene.view_settings.view_transform = "Standard"
+        scene.render.filepath = str(prefix)
+        picture = scene.render.image_settings
+        picture.color_mode, picture.color_depth = "RGB", UNDISTORTED_BITS if undistort else FILMED_BITS
+        source = tree.nodes.new("CompositorNodeMovieClip")
+        source.clip = clip
+        pictures = source.outputs["Image"]
+        tree.links.new(_undistorted(tree, clip, pictures) if undistort else pictures, shown)
+        bpy.ops.render.render(animation=True, scene=scene.name)
+        return Path(scene.render.frame_path(frame=first))
 
 
 def _undistorted(

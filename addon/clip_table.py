@@ -12,7 +12,7 @@ from .pictures import Pictures, pictures_from
 from .smoke import scene_of
 
 TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}
-"""The engine's name of the transfer function of a clip's pixels, by Blender's colour space."""
+"""The engine's name of the transfer function of a clip's pixels, by Blender's color space."""
 
 
 def clip_path(clip: bpy.types.MovieClip) -> Path:
@@ -42,9 +42,9 @@ def clip_table(smoke: bpy.types.Object) -> dict[str, Any]:
 
 
 def _transfer(clip: bpy.types.MovieClip) -> str | None:
-    """The transfer function that the clip's colour space says; None for the one that its kind of file has."""
+    """The transfer function that the clip's color space says; None for the one that its kind of file has."""
     space = clip.colorspace_settings.name
-    if not space:  # the colour management of this Blender does not know it
+    if not space:  # the color management of this Blender does not know it
         return None
     if space not in TRANSFERS:
         raise ShotError(

@@ -80,6 +80,25 @@ def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
     return area
 
 
+def show_mask(clip: bpy.types.MovieClip, mask: bpy.types.Mask) -> bpy.types.Area:
+    """Show a clip in a Clip Editor, with a mask to be drawn over it."""
+    area = _editor("CLIP_EDITOR")
+    space = area.spaces.active
+    space.clip, space.mode, space.mask = clip, "MASK", mask
+    bpy.app.timers.register(functools.partial(_fit_clip, area.as_pointer()), first_interval=DRAWN_SECONDS)
+    return area
+
+
+def _fit_clip(area_pointer: int) -> None:
+    """Show the whole of the clip in a Clip Editor; a timer, as in `_fit`."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.as_pointer() == area_pointer and area.type == "CLIP_EDITOR":
+                region = next(region for region in area.regions if region.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.clip.view_all(fit_view=True)
+
+
 def _fit(name: str) -> None:
     """Show the whole of a picture in the editor that has it; a timer, as a window has no size before it is drawn."""
     for window in bpy.context.window_manager.windows:

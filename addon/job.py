@@ -119,6 +119,8 @@ class Job:
         File to which all messages are appended.
     before
         Number of the clip's frames before the first of the result.
+    done
+        Frames that are finished already, which a run that is resumed counts too.
 
     Attributes
     ----------
@@ -130,8 +132,8 @@ class Job:
         The engine's estimate; None while unknown.
     notes
         The engine's assumptions and warnings, a sentence each.
-    warnings
-        Those of the notes that are doubts: why the result may be nothing, or wrong.
+    doubts
+        Why the result may be nothing, or wrong: the notes that say so, each after the engine's name for it.
     sentence
         The result, or the reason of a failure.
     details
@@ -140,12 +142,12 @@ class Job:
         The engine's exit status; None before it ends.
     """
 
-    def __init__(self, command: Sequence[str], log: Path, before: int = 0) -> None:
+    def __init__(self, command: Sequence[str], log: Path, before: int = 0, done: int = 0) -> None:
         self.outcome: Outcome = "waiting"
-        self.done = self.total = 0
+        self.done, self.total = done, 0
         self.seconds_left: float | None = None
         self.notes: list[str] = []
-        self.warnings: list[str] = []
+        self.doubts: list[tuple[str, str]] = []
         self.sentence = ""
         self.details: Mapping[str, Any] = {}
         self.status: int | None = None
@@ -248,10 +250,12 @@ class Job:
             case "note":
                 self.notes.append(sentence(message, self._before))
                 if message.get("doubt"):
-                    self.warnings.append(self.notes[-1])
+                    self.doubts.append((str(message.get("kind", "")), self.notes[-1]))
                 self._write_log(self.notes[-1])
             case "start":
                 self.done, self.total = int(message["done"]), int(message["total"])
+                if "seconds_left" in message:
+                    self.seconds_left = float(message["seconds_left"])
             case "frame":
                 self.done, self.total = int(message["done"]), int(message["total"])
                 self.seconds_left = float(message["seconds_left"])

@@ -1,7 +1,7 @@
 """How smoke looks: a material with one node group, whose inputs are what the clip says and what the artist likes.
 
 What was fitted to the clip (extinction, albedo, anisotropy) follows the newest result; what the artist sets
-(density, brightness, colours, edges) is never touched by a run.
+(density, brightness, colors, edges) is never touched by a run.
 """
 
 from dataclasses import dataclass

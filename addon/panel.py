@@ -18,6 +18,9 @@ from .undistort import is_distorted
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
+MASKED = ("not all may be smoke", "not all is smoke", "hardly any smoke fitted")
+"""Doubts that a mask may end."""
+
 CELLS = 0.245, 0.215, 0.18, 0.18
 """Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
 
@@ -128,7 +131,7 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         row = layout.row(align=True)
         row.prop(settings, "plate_frames", text=" ")
         row.operator("smokelift.clear_plate_frames", text="", icon="X")
-    layout.prop(settings, "mask")
+    _draw_mask(layout, context, settings)
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
         layout.prop(settings, "box")
@@ -142,6 +145,18 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     draw_closed(layout, settings)
 
 
+def _draw_mask(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+    """The mask that is drawn, and which side of it is smoke; without one, the field for a file."""
+    drawn = settings.drawn_mask is not None
+    row = layout.row(align=True)
+    row.prop(settings, "drawn_mask")
+    row.operator("smokelift.new_mask", text="" if drawn else "New", icon="GREASEPENCIL" if drawn else "ADD")
+    if drawn:
+        draw_text(layout, context, "Smoke may be inside its lines; outside, if its layer is inverted.", "INFO")
+    else:
+        layout.prop(settings, "mask", text=" ", placeholder=iface_("white is smoke"))
+
+
 def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """A button for each side of the box, below the name of the row: beside it their names would be cut off."""
     column = layout.column(align=True)
@@ -153,7 +168,7 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
 def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """A button for each quality with what it takes and loses; the first drawing of the tab starts the estimate.
 
-    While a change is estimated, the figures of before stay, greyed.
+    While a change is estimated, the figures of before stay, grayed.
     """
     state, settings = context.window_manager.smokelift, smoke.smokelift
     checked = shot_check.is_checked(state, smoke)
@@ -193,6 +208,9 @@ def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smok
         if own.memory > state.memory_free:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
             draw_text(layout, context, text.format(state.memory_free), "ERROR")
+    if done:
+        for doubt in state.doubts:
+            draw_doubt(layout, context, doubt.kind, doubt.sentence)
 
 
 def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
@@ -277,8 +295,8 @@ def _draw_job(
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
     if row.outcome in ENDED:
-        for warning in filter(None, row.warnings.split("\n")):
-            draw_text(box, context, warning, "ERROR")
+        for doubt in row.doubts:
+            draw_doubt(box, context, doubt.kind, doubt.sentence)
         box.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
         box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
@@ -309,6 +327,15 @@ def duration(seconds: float) -> str:
 def size(megabytes: float) -> str:
     """An amount of disk in words."""
     return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"
+
+
+def draw_doubt(layout: bpy.types.UILayout, context: bpy.types.Context, kind: str, words: str) -> None:
+    """Why a result may be wrong, and the button that helps."""
+    draw_text(layout, context, words, "ERROR")
+    if kind in MASKED:
+        smoke = active_smoke(context.scene)
+        drawn = smoke is not None and smoke.smokelift.drawn_mask is not None
+        layout.operator("smokelift.new_mask", text="Edit Mask" if drawn else "New Mask", icon="MOD_MASK")
 
 
 def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:

@@ -69,7 +69,7 @@ class Floor:
         return (place - self.eye).dot(self.along)
 
     def clicked(self, rays: Sequence[tuple[Vector, Vector]]) -> float:
-        """The distance of where the first of two rays, of neighbouring pixels, meets the floor.
+        """The distance of where the first of two rays, of neighboring pixels, meets the floor.
 
         Raises
         ------

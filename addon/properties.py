@@ -23,7 +23,7 @@ from .paths import PATH_OPTIONS
 from .smoke import free_folder, scene_of
 
 USUAL_DISTANCE = 2.0
-"""Metres from which a distance is given by hand where there is no box."""
+"""Meters from which a distance is given by hand where there is no box."""
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -296,8 +296,15 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         type=bpy.types.Image,
         update=_changed,
     )
-    mask: StringProperty(
+    drawn_mask: PointerProperty(
         name="Mask",
+        description="Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is "
+        "inverted, and nowhere else, whatever moves there",
+        type=bpy.types.Mask,
+        update=_changed,
+    )
+    mask: StringProperty(
+        name="Mask File",
         description=(
             "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
             "mask_####.png, with one for each frame of the clip"
@@ -525,6 +532,13 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
 
 
+class SmokeliftDoubt(bpy.types.PropertyGroup):
+    """Why a result may be nothing, or wrong."""
+
+    kind: StringProperty(description="The engine's name of the sentence; empty if it has none")
+    sentence: StringProperty()
+
+
 class SmokeliftJob(bpy.types.PropertyGroup):
     """One run in the panel."""
 
@@ -535,7 +549,7 @@ class SmokeliftJob(bpy.types.PropertyGroup):
     total: IntProperty()
     seconds_left: FloatProperty(default=-1.0)
     sentence: StringProperty()
-    warnings: StringProperty()
+    doubts: CollectionProperty(type=SmokeliftDoubt)
     icon: IntProperty()
     cancel: BoolProperty()
     left: BoolProperty(description="The artist chose another result while it runs")
@@ -563,12 +577,20 @@ class SmokeliftState(bpy.types.PropertyGroup):
     check_error: StringProperty()
     check_seconds: IntProperty(description="Since the engine began to read the clip")
     notes: StringProperty()
+    doubts: CollectionProperty(type=SmokeliftDoubt)
     costs: CollectionProperty(type=SmokeliftCost)
     costs_smoke: IntProperty(description="Whose the costs are")
     memory_free: FloatProperty(description="GiB")
 
 
-_CLASSES = (SmokeliftDirecting, SmokeliftSettings, SmokeliftJob, SmokeliftCost, SmokeliftState)
+_CLASSES = (
+    SmokeliftDirecting,
+    SmokeliftSettings,
+    SmokeliftDoubt,
+    SmokeliftJob,
+    SmokeliftCost,
+    SmokeliftState,
+)
 
 
 def register() -> None:

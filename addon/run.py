@@ -25,7 +25,7 @@ def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> 
         if jobs[place].outcome in ENDED and jobs[place].smoke_uid == smoke.session_uid:
             jobs.remove(place)
     row = jobs.add()
-    row.take, row.smoke_uid = str(take.directory), smoke.session_uid
+    row.take, row.smoke_uid, row.done = str(take.directory), smoke.session_uid, take.read().frames
     work(context)
 
 
@@ -172,7 +172,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         take, smoke = Take(Path(name)), find_smoke(row.smoke_uid)
         before = volume.frames_before_take(smoke, take) if smoke is not None else 0
         try:
-            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file, before)
+            words = engine_command(take.arguments() + preferences.thread_options())
+            job = Job(words, take.log_file, before, take.read().frames)
         except (EngineMissingError, TakeError) as error:
             row.outcome, row.sentence = "failed", str(error)
             return
@@ -183,7 +184,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Show a job's progress in the panel."""
         new_frames = job.done != row.done
         row.outcome, row.sentence = job.outcome, job.sentence
-        row.warnings = "\n".join(job.warnings)
+        shot_check.keep_doubts(row, job.doubts)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
         if new_frames or job.ended:
@@ -239,7 +240,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the worker and end its jobs."""
-    shot_check.end_timer()
     if bpy.app.timers.is_registered(_work_later):
         bpy.app.timers.unregister(_work_later)
     manager = bpy.context.window_manager

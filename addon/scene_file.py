@@ -2,7 +2,7 @@
 
 The engine's axes are those of the box that holds the smoke, because its voxels lie along its world's axes. A rotated
 box rotates the camera and the lights the other way. Without rotation both worlds are the same. One Blender unit is a
-metre.
+meter.
 """
 
 from pathlib import Path
@@ -18,12 +18,12 @@ from .camera_table import camera_over_frames
 from .clip_table import clip_table, start_frame
 from .contract import IMAGE_SUFFIXES, SIDES
 from .light_tables import light_tables, require_lights_outside
-from .paths import absolute
+from .mask import mask_path
 from .smoke import scene_of
 
 
-def footage_tables(smoke: bpy.types.Object) -> dict[str, Any]:
-    """The tables of the clip and of what is behind its smoke.
+def footage_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
+    """The tables of the clip and of what is behind its smoke; ``quick`` as in `shot_tables`.
 
     Raises
     ------
@@ -31,8 +31,9 @@ def footage_tables(smoke: bpy.types.Object) -> dict[str, Any]:
         If something is missing or unusable.
     """
     tables: dict[str, Any] = {"clip": clip_table(smoke)}
-    if smoke.smokelift.mask:
-        tables["clip"]["mask"] = _existing_mask(smoke.smokelift.mask)
+    mask = mask_path(smoke, quick)
+    if mask is not None:
+        tables["clip"]["mask"] = str(mask)
     background = background_table(smoke)
     return {**tables, "background": background} if background else tables
 
@@ -45,7 +46,7 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
     smoke
         Its settings decide what is used of its scene.
     quick
-        Read the camera in the current frame only.
+        Read the camera, and a mask that is drawn, in the current frame only.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
         If something is missing or unusable.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
-    tables = footage_tables(smoke)
+    tables = footage_tables(smoke, quick)
     with at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
         rotation = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
@@ -90,13 +91,6 @@ def options(smoke: bpy.types.Object) -> list[str]:
     if settings.distance and not has_inlet(smoke):
         words.append(f"--distance={settings.distance:g}")
     return words
-
-
-def _existing_mask(path: str) -> str:
-    mask = absolute(path)
-    if "#" not in mask.name and not mask.is_file():  # a pattern is no file; the engine says what it finds
-        raise ShotError(f"The mask {mask} is not there: choose it again, or clear Mask.")
-    return str(mask)
 
 
 def _require_moving_plate(plate: Path) -> None:

@@ -19,6 +19,11 @@ SENTENCES = {
         "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
         "Report shows what counts as smoke. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
     ),
+    "not all may be smoke": (
+        "Some of what counts as smoke may be something else: a coarse fit leaves {error:.0%} of it unexplained. "
+        "People, leaves, labels and light that changes look like smoke, too. Hide them by a Mask, or choose a Clean "
+        "Plate."
+    ),
     "clearest frame": (
         "Frame {frame} shows more of the background than the others: if it is free of smoke, go to it and press Plate "
         "from This Frame."

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
 from . import preferences
 from .blender_scene import ShotError
@@ -20,14 +21,15 @@ from .job import EngineMissingError, Job, engine_command
 from .paths import absolute
 from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
+from .subpanel import redraw
 from .take import Take, TakeError
 
 TICKS = 4
 """Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
 
 
-_known: dict[str, Mapping[str, Any]] = {}
-"""What the engine said of the shots of this session, by their fingerprints."""
+_known: dict[str, tuple[Mapping[str, Any], list[tuple[str, str]]]] = {}
+"""What the engine said of the shots of this session at its end, and its doubts, by their fingerprints."""
 
 
 WORDS = {
@@ -35,7 +37,7 @@ WORDS = {
     "scale": "Box",
     "light": "Light",
     "sun's direction": "Light",
-    "smoke colour": "Smoke Color",
+    "smoke color": "Smoke Color",
     "place in depth": "Depth",
 }
 """What the engine knows of a shot and the panel shows, in the panel's words; the page of the report has the rest."""
@@ -115,8 +117,8 @@ class ShotCheck:
             return state.check_seconds != before
         job, self._job = self._job, None
         if job.outcome == "done":
-            _known[self._shot] = job.details
-            _keep(state, job.details)
+            _known[self._shot] = job.details, job.doubts
+            _keep(state, *_known[self._shot])
         else:
             state.check_error = job.sentence
         return True
@@ -135,7 +137,7 @@ class ShotCheck:
             page = folder / f"smokelift_inspect_{self._shot}.png"
             state.check_page = str(page)
             if self._shot in _known:
-                _keep(state, _known[self._shot])
+                _keep(state, *_known[self._shot])
                 return
             arguments = ["inspect", str(take.scene_file), "--page", str(page), "--progress", "json", *words]
             self._job = Job(engine_command(arguments), take.log_file)
@@ -146,9 +148,18 @@ class ShotCheck:
         self._job.start()
 
 
-def _keep(state: bpy.types.PropertyGroup, details: Mapping[str, Any]) -> None:
+def keep_doubts(owner: bpy.types.PropertyGroup, doubts: Iterable[tuple[str, str]]) -> None:
+    """Keep why a result may be wrong, as `Job` has it, in a run or in the state of the session."""
+    owner.doubts.clear()
+    for kind, words in doubts:
+        row = owner.doubts.add()
+        row.kind, row.sentence = kind, words
+
+
+def _keep(state: bpy.types.PropertyGroup, details: Mapping[str, Any], doubts: Iterable[tuple[str, str]]) -> None:
     """Show what the engine said of the shot."""
     state.check_done = True
+    keep_doubts(state, doubts)
     state.notes = "\n".join(found_lines(details.get("facts", ())))
     keep_costs(state, state.check_smoke, details)
 
@@ -176,10 +187,29 @@ def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
 
 def check_again(context: bpy.types.Context) -> None:
     """Forget the last check, for the shot has changed, and begin another if there is a window."""
-    state = context.window_manager.smokelift
-    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+    _forget(context.window_manager.smokelift)
     if not bpy.app.background and context.window is not None and bpy.ops.smokelift.check.poll():
         bpy.ops.smokelift.check()
+
+
+def _forget(state: bpy.types.PropertyGroup) -> None:
+    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+
+
+@persistent
+def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Forget the check of a smoke whose mask was drawn on; the tab begins another when it is drawn."""
+    manager = bpy.context.window_manager
+    state = manager.smokelift
+    if not state.check_smoke or not depsgraph.id_type_updated("MASK"):
+        return
+    smoke = find_smoke(state.check_smoke)
+    mask = None if smoke is None else smoke.smokelift.drawn_mask
+    if mask is None or smoke.name not in scene.objects:
+        return
+    if any(update.id.original == mask for update in depsgraph.updates):
+        _forget(state)
+        redraw(manager)
 
 
 def check_soon(context: bpy.types.Context) -> None:
@@ -197,7 +227,12 @@ def _check() -> None:
             bpy.ops.smokelift.check()
 
 
-def end_timer() -> None:
-    """End the timer that would start a check."""
+def register() -> None:
+    bpy.app.handlers.depsgraph_update_post.append(_when_drawn_on)
+
+
+def unregister() -> None:
+    """End what would start a check."""
+    bpy.app.handlers.depsgraph_update_post.remove(_when_drawn_on)
     if bpy.app.timers.is_registered(_check):
         bpy.app.timers.unregister(_check)

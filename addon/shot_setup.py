@@ -1,4 +1,4 @@
-"""Set Up Shot: size, speed, camera, background, light and colours of the clip for the Blender scene.
+"""Set Up Shot: size, speed, camera, background, light and colors of the clip for the Blender scene.
 
 Everything made here is found again by its name, so a second set-up changes nothing.
 """
@@ -24,7 +24,7 @@ NEW_RANGE = (1, 250)
 """Frames of a new file of Blender."""
 
 SENSOR_WIDTH = 36.0
-"""Millimetres; Blender's default."""
+"""Millimeters; Blender's default."""
 
 BOUNCES = 128
 """How often Cycles scatters light in smoke that was fitted with scattering of all orders."""

@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from . import preferences
 from .blender_scene import ShotError
 from .job import EngineMissingError, Job, engine_command
-from .panel import draw_text
+from .panel import draw_doubt, draw_text
 from .smoke import active_smoke, find_smoke
 from .subpanel import redraw
 from .take import TakeError
@@ -38,8 +38,8 @@ class SideJob:
         Identifier of the operator that has files written; empty for an estimate.
     sentence
         The result, or the reason of a failure; empty for an estimate.
-    warnings
-        Why the result may be wrong.
+    doubts
+        Why the result may be wrong, as `Job` has them.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class SideJob:
         self.smoke = 0
         self.operator = ""
         self.sentence = ""
-        self.warnings: list[str] = []
+        self.doubts: list[tuple[str, str]] = []
         self._end: End | None = None
 
     @property
@@ -59,7 +59,7 @@ class SideJob:
         """Start the engine; EngineMissingError if there is none."""
         self.stop()
         words, self._end = request
-        self.smoke, self.operator, self.sentence, self.warnings = smoke.session_uid, operator, "", []
+        self.smoke, self.operator, self.sentence, self.doubts = smoke.session_uid, operator, "", []
         words = [*words, "--progress", "json", *preferences.thread_options()]
         self.job = Job(engine_command(words), Path(bpy.app.tempdir) / "smokelift.log")
         self.job.start()
@@ -82,7 +82,7 @@ class SideJob:
             return TICK_SECONDS
         self.job = None
         if self.operator:
-            self.sentence, self.warnings = job.sentence, job.warnings
+            self.sentence, self.doubts = job.sentence, job.doubts
         smoke = find_smoke(self.smoke)
         if smoke is not None:
             self._end(smoke, job)
@@ -157,8 +157,8 @@ def draw_work(
         layout.operator(operator, icon=icon)
     if own and side_job.smoke == smoke.session_uid and side_job.sentence:
         draw_text(layout, context, side_job.sentence, "INFO")
-        for warning in side_job.warnings:
-            draw_text(layout, context, warning, "ERROR")
+        for kind, words in side_job.doubts:
+            draw_doubt(layout, context, kind, words)
 
 
 register, _unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_stop_writing,))

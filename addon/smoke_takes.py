@@ -82,6 +82,8 @@ def write_take(smoke: bpy.types.Object) -> Take:
     if smoke.smokelift.camera_mode == "ESTIMATE":
         hide_default_cube(scene_of(smoke))
     take = _next_take(smoke)
+    if smoke.smokelift.drawn_mask is not None:
+        tables["clip"]["mask"] = take.keep_mask(Path(tables["clip"]["mask"]))
     take.write(tables, engine_options(smoke))
     _note_file(take)
     return take

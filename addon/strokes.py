@@ -66,8 +66,8 @@ def lay_below(image: bpy.types.Image, picture: Path) -> None:
     filmed = bpy.data.images.load(str(picture))
     values, strokes = _pixels(filmed), strokes_in(_pixels(image))
     bpy.data.images.remove(filmed)
-    grey = values[:, :3].mean(1, keepdims=True)
-    values[:, :3] = grey + SATURATION * (values[:, :3] - grey)
+    gray = values[:, :3].mean(1, keepdims=True)
+    values[:, :3] = gray + SATURATION * (values[:, :3] - gray)
     painted = strokes[:, 3] > 0.0
     values[painted] = strokes[painted]
     image.pixels.foreach_set(values.ravel())

@@ -7,6 +7,8 @@ Every take has the next free number, so no run overwrites another:
     take_0003.json    the engine's further options, and the .blend files that may show it
     take_0003.log     the engine's messages
     take_0003.png     a thumbnail of the last frame, input beside reconstruction
+    take_0003_mask.png  the mask, if it was drawn in Blender
+    take_0003_mask_####.png  the same where it moves, for every frame
 
 One that is made of another take, which goes on after its clip, has another pace or repeats, has no scene file:
 
@@ -90,6 +92,27 @@ class Take:
     def _moving_files(self) -> list[Path]:
         return sorted(self.directory.parent.glob(f"{self.directory.name}_{'[0-9]' * 4}*.stl"))
 
+    def _mask_files(self) -> list[Path]:
+        return sorted(self.directory.parent.glob(f"{self.directory.name}_mask*.png"))
+
+    def keep_mask(self, drawn: Path) -> str:
+        """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
+
+        Parameters
+        ----------
+        drawn
+            A picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones.
+
+        Raises
+        ------
+        TakeError
+            If the folder cannot be written to.
+        """
+        beside = self.directory.name
+        files = sorted(drawn.parent.glob(drawn.name.replace("####", "*")))
+        self._write({self.directory.with_name(f"{beside}_{file.name}"): file.read_bytes() for file in files})
+        return f"{beside}_{drawn.name}"
+
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options.
 
@@ -161,13 +184,18 @@ class Take:
             moved = False
             for (table, key), path in files.items():
                 before = tables.get(table, {}).get(key)
-                if isinstance(before, str) and not Path(before).is_file() and path.is_file():
+                if isinstance(before, str) and not self._has(before) and path.is_file():
                     tables[table][key] = str(path)
                     moved = True
         except (OSError, ValueError, AttributeError) as error:
             raise TakeError(f"{self.scene_file} is missing or damaged: make the smoke again.") from error
         if moved:
             self._write({self.scene_file: toml.dumps(tables).encode()})
+
+    def _has(self, path: str) -> bool:
+        """Whether there is a file of its scene file, or those of a pattern."""
+        file = self.directory.parent / path
+        return file.is_file() or ("#" in file.name and any(file.parent.glob(re.sub("#+", "[0-9]*", file.name))))
 
     def arguments(self) -> list[str]:
         """The engine's arguments, which start this take or resume it.
@@ -234,7 +262,7 @@ class Take:
         """Delete all its files."""
         shutil.rmtree(self.directory, ignore_errors=True)
         own = (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file)
-        for file in (*own, *self._moving_files()):
+        for file in (*own, *self._moving_files(), *self._mask_files()):
             file.unlink(missing_ok=True)
 
 

@@ -65,8 +65,8 @@ class SMOKELIFT_OT_undistort(bpy.types.Operator):
         if settings.plate_mode == "FILE":
             self.report({"ERROR"}, "The clean plate is distorted too: choose Background: From the Clip first.")
             return {"CANCELLED"}
-        if settings.mask:
-            self.report({"ERROR"}, "The mask is distorted too: clear it, and paint one over the undistorted clip.")
+        if settings.mask or settings.drawn_mask is not None:
+            self.report({"ERROR"}, "The mask is distorted too: clear it, and draw one over the undistorted clip.")
             return {"CANCELLED"}
         if settings.strokes is not None:
             self.report({"ERROR"}, "The strokes are distorted too: clear them, and paint new ones afterwards.")

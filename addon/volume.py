@@ -1,6 +1,7 @@
 """The result: a Volume object that plays the sequence, with a material of the smoke's optical properties."""
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,9 @@ GOOD_DEGREES = 30
 """Degrees beside its camera at which smoke of one camera still has what `sentences` calls good, about 28 dB: 29.0 at 20
 and 25.1 at 45 degrees, mean of four scenes, smooth (docs/accuracy.md)."""
 
+_FRAMES = re.compile(r"[Ff]rames? \d+(?: to \d+)?")
+"""Frames that a sentence of the engine names."""
+
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
 
@@ -53,7 +57,8 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     _correct_position(smoke, index["scene"]["domain"])
     fit_look(smoke, index["scene"])
     _play(smoke, scene_of(smoke), take, index)
-    smoke.data[PROVENANCE] = _provenance(index.get("provenance", []), bool(index["scene"].get("views")))
+    parts, before = index.get("provenance", []), frames_before(smoke.smokelift, index)
+    smoke.data[PROVENANCE] = _provenance(parts, bool(index["scene"].get("views")), before)
     return smoke
 
 
@@ -182,8 +187,10 @@ def provenance_note(smoke: bpy.types.Object) -> str:
     return smoke.data.get(PROVENANCE, "")
 
 
-def _provenance(parts: list[dict[str, Any]], has_further_views: bool) -> str:
-    directed = [part["how"] for part in parts if part["what"] in DIRECTIONS]
+def _provenance(parts: list[dict[str, Any]], has_further_views: bool, before: int) -> str:
+    """The line; of what was done after the clip, with its frames counted on from the clip's."""
+    hows = (part["how"] for part in parts if part["what"] in DIRECTIONS)
+    directed = [_counted_on(how, before) for how in hows]
     parts = [part for part in parts if part["what"] not in DIRECTIONS]
     if not parts:  # the engine of earlier versions did not say
         return " ".join(directed)
@@ -195,6 +202,11 @@ def _provenance(parts: list[dict[str, Any]], has_further_views: bool) -> str:
     seen = "What the camera sees is measured"
     seen += "." if has_further_views else f", good to about {GOOD_DEGREES} degrees beside it."
     return " ".join([seen, what, *directed])
+
+
+def _counted_on(words: str, before: int) -> str:
+    """A sentence of the engine, which counts the frames of a result from 1, with so many frames before them."""
+    return _FRAMES.sub(lambda named: re.sub(r"\d+", lambda number: str(int(number[0]) + before), named[0]), words)
 
 
 @persistent

@@ -85,6 +85,20 @@ def test_the_table_is_what_is_enforced() -> None:
     assert {avoided for say, avoided in rows if say != "say" and "---" not in say} == set(BANNED)
 
 
+BRITISH = re.compile(r"(?i)colour|\bgrey|metres?\b|neighbour|behaviour|\bcentres?\b|licence|linearis|minimis|stabilis")
+"""Spellings that Blender does not have."""
+
+CODE = re.compile(r"`[^`]*`|\]\([^)]*\)|[\w.-]*/[\w/.-]+|\.\w*centres\(|^centre = |\"centre\"|^    python .*", re.M)
+"""Names of files and of the code, which a page quotes."""
+
+
+def test_what_an_artist_reads_has_one_spelling() -> None:
+    """All pages, and the add-on with its comments."""
+    read = [path for path in FILES if name(path).startswith(("addon/", "docs/")) or path.parent == ROOT]
+    found = {name(path): set(BRITISH.findall(CODE.sub("", path.read_text(encoding="utf-8")))) for path in read}
+    assert {path: words for path, words in found.items() if words} == {}
+
+
 FRAGMENT = re.compile(r"(?:Of|That of|Those|By|In|From|As|With|On|At|The same) ")
 """How docstrings begin that leave their noun to the name beside them."""
 

@@ -93,8 +93,8 @@ def add_lights(scene: bpy.types.Scene, lights: list[dict[str, Any]]) -> None:
         scene.collection.objects.link(obj)
     world = scene.world = bpy.data.worlds.new("World")
     world.use_nodes = True
-    grey = 0.0 if suns else 1.0
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (grey, grey, grey, 1.0)
+    gray = 0.0 if suns else 1.0
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (gray, gray, gray, 1.0)
 
 
 def add_camera(scene: bpy.types.Scene, described: dict[str, Any]) -> bpy.types.Object:

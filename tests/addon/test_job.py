@@ -115,13 +115,24 @@ def test_progress(engine, log) -> None:
     assert (job.outcome, job.status) == ("done", 0)
     assert (job.done, job.total, job.seconds_left) == (3, 3, 0.0)
     assert job.notes == ["Light not given.", "A cut.", "No smoke found."]
-    assert job.warnings == ["A cut.", "No smoke found."]
+    assert job.doubts == [("", "A cut."), ("", "No smoke found.")]
     assert job.sentence == "3 frames."
     assert job.details == {"text": "3 frames.", "frames": 3}
     text = log.read_text()
     assert "Light not given." in text
     assert "frame 2: 2 of 3" in text
     assert text.endswith("[done, status 0]\n")
+
+
+def test_a_run_that_goes_on_counts_what_was_finished(engine, log) -> None:
+    """Also where it is cancelled before it has said so; and it knows the forecast before its first frame."""
+    job = Job([sys.executable, "-c", "import time; time.sleep(60)"], log, done=7)
+    assert (job.done, job.total) == (7, 0)
+    job.start()
+    job.kill()
+    assert job.sentence == "Cancelled; finished frames stay: 7."
+    job = finished(engine('print(\'{"event": "start", "total": 9, "done": 2, "seconds_left": 21.5}\')'))
+    assert (job.done, job.total, job.seconds_left) == (2, 9, 21.5)
 
 
 @pytest.mark.parametrize(

@@ -78,8 +78,8 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--distance",
         type=float,
-        metavar="METRES",
-        help="level distance in metres from the camera, straight ahead, to the lower end of the smoke; sets the scale "
+        metavar="METERS",
+        help="level distance in meters from the camera, straight ahead, to the lower end of the smoke; sets the scale "
         "where no box is given (default: estimated)",
     )
     parser.add_argument(

@@ -7,7 +7,8 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
@@ -17,9 +18,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from smokelift.checks import Doubt, Figures, Remark, printable
+from smokelift.output.sequence import Sequence
 from smokelift.report.sentences import all_figures, sentence
 
 Style = Literal["text", "json"]
+
+PACE_FRAMES = 10
+"""Frames by whose pace the rest is forecast, the newest. The forecast before the first counts as one of them until that
+many are there: so it hardly matters after a few, and one slow frame is not taken for all."""
 
 
 class OutputError(OSError):
@@ -66,8 +72,8 @@ class Reporter(Protocol):
     def note(self, said: Remark | str) -> None:
         """Something that was assumed or noticed."""
 
-    def start(self, total: int, done: int) -> None:
-        """Frames begin: ``total`` of them, ``done`` already."""
+    def start(self, total: int, done: int, seconds: float | None = None) -> None:
+        """Frames begin: ``total`` of them, ``done`` already; ``seconds`` is a forecast of the rest, if there is one."""
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         """One more frame is finished."""
@@ -98,15 +104,28 @@ def say_sequence(
 
     The last sentence is a remark of ``kind`` with ``figures`` of its own.
     """
-    began, started = time.monotonic(), False
+    began, new = time.monotonic(), set[int]()
     for number, of_frame in written:
-        if not started:
+        if not new:
             say.start(total, number - start)
-            started = True
+        new.add(number)
         say.frame(number, of_frame)
-    seconds = round(time.monotonic() - began, 1)
+    earlier = seconds_before(Sequence.open(directory), new) if min(new, default=start) > start else 0.0
+    seconds = round(time.monotonic() - began + earlier, 1)
     result: Figures = {"directory": str(directory), "frames": total, "seconds": seconds}
     say.finish(Remark(kind, {**result, **figures}), result)
+
+
+def work_seconds(figures: Mapping[str, Any]) -> float:
+    """Return what a frame took; nothing for one that is copied from its source, whose figures it has."""
+    if figures.get("origin") == "clip":
+        return 0.0
+    return float(figures.get("seconds_density") or 0.0) + float(figures.get("seconds_velocity") or 0.0)
+
+
+def seconds_before(sequence: Sequence, new: Collection[int]) -> float:
+    """Return what the frames of a sequence took that a run found finished; ``new`` are the numbers of its own."""
+    return sum(work_seconds(sequence.figures(number)) for number in sequence.frames if number not in new)
 
 
 def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
@@ -150,7 +169,7 @@ class _Text(Reporter):
         with _output():
             self._console.print(printable_lines(_words(said)), markup=False, soft_wrap=True)
 
-    def start(self, total: int, done: int) -> None:
+    def start(self, total: int, done: int, seconds: float | None = None) -> None:
         with _output():
             self._bar.update(self._task, total=total, completed=done)
             self._bar.start_task(self._task)
@@ -181,20 +200,27 @@ class _Json(Reporter):
 
     def __init__(self) -> None:
         self._total = self._done = 0
-        self._spent: list[float] = []
+        self._pace: deque[float] = deque(maxlen=PACE_FRAMES)
+        self._before = time.monotonic()
 
     def note(self, said: Remark | str) -> None:
         self._say("note", **_fields(said), doubt=isinstance(said, Doubt))
 
-    def start(self, total: int, done: int) -> None:
-        self._total, self._done = total, done
-        self._say("start", total=total, done=done)
+    def start(self, total: int, done: int, seconds: float | None = None) -> None:
+        self._total, self._done, self._before = total, done, time.monotonic()
+        known = {}
+        if seconds is not None and total > done:
+            self._pace.append(seconds / (total - done))
+            known = {"seconds_left": round(seconds, 1)}
+        self._say("start", total=total, done=done, **known)
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         self._done += 1
-        self._spent.append(figures["seconds_density"] + figures["seconds_velocity"])
-        recent = self._spent[-10:]
-        left = (self._total - self._done) * sum(recent) / len(recent)
+        now = time.monotonic()
+        # all that passed, with the files; of a first frame that was under way at the start, what it says itself
+        self._pace.append(max(now - self._before, work_seconds(figures)))
+        self._before = now
+        left = (self._total - self._done) * sum(self._pace) / len(self._pace)
         self._say(
             "frame",
             frame=number,

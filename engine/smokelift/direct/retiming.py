@@ -62,7 +62,7 @@ def retime_sequence(
     """
     times, pace = playback(len(sequence.frames), speeds)
     first, dt = sequence.frames[0], 1 / sequence.fps
-    how = "Frames between those of the clip are made of both neighbours, carried there by the velocity."
+    how = "Frames between those of the clip are made of both neighbors, carried there by the velocity."
     camera_frames = [first + float(at) for at in times]
     pair: dict[int, Moment] = {}
     with directed_writer(

@@ -139,7 +139,7 @@ class Sequence:
     def flame(self, number: int) -> Array | None:
         """Return the emission of fire in a frame, shape (nx, ny, nz); None where the clip or the file has none.
 
-        It is radiance per metre, of the color ``scene.medium.flame_color``.
+        It is radiance per meter, of the color ``scene.medium.flame_color``.
 
         Raises
         ------

@@ -41,7 +41,7 @@ class Viewer:
     def image(self, number: int, density: Volume, flame: Volume | None = None) -> Image:
         """Render a density (nx, ny, nz) as a frame, from 1; linear radiance (rows, columns, 3).
 
-        The light of a flame (nx, ny, nz), radiance per metre, is added; that the smoke is lit by it is not shown.
+        The light of a flame (nx, ny, nz), radiance per meter, is added; that the smoke is lit by it is not shown.
         """
         frame = number - 1 if self._moves else 0
         if frame not in self._renderers:

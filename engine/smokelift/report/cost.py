@@ -123,13 +123,17 @@ class Spent:
 
 def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Cost:
     """Estimate the cost of a run from its grid, its smoke and what preparing it took, in a part of a second."""
-    frames = START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
     return Cost(
-        seconds=prepared.work + frames,
+        seconds=prepared.work + frames_seconds(resolution, work),
         memory=max(memory_needed(resolution, work), prepared.memory or 0),
         memory_free=memory_free(),
         disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_A_SMOKY_VOXEL_ON_DISK),
     )
+
+
+def frames_seconds(resolution: Resolution, work: Workload) -> float:
+    """Estimate the seconds of a run's frames, without the set-up, in a part of a second."""
+    return START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
 
 
 def voxel_solves(resolution: Resolution, work: Workload) -> float:

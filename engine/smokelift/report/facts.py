@@ -43,7 +43,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
             _said(shot, "assumed camera"),
         ),
         _given_or_undetermined(
-            "scale", f"box of {size} m", has_scale, f"{height} Give its distance, or camera and box, in metres."
+            "scale", f"box of {size} m", has_scale, f"{height} Give its distance, or camera and box, in meters."
         ),
         _box(shot, has_box),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
@@ -66,13 +66,13 @@ def _box(shot: Shot, is_given: bool) -> Fact:
 def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
     medium, know = shot.scene.medium, "Give the medium if you know it."
     extinction = f"{medium.extinction:.3g} 1/m at density 1"
-    colour = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
+    colour = "gray" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
     product = f"A picture shows it times the density only. {know}"
     light = f"A picture shows it times the light only. {know}"
     return (
         _given_or_undetermined("extinction", extinction, is_given, product),
         _given_or_undetermined("albedo", f"{medium.albedo:.3g}", is_given, light),
-        _chosen(shot, "smoke colour", "smoke colour", colour, is_given),
+        _chosen(shot, "smoke colour", "smoke color", colour, is_given),
     )
 
 
@@ -147,7 +147,7 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     return (
         _chosen(shot, "source radiance", "light strength", f"smoke of radiance {colour}", False),
         Fact("sun's direction", "no sun", UNDETERMINED, "Suns from many sides look the same. Give the lights."),
-        Fact("sun's colour", "that of all light", UNDETERMINED),
+        Fact("sun's color", "that of all light", UNDETERMINED),
         Fact("ambient share", "all light is from everywhere", UNDETERMINED),
     )
 

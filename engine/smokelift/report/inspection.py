@@ -68,7 +68,7 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
             f"smoke of frame {shot.clip.first + number}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)
         ),
         Panel(f"unknown background: {unknown.mean():.1%} of the picture", _unknown_picture(plate, unknown)),
-        Panel("brightness: frame (grey), its smoke (orange), background (blue)", _histogram(picture, plate, seen)),
+        Panel("brightness: frame (gray), its smoke (orange), background (blue)", _histogram(picture, plate, seen)),
         *([] if path is None else [Panel("path of the box's middle while the camera moves", path)]),
     ]
     name = given.clip.path.name if given.clip is not None else "clip"

@@ -185,15 +185,15 @@ SENTENCES: Mapping[str, str] = {
         "Medium not given: extinction {extinction:.3g} 1/m (density 1 is thick smoke), albedo {albedo:g}, isotropic."
     ),
     "smoke colour": (
-        "Smoke color: {value} (linear), at least {degrees:.0f} degrees from that of grey smoke; if the light has this "
-        "color and the smoke is grey, give grey as the smoke's color."
+        "Smoke color: {value} (linear), at least {degrees:.0f} degrees from that of gray smoke; if the light has this "
+        "color and the smoke is gray, give gray as the smoke's color."
     ),
     "smoke colour unseen": (
-        "Smoke color: undetermined, so grey is assumed: no smoke is thick, bright and free of clipped pixels enough to "
+        "Smoke color: undetermined, so gray is assumed: no smoke is thick, bright and free of clipped pixels enough to "
         "show a color. Give the color if you know it."
     ),
     "smoke colour near the light's": (
-        "Smoke color: undetermined, so grey is assumed: its color may be {degrees:.0f} degrees from that of grey smoke "
+        "Smoke color: undetermined, so gray is assumed: its color may be {degrees:.0f} degrees from that of gray smoke "
         "or of what is behind it, and colored light alone can make {tolerance:g}. Give the color if you know it."
     ),
     "fire": (
@@ -292,6 +292,11 @@ SENTENCES: Mapping[str, str] = {
         "Fire and smoke are not separated well: a typical frame still differs from the clip by {error:.0%} "
         "of what changes in it. Smoke that fire lights looks like fire, and flames that are clipped to white look "
         "like smoke. Use a copy that is exposed for the flames, frames with less fire, or hide the fire by a mask."
+    ),
+    "not all may be smoke": (
+        "Some of what counts as smoke may be something else: a first, coarse fit leaves {error:.0%} of what changes in "
+        "the clip unexplained. Things that move, light that changes and labels look like smoke, too. Hide what is no "
+        "smoke by a mask, crop the clip, use frames in which the light is steady, or give a clean plate as background."
     ),
     "not all is smoke": (
         "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "

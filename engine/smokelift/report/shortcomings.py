@@ -1,4 +1,4 @@
-"""What the figures of a finished run say against its result."""
+"""What figures say against a result: those of a finished run, and before one those of its set-up."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import Doubt
+from smokelift.setup.shot import Shot
 
 UNEXPLAINED_SHARE = 0.7
 """Root mean square of what a fit leaves, as a share of what the smoke changes: half of the change's energy."""
@@ -15,6 +16,21 @@ UNEXPLAINED_SHARE = 0.7
 DOUBTFUL_SHARE = 0.3
 """Share left above which some of the change may be no smoke. Good results leave less; those that take labels, leaves, a
 head or the light for smoke leave more (docs/clips.md)."""
+
+FORESEEN_SHARE = 0.25
+"""Share that a coarse fit leaves of the pixels that it leaves out, above which a run is likely to leave more than
+`DOUBTFUL_SHARE`. The example as it is, with leaves and with light that flickers leaves .04 to .07 (a run .05 to .12),
+with a person in it .12, .16, .29 and .35 (.14, .23, .37 and .39), with labels .10 (.27)."""
+
+
+def foreseen(shot: Shot) -> list[Doubt]:
+    """Return the doubts about a run that the set-up of its shot gives reason for."""
+    if shot.fire is not None or any(remark.kind == "likely wrong light" for remark in shot.remarks):
+        return []
+    figures = next((estimate.figures for estimate in shot.estimates if estimate.what == "scattering"), {})
+    error = figures.get("error", 0.0)
+    assert isinstance(error, float)
+    return [Doubt("not all may be smoke", {"error": error})] if error > FORESEEN_SHARE else []
 
 
 def count_empty(figures: Sequence[Mapping[str, Any]]) -> int:

@@ -33,7 +33,7 @@ class Camera:
     size
         Picture width and height in pixels.
     fx, fy
-        Perspective: focal lengths in pixels. Orthographic: pixels per metre.
+        Perspective: focal lengths in pixels. Orthographic: pixels per meter.
     cx, cy
         Where the optical axis meets the picture, in pixels.
     matrices
@@ -82,7 +82,7 @@ class Camera:
         Parameters
         ----------
         position, target
-            Points in metres.
+            Points in meters.
         up
             A direction that is up in the picture.
         fov_y_degrees
@@ -109,7 +109,7 @@ class Camera:
 
     @property
     def position(self) -> Vector:
-        """Where the camera is, in metres."""
+        """Where the camera is, in meters."""
         return self.matrix[0][3], self.matrix[1][3], self.matrix[2][3]
 
     @property

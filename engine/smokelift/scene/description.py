@@ -1,6 +1,6 @@
 """What a user describes of a shot; whatever is left out is estimated or defaulted.
 
-Conventions: right-handed world, Z up, metres. Cameras look along their local -Z with +Y up, as Blender's do.
+Conventions: right-handed world, Z up, meters. Cameras look along their local -Z with +Y up, as Blender's do.
 Image coordinates are in pixels, x to the right and y down from the top left corner, pixel centres at half
 integers. Directions of lights are directions of travel.
 

@@ -22,12 +22,12 @@ MAX_SIDE_VOXELS = 4096
 
 @dataclass(frozen=True)
 class Box:
-    """A box in metres; as the domain of a `Scene` it leaves the resolution to the quality.
+    """A box in meters; as the domain of a `Scene` it leaves the resolution to the quality.
 
     Attributes
     ----------
     min, max
-        Corners in metres.
+        Corners in meters.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class Box:
 
     @property
     def centre(self) -> Vector:
-        """Middle of the box in metres."""
+        """Middle of the box in meters."""
         x, y, z = ((low + high) / 2 for low, high in zip(self.min, self.max, strict=True))
         return x, y, z
 
@@ -65,7 +65,7 @@ class Box:
         return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))
 
     def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Return the eight corners in metres, shape (8, 3)."""
+        """Return the eight corners in meters, shape (8, 3)."""
         axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
         corners: np.ndarray[Any, np.dtype[np.float64]] = np.stack(axes, axis=-1).reshape(8, 3)
         return corners
@@ -78,7 +78,7 @@ class Domain(Box):
     Attributes
     ----------
     min, max
-        Corners in metres.
+        Corners in meters.
     resolution
         Voxels along x, y, z.
 
@@ -115,7 +115,7 @@ class Domain(Box):
 
     @property
     def voxel_size(self) -> float:
-        """Voxel edge in metres."""
+        """Voxel edge in meters."""
         return (self.max[0] - self.min[0]) / self.resolution[0]
 
     @property
@@ -124,7 +124,7 @@ class Domain(Box):
         return self.resolution
 
     def about_centre(self, resolution: tuple[int, int, int], voxel_size: float) -> Domain:
-        """Return the domain about the same centre with other voxels, whose size is in metres."""
+        """Return the domain about the same centre with other voxels, whose size is in meters."""
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
@@ -172,7 +172,7 @@ class Domain(Box):
         return Domain((a, b, c), (d, e, f), (x, y, z))
 
     def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""
+        """Return the meters from a point to the voxels' centres along x, y and z, ready to be broadcast."""
         places = zip(self.min, point, self.resolution, strict=True)
         x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * self.voxel_size - at for low, at, n in places))
         return x, y, z
@@ -185,9 +185,9 @@ class Inlet:
     Attributes
     ----------
     centre
-        In metres.
+        In meters.
     radius
-        In metres, above 0.
+        In meters, above 0.
     """
 
     centre: Vector
@@ -195,7 +195,7 @@ class Inlet:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        radius = positive(self.radius, "radius", "a number of metres above 0")
+        radius = positive(self.radius, "radius", "a number of meters above 0")
         set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
 
     def reaches(self, domain: Box) -> bool:

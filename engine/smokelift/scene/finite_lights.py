@@ -58,7 +58,7 @@ class PointLight:
     Attributes
     ----------
     position
-        In metres, outside the box.
+        In meters, outside the box.
     intensity
         Red, green and blue in W/sr.
     """

@@ -34,7 +34,7 @@ class Medium:
         Extinction is the same for all.
     flame_color
         Colour of the light of fire in the smoke, red, green and blue from 0 to 1. Times the emission in the grid
-        ``flame`` it is the radiance per metre. What may be fire is fire then. None takes what the clip shows.
+        ``flame`` it is the radiance per meter. What may be fire is fire then. None takes what the clip shows.
     """
 
     extinction: float = 5.0

@@ -9,7 +9,7 @@ each of them optional. Their keys are the fields of the classes of the same name
   shadows), ``"unshadowed"`` (once, without) or ``"absorption"`` (not at all). A ``[medium]`` that holds nothing else
   leaves the medium to be estimated.
 - ``[camera]`` takes ``position``, ``target`` and ``up`` in place of ``matrix``, and ``fov_y_degrees``, or the
-  ``height`` in metres of an orthographic picture, in place of ``fx`` and ``fy``.
+  ``height`` in meters of an orthographic picture, in place of ``fx`` and ``fy``.
 """
 
 from __future__ import annotations
@@ -235,5 +235,5 @@ def _scales(data: Table, lens: str, height: int) -> tuple[Any, Any]:
     if lens == "fov_y_degrees":
         focal = focal_length(data[lens], height)
     else:
-        focal = height / positive(data[lens], lens, "a number of metres above 0")
+        focal = height / positive(data[lens], lens, "a number of meters above 0")
     return focal, focal

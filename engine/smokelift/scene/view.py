@@ -71,12 +71,12 @@ class ClipSource:
 
 @dataclass(frozen=True)
 class Background:
-    """What the camera sees behind the smoke: one colour, a clean plate or frames of the clip; else it is estimated.
+    """What the camera sees behind the smoke: one color, a clean plate or frames of the clip; else it is estimated.
 
     Attributes
     ----------
     color
-        One linear colour.
+        One linear color.
     image
         A clean plate: a picture. A video, or pictures written ``plate_####.png``, is a plate that changes: its frame n
         is behind the clip's frame n.
@@ -132,7 +132,7 @@ class View:
     clip
         Its ``frames`` show the same moments as those of the scene's clip; None takes the same numbers.
     background
-        What it sees behind the smoke; None takes the scene's if that is one colour, and estimates it otherwise.
+        What it sees behind the smoke; None takes the scene's if that is one color, and estimates it otherwise.
     """
 
     camera: Camera

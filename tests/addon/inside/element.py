@@ -61,7 +61,7 @@ def test_extract_shows_the_element_of_this_frame(shot, asked) -> None:
     image = bpy.data.images["element.exr"]
     assert image.alpha_mode == "PREMUL"
     assert list(image.pixels)[:4] == pytest.approx([0.25, 0.0, 0.0, 0.5])
-    assert side_job.side_job.warnings == ["The plate is noisy."]
+    assert side_job.side_job.doubts == [("", "The plate is noisy.")]
     shot.frame_set(25)
     assert bpy.ops.smokelift.extract() == {"FINISHED"}
     assert [image.name for image in bpy.data.images if "element" in image.name] == ["element.exr"]

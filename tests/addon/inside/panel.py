@@ -20,13 +20,15 @@ LETTERS = 34
 
 
 class Layout:
-    """Keeps the texts that are drawn, in place of Blender's layout."""
+    """Keeps the texts that are drawn and the buttons, as ``[identifier]``, in place of Blender's layout."""
 
     def __init__(self, texts: list[str]) -> None:
         object.__setattr__(self, "texts", texts)
 
-    def __getattr__(self, _name: str) -> Any:
-        def draw(*_values: Any, text: str = "", icon: str = "NONE", **_settings: Any) -> Layout:
+    def __getattr__(self, name: str) -> Any:
+        def draw(*values: Any, text: str = "", icon: str = "NONE", **_settings: Any) -> Layout:
+            if name == "operator":
+                self.texts.append(f"[{values[0].removeprefix('smokelift.')}]")
             self.texts.append(text if icon == "NONE" else f"{text}    ")
             return self
 
@@ -69,9 +71,13 @@ def test_no_line_is_cut_off(shot) -> None:
     for outcome in ("waiting", "running", "done", "failed"):
         row = manager.smokelift.jobs.add()
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
-        row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
+        row.done, row.total, row.seconds_left = 1250, 2500, 80000.0
+        shot_check.keep_doubts(row, [("not all is smoke", "This is a doubt. " * 5)])
     panels = (panel.SMOKELIFT_PT_view, element.SMOKELIFT_PT_view_element, advanced_panel.SMOKELIFT_PT_view_advanced)
     texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES") for text in drawn_with(shot, mode, *panels)]
+    bpy.ops.smokelift.new_mask()
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    texts += drawn(shot, *panels)
     assert {"24 h", "112 G", "100 G", "12%"} <= set(texts)
     assert [text for text in texts if len(text) > LETTERS] == []
 
@@ -166,6 +172,51 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     assert shown() == [0, 0, 0, 0]
     state.check_error, state.costs_smoke = "", state.costs_smoke + 1
     assert shown() == [0, 0, 0, 0]
+
+
+def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_it(shot) -> None:
+    """Beside the forecast, and not while it is made anew; without a forecast in the window the tab stays as it was."""
+    state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
+    details = {**each, "qualities": dict.fromkeys(QUALITIES, each)}
+    state.check_smoke = smoke(shot).session_uid
+    shot_check._keep(state, details, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")])
+    texts = [text.strip() for text in drawn(shot, panel.SMOKELIFT_PT_view)]
+    place = texts.index("A person moves.")
+    assert "[new_mask]" in texts[:place]  # beside Mask
+    assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
+    assert "There is a cut." in texts[place + 3 : place + 6]
+    assert texts.index("There is a cut.") < texts.index("[run]")
+    smoke(shot).smokelift.albedo = 0.5
+    state.check_smoke = smoke(shot).session_uid
+    assert "A person moves." not in [text.strip() for text in drawn(shot, panel.SMOKELIFT_PT_view)]
+
+
+def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
+    state = bpy.context.window_manager.smokelift
+    volume.show(smoke(shot), made(tmp_path))
+    for outcome in ("done", "waiting"):
+        row = state.jobs.add()
+        row.smoke_uid, row.outcome, row.sentence = (
+            smoke(shot).session_uid,
+            outcome,
+            "Match to the clip: good (29.0 dB).",
+        )
+    state.check_smoke = smoke(shot).session_uid
+    texts = [text.strip() for text in drawn(shot, panel.SMOKELIFT_PT_view) if text.strip()]
+    end = texts.index("[set_up]")
+    assert texts[end - 4 : end] == ["[open_log]", "Queued", "[cancel]", "Cancel"]
+    assert "Smoke from Video..." in texts
+
+
+def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
+    def said() -> bool:
+        bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
+        return "inside its lines" in " ".join(map(str.strip, drawn(shot, panel.SMOKELIFT_PT_view)))
+
+    assert not said()
+    bpy.ops.smokelift.new_mask()
+    assert said()
 
 
 def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:

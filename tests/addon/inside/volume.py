@@ -227,6 +227,17 @@ def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     assert volume.provenance_note(smoke(shot)) == ""
 
 
+def test_a_simulation_is_said_with_the_clips_frames(shot, tmp_path) -> None:
+    how = "Frames 7 to 11 are a simulation that starts from frame 6, with 3 of the clip."
+    take = made(tmp_path)
+    with changed(take) as index:
+        index["provenance"] = [{"what": "continue", "origin": "made up", "how": how, "settings": {}}]
+        index["scene"]["clip"]["frames"] = [39, 44]
+    volume.show(smoke(shot), take)
+    said = "Frames 46 to 50 are a simulation that starts from frame 45, with 3 of the clip."
+    assert volume.provenance_note(smoke(shot)) == said
+
+
 def test_a_new_result_replaces_the_old_one_in_the_same_object(shot, tmp_path) -> None:
     volume.show(smoke(shot), made(tmp_path))
     before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]

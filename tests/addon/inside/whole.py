@@ -143,7 +143,7 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     assert bpy.context.view_layer.objects.active == smoke(scene)
     assert smoke(scene).select_get()
     assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
-    assert not row.warnings
+    assert not row.doubts
     whole, within = look_alike(scene, tmp_path)
     assert lamp.hide_render and lamp.hide_viewport
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)

@@ -17,6 +17,7 @@ import pytest
 from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, refused
 
 import smokelift
+from smokelift.app.progress import work_seconds
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
@@ -103,7 +104,10 @@ def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys, nu
     sent = events(capsys.readouterr().out)
     start = next(event for event in sent if event["event"] == "start")
     assert (start["done"], start["total"]) == (len(begun.frames), 8)
-    assert Sequence.open(out).frames == tuple(range(1, 9))
+    whole_run = Sequence.open(out)
+    assert whole_run.frames == tuple(range(1, 9))
+    assert sent[-1]["seconds"] > sum(map(work_seconds, map(whole_run.figures, whole_run.frames)))
+    assert start["seconds_left"] > 0
     assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "whole", "--npz", *QUICK) == 0
     for path in sorted((tmp_path / "whole").glob("*.npz")):
         with np.load(path) as whole, np.load(out / path.name) as resumed:

@@ -67,7 +67,7 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     known = {fact["what"]: fact for fact in done["facts"]}
     for what in ("exposure", "camera", "scale", "extinction", "albedo", "light strength"):
         assert known[what]["origin"] == "undetermined"
-    for what in ("sun's direction", "sun's colour", "ambient share"):
+    for what in ("sun's direction", "sun's color", "ambient share"):
         assert known[what]["origin"] == "undetermined"
     if kind == ".html":
         assert "sun&#x27;s direction" in page.read_text(encoding="utf-8")

@@ -1,10 +1,12 @@
 """Progress: lines of JSON for programs, plain words for people, errors apart from results."""
 
 import json
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from smokelift.app import progress
 from smokelift.app.progress import reporter
 from smokelift.checks import Doubt, Remark
 
@@ -49,6 +51,29 @@ def test_json_is_told_how_long_it_takes(capsys) -> None:
     assert left[1] == pytest.approx(11 * 16)
     assert left[11] == pytest.approx(2.0)
     assert left[12] == 0
+
+
+def test_a_forecast_is_corrected_by_the_runs_own_pace(capsys) -> None:
+    """It is all that is known before the first frame, one of two after that, and nothing after ten."""
+    with reporter("json") as say:
+        say.start(24, 4, 80.0)
+        for number in range(5, 25):
+            say.frame(number, figures(2.0))
+    start, *frames = lines(capsys)
+    left = [start["seconds_left"], *(frame["seconds_left"] for frame in frames)]
+    assert left[:3] == pytest.approx([20 * 4.0, 19 * 3.0, 18 * 8 / 3], abs=0.1)
+    assert left[10:] == pytest.approx([2.0 * n for n in range(10, -1, -1)], abs=0.1)
+
+
+def test_what_passes_between_frames_counts(capsys, monkeypatch) -> None:
+    """Writing files, too: more than the frames say."""
+    clock = iter([0.0, 0.0, 5.0, 11.0])
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    say = reporter("json")
+    say.start(4, 0)
+    for number in (1, 2):
+        say.frame(number, figures(2.0))
+    assert [line["seconds_left"] for line in lines(capsys)[1:]] == [15.0, 11.0]
 
 
 def test_text_names_what_matters(capsys) -> None:

@@ -8,6 +8,7 @@ from command_line import command, events, names, refused
 
 from smokelift.app.commands import continue_
 from smokelift.direct import CONTRADICTED
+from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.report import cost
 
@@ -116,6 +117,23 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
     assert command("render", out, "--frame", said[-1]["frames"], "--out", tmp_path / "last.png") == 0
 
 
+def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys, monkeypatch) -> None:
+    """The seconds of what was simulated before count too; frames that are copied from the clip took none."""
+    out = tmp_path / "out"
+    words = ("continue", finished, "--out", out, "--npz", "--frames", 3, "--progress", "json")
+    assert command(*words) == 0
+    last = Sequence.open(out).frames[-1]
+    simulated = [Sequence.open(out).figures(number) for number in range(last - 2, last)]
+    capsys.readouterr()
+    monkeypatch.setattr(continue_, "require_new", lambda _options: None)
+    copied = {"origin": "clip", "seconds_density": 0.0, "seconds_velocity": 0.0}
+    monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(last, copied)]))
+    assert command(*words) == 0
+    start, _, done = events(capsys.readouterr().out)
+    assert (start["done"], start["total"]) == (last - 1, last)
+    assert done["seconds"] == pytest.approx(sum(each["seconds_velocity"] for each in simulated), abs=0.15)
+
+
 def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, monkeypatch) -> None:
     def said(*words: object) -> list[str]:
         start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
@@ -133,7 +151,7 @@ def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, 
 
 def test_one_sentence_says_that_a_buoyancy_contradicts_the_clip(finished, tmp_path, capsys, monkeypatch) -> None:
     figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
-    monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(7, figures), (8, figures)]))
+    monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
     start = ("continue", finished, "--out", tmp_path / "out", "--frames", 2, "--npz", "--progress", "json")
     assert command(*start) == 0
     (sentence,) = [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]

@@ -1,13 +1,15 @@
 """What is said of a shot's box, and against a finished run."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from smokelift.checks import Doubt, Remark
 from smokelift.report.facts import boundaries
-from smokelift.report.shortcomings import shortcomings
+from smokelift.report.shortcomings import foreseen, shortcomings
 from smokelift.scene import Inlet, completed
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.settings import Settings
 
 
@@ -28,6 +30,16 @@ def test_a_fit_that_explains_little_is_said(left: float, kinds: list[str]) -> No
     errors = ({"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {})
     said = shortcomings([{"hull_share": 0.1, **figures} for figures in errors])
     assert said == [Doubt(kind, {"error": left}) for kind in kinds]
+
+
+@pytest.mark.parametrize(("left", "said"), [(0.2, False), (0.3, True)])
+def test_what_may_be_no_smoke_is_foreseen(left: float, said: bool) -> None:
+    """By what the set-up's fit leaves, unless it made none, fire shines or the light is at fault."""
+    estimate = Estimate("compared scattering", {"error": left}, what="scattering", value="single", source="measured")
+    shot = SimpleNamespace(fire=None, remarks=(Remark("open box"),), estimates=(estimate,))
+    assert foreseen(shot) == ([Doubt("not all may be smoke", {"error": left})] if said else [])
+    for other in ({"fire": object()}, {"estimates": ()}, {"remarks": (Doubt("likely wrong light", {"error": left}),)}):
+        assert foreseen(SimpleNamespace(**{**vars(shot), **other})) == []
 
 
 def test_what_a_fire_leaves_is_said_to_be_fires() -> None:

@@ -60,17 +60,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         parser,
         "--turbulence",
         ("SPEED", "SIZE", "SEED"),
-        "eddies in all air: their speed in m/s, their size in metres, and a whole number (each makes others)",
+        "eddies in all air: their speed in m/s, their size in meters, and a whole number (each makes others)",
     )
     _add_repeatable(
         parser,
         "--fan",
         ("X", "Y", "Z", "RADIUS", "VX", "VY", "VZ"),
-        "a ball in which air is blown: centre and radius in metres, velocity in m/s",
+        "a ball in which air is blown: center and radius in meters, velocity in m/s",
     )
-    _add_repeatable(parser, "--ball", ("X", "Y", "Z", "RADIUS"), "a round obstacle, in metres")
+    _add_repeatable(parser, "--ball", ("X", "Y", "Z", "RADIUS"), "a round obstacle, in meters")
     _add_repeatable(
-        parser, "--box", ("X", "Y", "Z", "X2", "Y2", "Z2"), "an obstacle from one corner to the other, in metres"
+        parser, "--box", ("X", "Y", "Z", "X2", "Y2", "Z2"), "an obstacle from one corner to the other, in meters"
     )
     parser.add_argument(
         "--mesh",
@@ -78,7 +78,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="an obstacle of any shape: a closed mesh in a binary STL file, in metres, Z up; mesh_####.stl for one "
+        help="an obstacle of any shape: a closed mesh in a binary STL file, in meters, Z up; mesh_####.stl for one "
         "that moves, with a file for the last frame that stays and for each after it; may be given again",
     )
     parser.add_argument(

@@ -20,6 +20,7 @@ from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, Fact, write_page
 from smokelift.report.provenance import made_up, record
+from smokelift.report.shortcomings import foreseen
 from smokelift.report.workload import Workload
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
         domain = shot.scene.domain
-        remarks = (*shot.remarks, *boundaries(shot.scene, settings), *shot.estimates, *made_up(shot))
+        remarks = (*shot.remarks, *foreseen(shot), *boundaries(shot.scene, settings), *shot.estimates, *made_up(shot))
         for remark in remarks:
             say.note(remark)
         work = Workload.of(shot, settings)

@@ -11,16 +11,17 @@ import numpy as np
 from PIL import Image
 
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
-from smokelift.app.progress import Reporter, median_psnr
+from smokelift.app.progress import Reporter, median_psnr, seconds_before
 from smokelift.checks import Figures, Remark
 from smokelift.footage.clip import Clip
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
-from smokelift.output.layout import MAX_START_NUMBER
+from smokelift.output.layout import INDEX, MAX_START_NUMBER
+from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
-from smokelift.report.cost import require_memory
+from smokelift.report.cost import frames_seconds, require_memory
 from smokelift.report.provenance import made_up
 from smokelift.report.sentences import sentence
 from smokelift.report.shortcomings import count_empty, shortcomings
@@ -64,12 +65,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         written_kinds(options.npz)  # before the set-up, which takes minutes
         reconstruction = reconstruct(clip, scene, settings)
         shot = reconstruction.shot
-        require_memory(
-            shot.scene.domain.resolution, Workload.of(shot, settings), given=isinstance(scene.domain, Domain)
-        )
+        resolution, work = shot.scene.domain.resolution, Workload.of(shot, settings)
+        require_memory(resolution, work, given=isinstance(scene.domain, Domain))
         for remark in (*shot.remarks, *shot.estimates, *made_up(shot)):
             say.note(remark)
-        report = _report(shot, options.thumbnail, say)
+        finished, new = _finished(options), set[int]()
+        say.start(shot.length, finished, frames_seconds(resolution, work) * (1 - finished / shot.length))
+        report = _report(shot, options.thumbnail, say, new)
         sequence = reconstruction.write(
             options.out,
             npz=options.npz,
@@ -87,7 +89,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         )
     for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)
-    seconds = time.monotonic() - began
+    seconds = time.monotonic() - began + seconds_before(sequence, new)
     fit = median_psnr(figures)
     result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
     done = Remark("written", result) if fit is None else Remark("reconstructed", {**result, "psnr": fit})
@@ -100,15 +102,18 @@ def _start_number(text: str) -> int:
     return int(text)
 
 
-def _report(shot: Shot, thumbnail: Path | None, say: Reporter) -> Callable[[Frame], None]:
-    """Return what is called with each written frame."""
-    started = False
+def _finished(options: argparse.Namespace) -> int:
+    """Number of frames that the run goes on after."""
+    if not options.resume or not (options.out / INDEX).is_file():
+        return 0
+    return len(Sequence.open(options.out).frames)
+
+
+def _report(shot: Shot, thumbnail: Path | None, say: Reporter, new: set[int]) -> Callable[[Frame], None]:
+    """Return what is called with each written frame, whose number it adds to ``new``."""
 
     def report(frame: Frame) -> None:
-        nonlocal started
-        if not started:
-            say.start(shot.length, frame.number - 1)
-            started = True
+        new.add(frame.number)
         if thumbnail:
             _write_thumbnail(thumbnail, shot, frame)
         say.frame(frame.number, frame.figures)

@@ -15,7 +15,7 @@ from smokelift.transport import StaggeredGrid
 def finite_array(values: npt.ArrayLike) -> Doubles:
     """Return an array of float64; ValueError if it holds anything but finite numbers."""
     if isinstance(values, StaggeredGrid):
-        raise ValueError("a velocity must be an array of vectors at voxel centres: velocity.centres(), not a Velocity")
+        raise ValueError("a velocity must be an array of vectors at voxel centers: velocity.centres(), not a Velocity")
     array = numbers(values, "values", np.float64)
     if not np.isfinite(array).all():
         raise ValueError("values must be finite; replace those that are not, or leave their pixels or voxels out")
