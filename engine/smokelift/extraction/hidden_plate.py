@@ -104,7 +104,8 @@ def _likeliest(frames: Sequence[Cells], plate: Plate, source: Picture) -> Pictur
         away = each - continued
         loss = 0.5 * np.einsum("ni,ij,nj->n", away, precision, away)
         for values, noise in seen:
-            loss += INDEPENDENT / FRAMES * np.min([_misfit(values - t * each, (1 - t) * light, noise) for t in MIXTURES], axis=0)
+            misfits = [_misfit(values - t * each, (1 - t) * light, noise) for t in MIXTURES]
+            loss += INDEPENDENT / FRAMES * np.min(misfits, axis=0)
         better = loss < least
         best, least = np.where(better[:, None], each, best), np.minimum(loss, least)
     found = start.copy()
