@@ -20,7 +20,7 @@ from .smoke import active_smoke, scene_of
 
 COARSEST = 0.08
 """Share of the box's depth that a pixel may show where the click still tells more than the box alone, which knows the
-depth to 0.165 of its half (docs/experiments/axis-uncertainty.md)."""
+depth to 0.165 of its half (docs/experiments/density-axis.md)."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ FRAMES = 16
 
 MAX_VOXELS = 512
 """Largest number of voxels along a side of the box; finer grids show the place no better
-(docs/experiments/axis-uncertainty.md)."""
+(docs/experiments/density-axis.md)."""
 
 CANDIDATES = 121
 """Number of depths that are compared, from the front of the box to its back: 60 to a reach (half the box's depth). So
@@ -40,11 +40,11 @@ CANDIDATES = 121
 
 BOX_DEVIATION = 0.165
 """Standard deviation, in reaches, of the smoke's depth about the middle of its box
-(docs/experiments/axis-uncertainty.md)."""
+(docs/experiments/density-axis.md)."""
 
 BOX_COUNT = 2.0
 """Number of boxes that `BOX_DEVIATION` counts as. The box at hand counts as one more, by how far off its middle the
-smoke is across the picture (docs/experiments/axis-uncertainty.md)."""
+smoke is across the picture (docs/experiments/density-axis.md)."""
 
 MAX_KNOWN_DEVIATION = 0.95
 """Largest standard deviation of a depth that a floor contact determines, over that by the box alone. A contact that
@@ -72,11 +72,11 @@ LEANING_DEVIATION = 0.5
 """Standard deviation, in reaches, of that distance for a column that leans, across the picture and in depth."""
 
 WIDENING = 0.15
-"""Growth of a column's radius per metre of height: it takes in air (docs/experiments/density-columns.md)."""
+"""Growth of a column's radius per metre of height: it takes in air (docs/experiments/density-axis.md)."""
 
 INERTIA = 0.5
 """Weight of a column's place in the row below, in shares of its smoke: other smoke in a row may not be its own
-(docs/experiments/density-columns.md)."""
+(docs/experiments/density-axis.md)."""
 
 
 def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate | None:

@@ -63,7 +63,8 @@ class DensitySettings:
         Steps of descent in a row without that gain which end it (density-descent.md).
     bound
         Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where
-        smoke hardly changes the picture, in shadow or before what hides it, nothing else bounds it (density-bound.md).
+        smoke hardly changes the picture, in shadow or before what hides it, nothing else bounds it
+        (density-descent.md).
 
     The files are in docs/experiments.
     """

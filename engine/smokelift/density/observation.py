@@ -29,7 +29,7 @@ THINNEST_CLEAR = 0.05
 
 SHADED, PATCH = 4.0, 3
 """Noise by which a shaded side of smoke turns away from its source radiance, and pixels along it, at least
-(docs/experiments/bright-background.md)."""
+(docs/experiments/thick-smoke.md)."""
 
 SHADED_DEPTH = 1.5
 """Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
@@ -280,7 +280,7 @@ def apparent_optical_depth(
     J is the source radiance of smoke in the middle of the domain, B the background. T is the least squares solution
     over the channels, or what the channel of T itself shows. Without that, no T explains a pixel that the smoke darkens
     although J is brighter than B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a
-    fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
+    fit that starts from less thins it out until nothing is left (docs/experiments/thick-smoke.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":

@@ -15,7 +15,7 @@ true smoke dark rays are longer than thin ones, by which a smooth answer gains n
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
 density can have, so a ray's middle is moved along it until most of the profile is inside too
-(docs/experiments/inside-box.md).
+(docs/experiments/support.md).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ how far its width may be wrong (docs/experiments/every-view.md)."""
 
 ROOM = 0.5
 """Distance, in A, of a ray's middle from the ends of its way through the domain: about four fifths of the profile
-are inside then (docs/experiments/inside-box.md)."""
+are inside then (docs/experiments/support.md)."""
 
 SILHOUETTE = 0.05
 """Share of the smoke's usual amount from which a pixel belongs to the silhouette
@@ -59,7 +59,7 @@ THINNEST = 0.7
 
 DISTANCE_SHARE = 0.5
 """Share of the distance between columns behind one another that lasts on the way up, as they draw together
-(docs/experiments/density-columns.md)."""
+(docs/experiments/density-axis.md)."""
 
 STEPS_TO_AXIS = 3
 """Fixed-point steps from a ray's place in the middle of the domain to where it meets the axis. A step leaves of the

@@ -2,7 +2,7 @@
 
 It comes from all sides and changes slowly, so a coarse grid holds it: light goes from block to block along 14
 directions, and conjugate gradients solve for all orders of scattering. What the lights themselves scatter, with its
-sharp shadows, stays on the voxels. Figures: docs/experiments/multiple-scattering.md.
+sharp shadows, stays on the voxels. Figures: docs/experiments/scattering.md.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ BLOCKS = 24
 
 MIN_BLOCK, MAX_BLOCK = 2, 4
 """Voxels along the edge of a block: one voxel says nothing of how its emission changes across it, and larger blocks are
-too dark (docs/experiments/multiple-scattering.md)."""
+too dark (docs/experiments/scattering.md)."""
 
 FIELDS = 4
 """Fields of what is linear across a block: the mean, and the slopes along x, y and z."""

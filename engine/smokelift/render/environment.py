@@ -9,7 +9,7 @@ a stratum cancels; what is left grows with its scatter
 
 so the stratum with the most scatter is split next, across the axis of its largest spread, where the two halves keep
 the least scatter. A median cut (Debevec 2005, "A Median Cut Algorithm for Light Probe Sampling") needs up to twice as
-many lights for the same picture (docs/experiments/environment-directions.md).
+many lights for the same picture (docs/experiments/renderer-agreement.md).
 """
 
 from __future__ import annotations

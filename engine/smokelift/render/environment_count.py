@@ -10,11 +10,11 @@ from smokelift.scene import Camera, Domain, EnvironmentLight, Medium
 from smokelift.scene.projection import voxel_width
 
 MIN_LIGHTS, MAX_LIGHTS = 4, 256
-"""Numbers of lights that `environment_count` chooses between (docs/experiments/environment-directions.md)."""
+"""Numbers of lights that `environment_count` chooses between (docs/experiments/renderer-agreement.md)."""
 
 TOLERANCE = 0.01
 """Relative L2 change of the picture. Single scattering at a voxel a step is itself good to a few tenths of a percent,
-and one code value of an 8-bit picture is half a percent of middle grey (docs/experiments/environment-directions.md)."""
+and one code value of an 8-bit picture is half a percent of middle grey (docs/experiments/renderer-agreement.md)."""
 
 REFERENCE_VOXELS = 28
 """Voxels along the longest edge of the smoke that the number is chosen with: enough for its lumps, and quick."""
@@ -32,7 +32,7 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
     A ball of lumps and hollows that fills the domain is rendered in the medium before black with 4, 8, 16, ... lights,
     until doubling their number changes the picture by at most `TOLERANCE`, or the number is 256. Under six kinds of
     surroundings, a plume then came within 0.2 to 1.3 % of its picture with 512 lights
-    (docs/experiments/environment-directions.md).
+    (docs/experiments/renderer-agreement.md).
     """
     small = _coarse(domain)
     view = _coarse_camera(camera, small)

@@ -27,7 +27,7 @@ MIN_SAME_FRAMES = 4
 
 COARSE_QUANTISER = 42.0
 """Quantiser from which faint smoke is taken for background, if that has more than one colour. Before a brick wall crf
-32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/disturbed-clips.md)."""
+32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/background.md)."""
 
 
 def first_remarks(estimate: FirstEstimate, given: bool) -> tuple[Remark, ...]:

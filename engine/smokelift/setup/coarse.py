@@ -30,7 +30,7 @@ from smokelift.setup.shot import ShotView
 
 COARSE_SIDE = 32
 """Largest number of voxels along the longest side: a few per cent of the work of 96, and every large shadow is there
-(docs/experiments/scattering-selection.md)."""
+(docs/experiments/scattering.md)."""
 
 SHORTEST = 4
 """Smallest number of voxels along the shortest side: two are not at its ends."""

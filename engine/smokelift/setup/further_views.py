@@ -36,7 +36,7 @@ AGREEMENT_SAMPLES = 4
 
 MIN_AGREED_SHARE = 0.9
 """Smallest share of the smoke's pixels that right views agree on: true views agree on all, cameras upside down on a
-tenth to nine tenths (docs/experiments/view-agreement.md)."""
+tenth to nine tenths (docs/experiments/further-views.md)."""
 
 SAME_RATE = 0.01
 """Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""

@@ -39,7 +39,7 @@ NARROWEST = 0.25
 
 MIN_SIDE_VOXELS = 32
 """Smallest number of voxels along the longest side: fewer save nothing more
-(docs/experiments/resolution-selection.md)."""
+(docs/experiments/clip-pixels.md)."""
 
 DETAIL_FRAMES = 3
 """Number of frames, those with the most smoke, whose detail decides the resolution (docs/selection.md)."""

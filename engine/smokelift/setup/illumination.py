@@ -31,22 +31,22 @@ MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multipl
 
 MAX_ERROR_RATIO = 0.75
 """Error of multiple over single scattering, below which multiple is taken. It is 0.01 to 0.63 for traced paths, unless
-either model fits, and from 0.82 for light scattered once (docs/experiments/scattering-selection.md)."""
+either model fits, and from 0.82 for light scattered once (docs/experiments/scattering.md)."""
 
 MAX_DESCENT_STEPS = 64
 """Steps of descent of a fit where models differ little: enough for every fit to end by itself. One that is cut off has
-the error of the steps that it lacks (docs/experiments/scattering-selection.md)."""
+the error of the steps that it lacks (docs/experiments/scattering.md)."""
 
 DOUBTFUL = 0.12
 """Error of held-out pixels, as a share of the smoke's contrast, from which an assumed light before one colour is likely
 wrong: from there the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
-(docs/experiments/surroundings.md)."""
+(docs/experiments/unknown-light.md)."""
 
 MAX_COLOUR_SPREAD = 0.1
 """Largest spread of a background of one colour, as a share of its brightness."""
 
 MAX_QUIET_NOISE = 2 / 255
-"""Largest noise that does not explain the error itself (docs/experiments/surroundings.md)."""
+"""Largest noise that does not explain the error itself (docs/experiments/unknown-light.md)."""
 
 
 def first_light(
@@ -128,7 +128,7 @@ def find_scattering(
     """Return the cheapest model of scattering that finds as good a density as the richest, which judges all.
 
     Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Where both fit a
-    picture, one is twice as dense as the other (docs/experiments/multiple-scattering.md). So multiple scattering is the
+    picture, one is twice as dense as the other (docs/experiments/scattering.md). So multiple scattering is the
     richest only if it fits its own picture clearly better. Neither is the cheaper answer, so the tolerance of cheaper
     models does not apply. Errors are compared as a ratio, in which what no model fits counts for both.
 

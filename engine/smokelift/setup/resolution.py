@@ -2,7 +2,7 @@
 
 The spectrum of what the smoke changes is compared with that of the noise beside it. It is a cosine transform of sRGB
 values, in which a clip's noise is even. A grid shows what is coarser than two of its voxels, and loses the share of the
-contrast that is finer. Figures: docs/experiments/resolution-selection.md.
+contrast that is finer. Figures: docs/experiments/clip-pixels.md.
 """
 
 from __future__ import annotations

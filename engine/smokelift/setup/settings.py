@@ -40,11 +40,11 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "final": GridLimit(1, 0, MAX_SIDE_VOXELS),
 }
 """Limits of each quality. A share loses much the same whatever the clip's size; the bounds keep the time of a frame
-from growing with that size (docs/experiments/resolution-selection.md)."""
+from growing with that size (docs/experiments/clip-pixels.md)."""
 
 LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005, "final": 0.0025}
 """Share of the smoke's contrast that a grid may lose beside the finest of its quality, halved from each to the next
-(docs/experiments/resolution-selection.md)."""
+(docs/experiments/clip-pixels.md)."""
 
 ITERATIONS: Mapping[Quality, tuple[int, int]] = {
     "draft": (4, 4), "balanced": (6, 14), "fine": (8, 14), "final": (8, 14)
@@ -67,7 +67,7 @@ class SelectionSettings:
     scattering_error
         Error, as a share of what the smoke changes in the picture, that a cheaper model of scattering may add. Without
         shadows that is reached at an optical depth of about 0.15, where the mass comes out 5 % too small
-        (docs/experiments/scattering-selection.md).
+        (docs/experiments/scattering.md).
     velocity_side
         Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
         velocities follow its errors (docs/experiments/velocity-grid.md).
