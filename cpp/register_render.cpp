@@ -59,9 +59,8 @@ struct OwnedRays {
     Record record(std::optional<Floats> &a, int width) const {
         if (!a)
             return {};
-        require_fit(a->ndim() == 4 && a->shape(0) == width && a->shape(2) == rays.rows &&
-                    a->shape(3) == rays.columns);
-        return {a->mutable_data(), static_cast<int>(a->shape(1))};
+        require_fit(std::size_t(a->size()) == rays.planes_of_runs() * width * Rays::LANES);
+        return {a->mutable_data()};
     }
 };
 
@@ -239,6 +238,9 @@ void register_camera(py::module_ &module) {
             for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
                 count += std::max(0, self.rays.planes[4 * ray + 3] - self.rays.planes[4 * ray + 2] + 1);
             return count;
+        })
+        .def_property_readonly("recorded", [](const OwnedRays &self) {
+            return self.rays.planes_of_runs() * Rays::LANES;
         });
 
     using Places = std::vector<double>;

@@ -324,6 +324,10 @@ class Rays:
     def samples(self) -> int:
         """Samples of all rays together."""
 
+    @property
+    def recorded(self) -> int:
+        """Samples that a record holds of each channel: neighbouring rays have as many."""
+
 def pixel_rays(
     start: npt.ArrayLike,
     direction: npt.ArrayLike,
@@ -367,7 +371,7 @@ def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth:
         Radiance, written.
     depth : (rows, columns)
         Optical depth, written.
-    record : (1 + channels, planes, rows, columns)
+    record : (1 + channels, `Rays.recorded`)
         What the samples held, written for `march_adjoint`; may be None.
     """
 

@@ -84,7 +84,7 @@ class CpuBackend:
         if self._diffuse:
             self._diffuse.add(self._medium)
         if keep_record and self._record is None:
-            self._record = _core.zeros((plan.lighting.channels + 1, max(plan.shape), *self._depth.shape))
+            self._record = _core.zeros((plan.lighting.channels + 1, self._rays.recorded))
         record = self._record if keep_record else None
         _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
         return self._scattered, self._depth
