@@ -33,7 +33,9 @@ struct Rays {
 
     void find_runs();
     // Planes that the runs cross, all together.
-    std::size_t planes_of_runs() const { return runs.empty() ? 0 : runs.back().before + runs.back().planes(); }
+    std::size_t planes_of_runs() const {
+        return runs.empty() ? 0 : runs.back().before + runs.back().planes();
+    }
     std::size_t pixels() const { return std::size_t(rows) * columns; }
 };
 

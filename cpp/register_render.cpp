@@ -233,15 +233,16 @@ void register_camera(py::module_ &module) {
                 released([&](Workers &workers) { clip(voxels, self.rays, workers); });
             },
             "support"_a, "medium"_a.noconvert())
-        .def_property_readonly("samples", [](const OwnedRays &self) {
-            std::size_t count = 0;
-            for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
-                count += std::max(0, self.rays.planes[4 * ray + 3] - self.rays.planes[4 * ray + 2] + 1);
-            return count;
-        })
-        .def_property_readonly("recorded", [](const OwnedRays &self) {
-            return self.rays.planes_of_runs() * Rays::LANES;
-        });
+        .def_property_readonly("samples",
+                               [](const OwnedRays &self) {
+                                   std::size_t count = 0;
+                                   for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
+                                       count += std::max(0, self.rays.planes[4 * ray + 3] -
+                                                                self.rays.planes[4 * ray + 2] + 1);
+                                   return count;
+                               })
+        .def_property_readonly(
+            "recorded", [](const OwnedRays &self) { return self.rays.planes_of_runs() * Rays::LANES; });
 
     using Places = std::vector<double>;
     module.def(

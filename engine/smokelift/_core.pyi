@@ -475,26 +475,65 @@ def depth_profile(
     ``aside`` are read.
     """
 
-def scale_along_rays(
-    values: Array,
-    plausible: Array | None,
-    logarithm: npt.NDArray[np.floating[Any]],
-    rows: Array,
-    columns: Array,
-    visible: Mask,
-    faint: float,
-    most: float,
-    share: float,
-) -> Array:
-    """Values (n,) of voxels at places of a picture (rows, columns), times exponentials of what it holds there.
+class MarkedVoxels:
+    """The marked voxels of a grid; values (count,) are at them in their order in memory."""
 
-    Of every step a share is made. A step that leads to a value v is multiplied by p / v where it adds something and by
-    v / p where it takes something, at most by ``most``, for p the plausible value, ``faint`` added to both; without
-    plausible values by 1. Those that are not visible stay.
+    def __init__(self, voxels: Mask) -> None: ...
+    @property
+    def count(self) -> int:
+        """How many there are."""
+
+    def above_zero(self, a: Array, b: Array) -> MarkedVoxels:
+        """Those of them at which either volume (nx, ny, nz) is above 0."""
+
+    def take(self, volume: Array, out: Array | None = None) -> Array:
+        """Values of a volume, written to ``out`` if that is given."""
+
+    def put(self, values: Array, volume: Array, factor: float = 1.0) -> None:
+        """Write values, times a factor, into a volume."""
+
+    def share_in_cubes(self, values: Array, size: int, weight: float, out: Array) -> None:
+        """Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
+
+        Half of it is over each of two lattices, half a cube apart. The result may replace the values.
+        """
+
+    def scale_along_rays(
+        self,
+        picture: PictureMap,
+        values: Array,
+        plausible: Array | None,
+        logarithm: npt.NDArray[np.floating[Any]],
+        faint: float,
+        most: float,
+        share: float,
+        out: Array,
+    ) -> None:
+        """Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
+
+        Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
+        would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
+        some, both plus ``faint``, by ``most`` at most. The result may replace the values.
+        """
+
+def hold(values: Array, gradient: Array, density: Array, bound: float, out: Array) -> None:
+    """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
+
+def descend(
+    density: Array,
+    direction: Array,
+    scale: Array,
+    floor: Array,
+    length: float,
+    max_change: float,
+    bound: float,
+    arrived: Array,
+    moved: Array,
+) -> None:
+    """Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
+
+    A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.
     """
-
-def write_at(volume: Array, where: npt.NDArray[np.int64], values: Array, factor: float) -> None:
-    """Write values (n,), times a factor, to ascending indices of a volume's elements."""
 
 def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""

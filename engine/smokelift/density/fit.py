@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.checks import listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
 from smokelift.density.descent import descend
@@ -132,7 +133,7 @@ class GradientFit:
         """Find a density; see `DensityFit`."""
         views, settings = depth.views, self.settings
         hull, where = views.hull, views.where
-        if not where.size:
+        if not where.count:
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
         start = inside(hull, depth.density if initial is None else initial)
@@ -146,11 +147,11 @@ class GradientFit:
         scaled = fit_multiplicative(
             cameras, start, iterations, settings.tolerance, within=views, plausible=plausible, recorded=True
         )
-        expected, started = (float(values.ravel()[where].max()) for values in (depth.density, start))
+        expected, started = (float(where.take(values).max()) for values in (depth.density, start))
         final = descend(
             cameras,
             scaled.density,
-            hull,
+            where,
             settings.descent_iterations,
             settings.tolerance,
             settings.patience,
@@ -255,12 +256,12 @@ def empty_density(views: ViewSet) -> FittedDensity:
     return FittedDensity(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 
 
-def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
-    """The density at some voxels (n,) of the flat array, without values below `MIN_DENSITY`."""
-    values = density.ravel()[within]
-    shown = values >= MIN_DENSITY
+def without_traces(density: Volume, within: _core.MarkedVoxels) -> Volume:
+    """The density at some voxels, without values below `MIN_DENSITY`."""
+    values = within.take(density)
+    values[values < MIN_DENSITY] = 0
     result = np.zeros(density.shape, np.float32)
-    result.ravel()[within[shown]] = values[shown]
+    within.put(values, result)
     return result
 
 

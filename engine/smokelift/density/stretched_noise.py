@@ -135,7 +135,7 @@ class _Octaves(NamedTuple):
 def _finer(values: NDArray[np.float32], coarser: MomentLevel, level: MomentLevel) -> NDArray[np.float32]:
     """Values at the voxels of one grid that may hold smoke, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
-    field.ravel()[coarser.views.where] = values
+    coarser.views.where.put(values, field)
     return coarser.finer(field, level)
 
 
