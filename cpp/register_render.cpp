@@ -200,20 +200,19 @@ void register_lights(py::module_ &module) {
 
     module.def(
         "shade_adjoint",
-        [](Floats medium, Floats gradient, Floats scratch, const Support &support, const Phase &phase,
-           const std::vector<Light> &lights) {
+        [](Floats medium, Floats gradient, std::optional<Floats> scratch, const Support &support,
+           const Phase &phase, const std::vector<Light> &lights) {
             const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
-            const Voxels space = voxels_of(scratch, support);
-            require_fit(space.width == 1 && gradients.width == voxels.width);
+            const Voxels space = scratch ? voxels_of(*scratch, support) : Voxels{};
+            require_fit(gradients.width == voxels.width && (scratch || lights.size() == 1) && space.width == 1);
             released([&](Workers &workers) {
                 fold_border(gradients);
-                const bool alone = lights.size() == 1;
                 for (const Light &light : lights) {
                     if (const auto *point = std::get_if<PointLight>(&light))
                         shade_adjoint(voxels, gradients, support.spans, phase, *point, workers);
                     else
                         shade_adjoint(voxels, gradients, space, support.spans, phase,
-                                      std::get<ParallelLight>(light), alone, workers);
+                                      std::get<ParallelLight>(light), workers);
                 }
             });
         },

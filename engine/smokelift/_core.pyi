@@ -355,11 +355,12 @@ def shade(medium: Volume, support: Support, phase: Phase, lights: Lights) -> Non
     """Write the radiance that the lights scatter in every voxel towards the camera."""
 
 def shade_adjoint(
-    medium: Volume, gradient: Volume, scratch: Volume, support: Support, phase: Phase, lights: Lights
+    medium: Volume, gradient: Volume, scratch: Volume | None, support: Support, phase: Phase, lights: Lights
 ) -> None:
     """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
 
-    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1).
+    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
+    in-scattered radiance is used up.
     """
 
 def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth: Array, record: Volume | None) -> None:
@@ -489,7 +490,7 @@ class MarkedVoxels:
     def take(self, volume: Array, out: Array | None = None) -> Array:
         """Values of a volume, written to ``out`` if that is given."""
 
-    def put(self, values: Array, volume: Array, factor: float = 1.0) -> None:
+    def put(self, values: npt.NDArray[np.floating[Any]], volume: Array, factor: float = 1.0) -> None:
         """Write values, times a factor, into a volume."""
 
     def share_in_cubes(self, values: Array, size: int, weight: float, out: Array) -> None:

@@ -39,7 +39,7 @@ The voxel may fill, but more slowly than others (docs/experiments/density-descen
 SUFFICIENT = 1e-4
 """Share of the linear prediction that a step has to gain (Armijo's constant)."""
 
-MAX_CHANGE = np.float32(0.25)
+MAX_CHANGE = 0.25
 """Largest change of a voxel in one step, as a share of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
@@ -67,6 +67,7 @@ def descend(
 ) -> Fit:
     """Minimise the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
 
+    The result takes the start's place, which is zero outside the hull.
     It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
     share of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to it.
     ``recorded`` is what is left of each term's picture at the start, L - I, if the renderers hold the records of these
@@ -81,7 +82,7 @@ def descend(
     floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)
     if expected is not None:
         np.minimum(floor, where.take(expected), out=floor)
-    problem = _Problem(terms, where, np.zeros(density.shape, np.float32), np.zeros(density.shape, np.float32), floor)
+    problem = _Problem(terms, where, density, np.zeros(density.shape, np.float32), floor)
     problem.scale += current
     if recorded and not beyond:
         problem.show(current)

@@ -326,18 +326,18 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     """Each further step leaves the picture as near or nearer, in thick smoke too, where bare steps overshoot."""
     scene = replace(small, medium=replace(small.medium, extinction=thickness * small.medium.extinction))
     term, hull, start = even_start(plume.densities[1], scene)
-    losses = [descend([term], start, hull, steps, 0.0, 2).loss for steps in range(20)]
+    losses = [descend([term], start.copy(), hull, steps, 0.0, 2).loss for steps in range(20)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.3 * losses[0]
 
 
 def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     term, hull, start = even_start(plume.densities[1], small)
-    free = descend([term], start, hull, 20, 0.0, 2)
+    free = descend([term], start.copy(), hull, 20, 0.0, 2)
     most = 0.5 * float(free.density.max())
-    bound = descend([term], start, hull, 20, 0.0, 2, bound=most)
+    bound = descend([term], start.copy(), hull, 20, 0.0, 2, bound=most)
     assert bound.density.max() == pytest.approx(most)
-    assert free.loss < bound.loss < 0.5 * descend([term], start, hull, 0, 0.0, 2).loss
+    assert free.loss < bound.loss < 0.5 * descend([term], start.copy(), hull, 0, 0.0, 2).loss
 
 
 def test_the_figures_are_those_of_the_density(plume, small) -> None:
