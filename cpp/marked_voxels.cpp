@@ -46,11 +46,13 @@ public:
             for (int x = std::max(i * size_ - offset_, 0); x < end; ++x) {
                 voxels_.in_plane(x, [&](int y, int z, int count, std::size_t at) {
                     const std::size_t row = std::size_t((y + offset_) / size_) * n_[2];
-                    for (int k = 0; k < count; ++k) {
-                        const std::size_t cube = row + std::size_t((z + k + offset_) / size_);
-                        sums[cube] += values[at + k];
-                        ++counts[cube];
-                    }
+                    in_cubes(z, count, [&](int cube, int first, int end) {
+                        double sum = sums[row + cube];
+                        for (int k = first; k < end; ++k)
+                            sum += values[at + k];
+                        sums[row + cube] = sum;
+                        counts[row + cube] += end - first;
+                    });
                 });
             }
             float *const means = means_.data() + i * slab;
@@ -63,11 +65,22 @@ public:
     void add(int x, int y, int z, int count, float *values) const {
         const float *const row =
             means_.data() + (std::size_t((x + offset_) / size_) * n_[1] + (y + offset_) / size_) * n_[2];
-        for (int k = 0; k < count; ++k)
-            values[k] += row[(z + k + offset_) / size_];
+        in_cubes(z, count, [&](int cube, int first, int end) {
+            for (int k = first; k < end; ++k)
+                values[k] += row[cube];
+        });
     }
 
 private:
+    // part(cube, first, end) for the parts of a stretch in cubes of a row.
+    template <class Part> void in_cubes(int z, int count, const Part &part) const {
+        for (int k = 0; k < count;) {
+            const int cube = (z + k + offset_) / size_, first = k;
+            k = std::min(count, (cube + 1) * size_ - offset_ - z);
+            part(cube, first, k);
+        }
+    }
+
     const MarkedVoxels &voxels_;
     int size_, offset_;
     Shape n_{};

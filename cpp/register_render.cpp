@@ -204,7 +204,8 @@ void register_lights(py::module_ &module) {
            const Phase &phase, const std::vector<Light> &lights) {
             const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
             const Voxels space = scratch ? voxels_of(*scratch, support) : Voxels{};
-            require_fit(gradients.width == voxels.width && (scratch || lights.size() == 1) && space.width == 1);
+            require_fit(gradients.width == voxels.width && (scratch || lights.size() == 1) &&
+                        space.width == 1);
             released([&](Workers &workers) {
                 fold_border(gradients);
                 for (const Light &light : lights) {
