@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace smokelift {
 namespace {
@@ -101,17 +102,92 @@ template <class At> void everywhere(const Shape &n, Workers &workers, const At &
     });
 }
 
-// Transport of one array by `velocity(i, j, k)`; values outside the box are zero or those of its side.
+// For every row (i, j) the range outside which all values within `reach` are zero.
+std::vector<Span> spans_within(In a, int reach, Workers &workers) {
+    const auto [nx, ny, nz] = a.n;
+    std::vector<Span> own(std::size_t(nx) * ny, Span{0, 0}), along_y = own, result = own;
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
+        for (int j = 0; j < ny; ++j) {
+            const float *const row = a.row(i, j);
+            int first = 0, end = nz;
+            while (first < end && row[first] == 0)
+                ++first;
+            while (end > first && row[end - 1] == 0)
+                --end;
+            if (first < end)
+                own[std::size_t(i) * ny + j] = {std::max(first - reach, 0), std::min(end + reach, nz)};
+        }
+        for (int j = 0; j < ny; ++j)
+            for (int other = std::max(j - reach, 0); other < std::min(j + reach + 1, ny); ++other)
+                along_y[std::size_t(i) * ny + j] =
+                    joined(along_y[std::size_t(i) * ny + j], own[std::size_t(i) * ny + other]);
+    });
+    workers.run(nx, [&, nx = nx, ny = ny](int i) {
+        for (int other = std::max(i - reach, 0); other < std::min(i + reach + 1, nx); ++other)
+            for (int j = 0; j < ny; ++j)
+                result[std::size_t(i) * ny + j] =
+                    joined(result[std::size_t(i) * ny + j], along_y[std::size_t(other) * ny + j]);
+    });
+    return result;
+}
+
+// Voxels around one that its value after a step can come from.
+int reach_of(const StaggeredIn &displacement, Workers &workers) {
+    float farthest = 0;
+    for (int c = 0; c < 3; ++c) {
+        const In u = displacement[c];
+        std::vector<float> slabs(std::size_t(u.n[0]));
+        workers.run(u.n[0], [&](int i) {
+            const float *const values = u.row(i, 0);
+            float most = 0;
+            for (std::size_t at = 0; at < u.slab_size(); ++at)
+                most = std::max(most, std::abs(values[at]));
+            slabs[i] = most;
+        });
+        farthest = std::max(farthest, *std::max_element(slabs.begin(), slabs.end()));
+    }
+    const float longest =
+        float(*std::max_element(displacement.box.cells.begin(), displacement.box.cells.end()));
+    return int(std::ceil(std::min(farthest, longest))) + 1;
+}
+
+// Calls at(i, j, k, index) for the elements in the spans of the rows (i, j), and clears the others of an
+// array.
+template <class At>
+void within_spans(const std::vector<Span> &spans, const Out &cleared, Workers &workers, const At &at) {
+    const auto [nx, ny, nz] = cleared.n;
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
+        for (int j = 0; j < ny; ++j) {
+            const auto [first, end] = spans[std::size_t(i) * ny + j];
+            float *const row = cleared.row(i, j);
+            const std::size_t start = std::size_t(row - cleared.data);
+            std::fill(row, row + first, 0.0f);
+            for (int k = first; k < end; ++k)
+                at(i, j, k, start + k);
+            std::fill(row + std::max(first, end), row + nz, 0.0f);
+        }
+    });
+}
+
+// Transport of one array by `velocity(i, j, k)`; values outside the box are those of its side, or zero as
+// outside the spans, where those are given.
 template <class Velocity>
-void maccormack(In a, const Velocity &velocity, bool zero_outside, Out result, Workers &workers) {
+void maccormack(In a, const Velocity &velocity, const std::vector<Span> *spans, Out result,
+                Workers &workers) {
     Field forward(a.n);
     const In hat = forward;
-    const auto gone = [&](const Point &x) { return zero_outside && outside(a.n, x); };
-    everywhere(a.n, workers, [&](int i, int j, int k, std::size_t index) {
+    const auto gone = [&](const Point &x) { return spans && outside(a.n, x); };
+    const auto over = [&](const Out &filled, const auto &at) {
+        if (spans)
+            within_spans(*spans, filled, workers, at);
+        else
+            everywhere(a.n, workers, at);
+    };
+    over(forward, [&](int i, int j, int k, std::size_t index) {
         const Point from = minus(i, j, k, velocity(i, j, k));
         forward.data()[index] = gone(from) ? 0 : Corners(a, from).value();
     });
-    everywhere(a.n, workers, [&](int i, int j, int k, std::size_t index) {
+    over(result, [&](int i, int j, int k, std::size_t index) {
         const Point u = velocity(i, j, k), from = minus(i, j, k, u), to = plus(i, j, k, u);
         // Without the value after transport there is nothing to estimate the error from.
         const bool correct = !gone(from) && !outside(a.n, to);
@@ -131,7 +207,8 @@ void advect_cells(In field, const StaggeredIn &displacement, bool extend, Out re
 
 void advect_cells_maccormack(In field, const StaggeredIn &displacement, Out result, Workers &workers) {
     const auto velocity = [&](int i, int j, int k) { return centre_velocity(displacement, i, j, k); };
-    maccormack(field, velocity, true, result, workers);
+    const std::vector<Span> spans = spans_within(field, reach_of(displacement, workers), workers);
+    maccormack(field, velocity, &spans, result, workers);
 }
 
 void advect_faces(const StaggeredIn &field, const StaggeredIn &displacement, bool limited,
@@ -139,7 +216,7 @@ void advect_faces(const StaggeredIn &field, const StaggeredIn &displacement, boo
     for (int c = 0; c < 3; ++c) {
         const auto velocity = [&](int i, int j, int k) { return face_velocity(displacement, c, i, j, k); };
         if (limited) {
-            maccormack(field[c], velocity, false, result[c], workers);
+            maccormack(field[c], velocity, nullptr, result[c], workers);
             continue;
         }
         everywhere(field[c].n, workers, [&](int i, int j, int k, std::size_t index) {

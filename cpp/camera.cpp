@@ -187,8 +187,7 @@ SMOKELIFT_INLINE void march_run(const Voxels &medium, const Rays &rays, const Ru
         prefetch_plane(medium, lanes, k + AHEAD * run.travel);
         const bool any = sample_lanes<W>(medium, lanes, k, sample);
         if (record.data)
-            for (int w = 0; w < W; ++w)
-                std::copy_n(sample[w], run.count, record.at(rays, w, k, run));
+            std::copy_n(sample[0], W * LANES, record.at(run, k, W));
         if (!any)
             continue;
         for (int lane = 0; lane < LANES; ++lane) {
@@ -229,9 +228,9 @@ SMOKELIFT_INLINE void adjoint_sweep(const Rays &rays, const Run &run, const floa
     }
     for (int step = 0; step <= run.last - run.first; ++step) {
         const int k = run.travel > 0 ? run.last - step : run.first + step;
-        float sample[W][LANES] = {};
-        for (int w = 0; w < W; ++w)
-            std::copy_n(record.at(rays, w, k, run), run.count, sample[w]);
+        float sample[W][LANES];
+        float *const recorded = record.at(run, k, W);
+        std::copy_n(recorded, W * LANES, sample[0]);
         for (int lane = 0; lane < LANES; ++lane) {
             const float x = sample[0][lane] * length[lane];
             const Attenuation crossed = attenuation(x);
@@ -248,8 +247,7 @@ SMOKELIFT_INLINE void adjoint_sweep(const Rays &rays, const Run &run, const floa
                 sample[w][lane] = tau * crossed.opacity * radiance_gradient[w][lane];
             behind[lane] = crossed.opacity * inscattered + crossed.transmittance * behind[lane];
         }
-        for (int w = 0; w < W; ++w)
-            std::copy_n(sample[w], run.count, record.at(rays, w, k, run));
+        std::copy_n(sample[0], W * LANES, recorded);
     }
 }
 
@@ -262,11 +260,10 @@ SMOKELIFT_INLINE void scatter_planes(const Rays &rays, const Run &run, const Rec
         prefetch_plane(gradient, lanes, k + AHEAD);
         const Footprint at(lanes, k);
         float derivative[LANES][W];
-        for (int w = 0; w < W; ++w) {
-            const float *in = record.at(rays, w, k, run);
-            for (int lane = 0; lane < run.count; ++lane)
-                derivative[lane][w] = in[lane];
-        }
+        const float *const in = record.at(run, k, W);
+        for (int w = 0; w < W; ++w)
+            for (int lane = 0; lane < LANES; ++lane)
+                derivative[lane][w] = in[w * LANES + lane];
         for (int lane = 0; lane < run.count; ++lane)
             if (lanes.crosses(lane, k))
                 add_to<W, Adjacent>(plane + at.cell[lane], lanes.along_b, lanes.along_c, at.f[lane],
@@ -409,6 +406,11 @@ void Rays::find_runs() {
         };
         return place(a) < place(b);
     });
+    std::size_t before = 0;
+    for (Run &run : runs) {
+        run.before = before;
+        before += run.planes();
+    }
 }
 
 void clip(const Voxels &medium, Rays &rays, Workers &workers) {

@@ -14,7 +14,10 @@ namespace smokelift {
 struct Run {
     int row, column, count;
     int axis, travel;
-    int first, last; // planes that any of them crosses
+    int first, last;        // planes that any of them crosses
+    std::size_t before = 0; // planes that the runs before it cross
+
+    int planes() const { return last - first + 1; }
 };
 
 // One ray a pixel. A ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k), in grid coordinates.
@@ -29,18 +32,20 @@ struct Rays {
     std::vector<Run> runs;
 
     void find_runs();
+    // Planes that the runs cross, all together.
+    std::size_t planes_of_runs() const {
+        return runs.empty() ? 0 : runs.back().before + runs.back().planes();
+    }
     std::size_t pixels() const { return std::size_t(rows) * columns; }
 };
 
-// What the samples held, or the derivatives of the loss by that: [channel][plane][row][column], the channels
-// those of the voxels. Written where a run has samples; a ray of the run without one has zeros there.
+// What the samples held, or the derivatives of the loss by that: run after run [plane][channel][lane], the
+// channels those of the voxels. A ray without a sample in a plane of its run has zeros there.
 struct Record {
     float *data = nullptr;
-    int planes = 0;
 
-    float *at(const Rays &rays, int channel, int plane, const Run &run) const {
-        return data + ((std::size_t(channel) * planes + plane) * rays.rows + run.row) * rays.columns +
-               run.column;
+    float *at(const Run &run, int plane, int channels) const {
+        return data + (run.before + std::size_t(plane - run.first)) * channels * Rays::LANES;
     }
 };
 

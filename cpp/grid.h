@@ -34,6 +34,18 @@ using In = Grid<const float>;
 using Out = Grid<float>;
 using Mask = Grid<const unsigned char>; // 0 or 1, as NumPy's booleans
 
+// A range of a row: first and end. Empty where first is not before end.
+using Span = std::array<int, 2>;
+
+// The shortest range that holds both.
+SMOKELIFT_INLINE Span joined(const Span &a, const Span &b) {
+    if (a[0] >= a[1])
+        return b;
+    if (b[0] >= b[1])
+        return a;
+    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
+}
+
 // The elements with the first index i.
 template <class T> Grid<T> slab(const Grid<T> &a, int i) { return {a.row(i, 0), {1, a.n[1], a.n[2]}}; }
 

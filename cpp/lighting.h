@@ -49,10 +49,10 @@ void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const P
            Workers &workers);
 
 // Adds what J's derivative (the J channels of `gradient`) says of the extinction along the light's way to the
-// extinction channel of `gradient`. `scratch` is one float a voxel. A light that is `alone` has made all of
-// J, which spares its sweep.
+// extinction channel of `gradient`. `scratch` is one float a voxel. Parallel light that has made all of J
+// needs none, and no sweep for it, but overwrites J's derivative.
 void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &scratch, const Spans &spans,
-                   const Phase &phase, const ParallelLight &light, bool alone, Workers &workers);
+                   const Phase &phase, const ParallelLight &light, Workers &workers);
 void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Spans &spans, const Phase &phase,
                    const PointLight &light, Workers &workers);
 

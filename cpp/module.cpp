@@ -8,4 +8,5 @@ PYBIND11_MODULE(_core, module) {
     smokelift::register_velocity(module);
     smokelift::register_render(module);
     smokelift::register_pictures(module);
+    smokelift::register_density(module);
 }

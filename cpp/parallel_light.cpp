@@ -267,19 +267,18 @@ void depth_gradient(const Columns &columns, const Voxels &medium, const Voxels &
           });
 }
 
-// The same where one light has made all of J: -J dJ.
+// The same where one light has made all of J: -J dJ, in place of dJ.
 SMOKELIFT_CLONES
-void depth_gradient_of_all(const Voxels &medium, const Voxels &gradient, const Voxels &scratch,
-                           const Spans &spans, int x) {
+void depth_gradient_of_all(const Voxels &medium, const Voxels &gradient, const Spans &spans, int x) {
     for (int y = 0; y < medium.n[1]; ++y) {
         const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
-        const float *inscatter = medium.at(x, y, 0), *inscatter_gradient = gradient.at(x, y, 0);
-        float *out = scratch.at(x, y, 0);
+        const float *inscatter = medium.at(x, y, 0);
+        float *inscatter_gradient = gradient.at(x, y, 0);
         for (int z = span[0]; z < span[1]; ++z) {
             float sum = 0;
             for (int channel = 1; channel < medium.width; ++channel)
                 sum -= inscatter[z * medium.width + channel] * inscatter_gradient[z * medium.width + channel];
-            out[z] = sum;
+            inscatter_gradient[z * medium.width + 1] = sum;
         }
     }
 }
@@ -305,9 +304,9 @@ void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const P
 }
 
 void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &scratch, const Spans &spans,
-                   const Phase &phase, const ParallelLight &light, bool alone, Workers &workers) {
-    if (alone) {
-        workers.run(medium.n[0], [&](int x) { depth_gradient_of_all(medium, gradient, scratch, spans, x); });
+                   const Phase &phase, const ParallelLight &light, Workers &workers) {
+    if (!scratch.data) {
+        workers.run(medium.n[0], [&](int x) { depth_gradient_of_all(medium, gradient, spans, x); });
     } else {
         const Columns columns(light, spans);
         workers.run(columns.tasks(),
@@ -316,7 +315,8 @@ void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &s
     ParallelLight reversed = light;
     reversed.travel = -light.travel;
     const Columns back(reversed, spans);
-    workers.run(back.tasks(), [&](int task) { add_columns(back, scratch, gradient, task); });
+    const Voxels field = scratch.data ? scratch : Voxels{gradient.data + 1, gradient.n, gradient.width};
+    workers.run(back.tasks(), [&](int task) { add_columns(back, field, gradient, task); });
 }
 
 } // namespace smokelift

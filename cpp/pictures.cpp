@@ -11,9 +11,9 @@ namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
-constexpr std::size_t SCALED_PER_TASK = 1 << 13; // their steps stay in the cache
-constexpr int RUN = 32;                          // voxels along z that are projected together
-constexpr double MIN_DEPTH = 1e-12;              // m; a voxel in the plane of the eye is in no picture
+constexpr int SCALED = 256;         // voxels along z that are scaled together
+constexpr int RUN = 32;             // voxels along z that are projected together
+constexpr double MIN_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
 
 // Homogeneous pixel coordinates along a row of voxels.
 struct PixelRow {
@@ -61,6 +61,16 @@ void places_of_plane(const PictureMap &map, Mask voxels, int i, std::size_t at, 
             places.columns[at] = found.column;
             places.visible[at++] = found.visible;
         }
+    }
+}
+
+SMOKELIFT_CLONES
+void places_of_stretch(const PictureMap &map, const PixelRow &line, int z, int count, const Places &places) {
+    for (int k = 0; k < count; ++k) {
+        const Place found = place_of(map, line, z + k);
+        places.rows[k] = found.row;
+        places.columns[k] = found.column;
+        places.visible[k] = found.visible;
     }
 }
 
@@ -163,17 +173,16 @@ SMOKELIFT_INLINE float exponential(float x) {
 
 SMOKELIFT_CLONES
 void scale_evenly(const float *__restrict steps, const bool *__restrict visible, float share,
-                  const float *__restrict values, float *__restrict scaled, std::size_t count) {
-    for (std::size_t n = 0; n < count; ++n)
+                  const float *values, float *scaled, int count) {
+    for (int n = 0; n < count; ++n)
         scaled[n] = values[n] * exponential(visible[n] ? share * steps[n] : 0.0f);
 }
 
 SMOKELIFT_CLONES
 void scale_unevenly(const float *__restrict steps, const bool *__restrict visible, const RayScale &scale,
-                    const float *__restrict plausible, const float *__restrict values,
-                    float *__restrict scaled, std::size_t count) {
+                    const float *__restrict plausible, const float *values, float *scaled, int count) {
     const float share = scale.share, faint = scale.faint, most = scale.most;
-    for (std::size_t n = 0; n < count; ++n) {
+    for (int n = 0; n < count; ++n) {
         const float step = visible[n] ? steps[n] : 0.0f;
         const float wanted = plausible[n] + faint, reached = values[n] * exponential(step) + faint;
         const float gain = step < 0 ? reached / wanted : wanted / reached;
@@ -238,28 +247,26 @@ double nearest_depth(const PictureMap &map, Workers &workers) {
     return *std::min_element(nearest.begin(), nearest.end());
 }
 
-void scale_along_rays(const RayScale &scale, const SeenAt &places, const float *values, std::size_t count,
-                      float *scaled, Workers &workers) {
-    workers.run(int((count + SCALED_PER_TASK - 1) / SCALED_PER_TASK), [&](int task) {
-        const std::size_t begin = task * SCALED_PER_TASK, most = std::min(count - begin, SCALED_PER_TASK);
-        float steps[SCALED_PER_TASK];
-        read_range(scale.logarithm, scale.rows, scale.columns, places.rows + begin, places.columns + begin, 0,
-                   most, steps);
-        const bool *visible = places.visible + begin;
-        if (scale.plausible)
-            scale_unevenly(steps, visible, scale, scale.plausible + begin, values + begin, scaled + begin,
-                           most);
-        else
-            scale_evenly(steps, visible, scale.share, values + begin, scaled + begin, most);
-    });
-}
-
-void write_at(const std::int64_t *where, const float *values, std::size_t count, float factor, float *volume,
-              Workers &workers) {
-    workers.run(int((count + READS_PER_TASK - 1) / READS_PER_TASK), [&](int task) {
-        const std::size_t begin = task * READS_PER_TASK, end = std::min(count, begin + READS_PER_TASK);
-        for (std::size_t n = begin; n < end; ++n)
-            volume[where[n]] = factor * values[n];
+void scale_along_rays(const RayScale &scale, const PictureMap &map, const MarkedVoxels &voxels,
+                      const float *values, float *scaled, Workers &workers) {
+    workers.run(voxels.shape()[0], [&](int x) {
+        float rows[SCALED], columns[SCALED], steps[SCALED];
+        bool visible[SCALED];
+        voxels.in_plane(x, [&](int y, int z, int length, std::size_t first) {
+            const PixelRow line(map, x, y);
+            for (int begin = 0; begin < length; begin += SCALED) {
+                const int count = std::min(length - begin, SCALED);
+                const std::size_t at = first + std::size_t(begin);
+                places_of_stretch(map, line, z + begin, count, {rows, columns, visible});
+                read_range(scale.logarithm, map.rows, map.columns, rows, columns, 0, std::size_t(count),
+                           steps);
+                if (scale.plausible)
+                    scale_unevenly(steps, visible, scale, scale.plausible + at, values + at, scaled + at,
+                                   count);
+                else
+                    scale_evenly(steps, visible, scale.share, values + at, scaled + at, count);
+            }
+        });
     });
 }
 

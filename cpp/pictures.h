@@ -2,6 +2,7 @@
 #pragma once
 
 #include "grid.h"
+#include "marked_voxels.h"
 #include "threads.h"
 
 #include <array>
@@ -54,7 +55,6 @@ double nearest_depth(const PictureMap &map, Workers &workers);
 // How the smoke of voxels is scaled along the rays of a picture.
 struct RayScale {
     const double *logarithm; // (rows, columns): of each pixel's factor
-    int rows, columns;
     // Smoke towards which a step leads: one that would scale a value to v is multiplied by plausible / v
     // where it adds smoke and by v / plausible where it takes some, by `most` at most. Without it steps are
     // even.
@@ -64,13 +64,10 @@ struct RayScale {
     float share; // of the step that is made
 };
 
-// Scales values (count) at some places in the picture; those outside stay as they are.
-void scale_along_rays(const RayScale &scale, const SeenAt &places, const float *values, std::size_t count,
-                      float *scaled, Workers &workers);
-
-// Writes values (count), times a factor, to indices of a volume that are all different.
-void write_at(const std::int64_t *where, const float *values, std::size_t count, float factor, float *volume,
-              Workers &workers);
+// Scales values of some voxels; those that the picture does not show stay as they are. Both arrays may be the
+// same.
+void scale_along_rays(const RayScale &scale, const PictureMap &map, const MarkedVoxels &voxels,
+                      const float *values, float *scaled, Workers &workers);
 
 // A picture (rows, columns) read bilinearly at some places; the nearest pixel's value outside.
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,

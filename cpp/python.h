@@ -115,5 +115,6 @@ void register_transport(py::module_ &module);
 void register_velocity(py::module_ &module);
 void register_render(py::module_ &module);
 void register_pictures(py::module_ &module);
+void register_density(py::module_ &module);
 
 } // namespace smokelift

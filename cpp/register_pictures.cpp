@@ -16,7 +16,6 @@ namespace {
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Codes = py::array_t<unsigned char, 0>;
 using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
-using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Marks = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> values_of(const Doubles &a) {
@@ -145,44 +144,6 @@ void register_places(py::module_ &module) {
         .def_property_readonly("nearest", [](const PictureMap &map) {
             return released([&](Workers &workers) { return nearest_depth(map, workers); });
         });
-
-    module.def(
-        "scale_along_rays",
-        [](const Array &values, const std::optional<Array> &plausible, const Doubles &logarithm,
-           const Array &rows, const Array &columns, const Marks &visible, float faint, float most,
-           float share) {
-            const auto count = values.size();
-            require_fit(logarithm.ndim() == 2 && logarithm.size() > 0 && rows.size() == count &&
-                        columns.size() == count && visible.size() == count &&
-                        (!plausible || plausible->size() == count));
-            const RayScale scale{logarithm.data(),
-                                 int(logarithm.shape(0)),
-                                 int(logarithm.shape(1)),
-                                 plausible ? plausible->data() : nullptr,
-                                 faint,
-                                 most,
-                                 share};
-            const SeenAt seen_at{rows.data(), columns.data(), visible.data()};
-            return made({count}, [&](float *scaled, Workers &workers) {
-                scale_along_rays(scale, seen_at, values.data(), std::size_t(count), scaled, workers);
-            });
-        },
-        "values"_a, "plausible"_a, "logarithm"_a, "rows"_a, "columns"_a, "visible"_a, "faint"_a, "most"_a,
-        "share"_a);
-
-    module.def(
-        "write_at",
-        [](py::array_t<float, py::array::c_style> &volume, const Indices &where, const Array &values,
-           float factor) {
-            require_fit(where.size() == values.size());
-            const std::int64_t *const at = where.data();
-            require_fit(where.size() == 0 || (at[0] >= 0 && at[where.size() - 1] < volume.size()));
-            float *const result = volume.mutable_data();
-            released([&](Workers &workers) {
-                write_at(at, values.data(), std::size_t(values.size()), factor, result, workers);
-            });
-        },
-        py::arg("volume").noconvert(), "where"_a, "values"_a, "factor"_a);
 
     module.def(
         "read_bilinearly",

@@ -59,9 +59,8 @@ struct OwnedRays {
     Record record(std::optional<Floats> &a, int width) const {
         if (!a)
             return {};
-        require_fit(a->ndim() == 4 && a->shape(0) == width && a->shape(2) == rays.rows &&
-                    a->shape(3) == rays.columns);
-        return {a->mutable_data(), static_cast<int>(a->shape(1))};
+        require_fit(std::size_t(a->size()) == rays.planes_of_runs() * width * Rays::LANES);
+        return {a->mutable_data()};
     }
 };
 
@@ -201,20 +200,20 @@ void register_lights(py::module_ &module) {
 
     module.def(
         "shade_adjoint",
-        [](Floats medium, Floats gradient, Floats scratch, const Support &support, const Phase &phase,
-           const std::vector<Light> &lights) {
+        [](Floats medium, Floats gradient, std::optional<Floats> scratch, const Support &support,
+           const Phase &phase, const std::vector<Light> &lights) {
             const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
-            const Voxels space = voxels_of(scratch, support);
-            require_fit(space.width == 1 && gradients.width == voxels.width);
+            const Voxels space = scratch ? voxels_of(*scratch, support) : Voxels{};
+            require_fit(gradients.width == voxels.width && (scratch || lights.size() == 1) &&
+                        space.width == 1);
             released([&](Workers &workers) {
                 fold_border(gradients);
-                const bool alone = lights.size() == 1;
                 for (const Light &light : lights) {
                     if (const auto *point = std::get_if<PointLight>(&light))
                         shade_adjoint(voxels, gradients, support.spans, phase, *point, workers);
                     else
                         shade_adjoint(voxels, gradients, space, support.spans, phase,
-                                      std::get<ParallelLight>(light), alone, workers);
+                                      std::get<ParallelLight>(light), workers);
                 }
             });
         },
@@ -234,12 +233,16 @@ void register_camera(py::module_ &module) {
                 released([&](Workers &workers) { clip(voxels, self.rays, workers); });
             },
             "support"_a, "medium"_a.noconvert())
-        .def_property_readonly("samples", [](const OwnedRays &self) {
-            std::size_t count = 0;
-            for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
-                count += std::max(0, self.rays.planes[4 * ray + 3] - self.rays.planes[4 * ray + 2] + 1);
-            return count;
-        });
+        .def_property_readonly("samples",
+                               [](const OwnedRays &self) {
+                                   std::size_t count = 0;
+                                   for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
+                                       count += std::max(0, self.rays.planes[4 * ray + 3] -
+                                                                self.rays.planes[4 * ray + 2] + 1);
+                                   return count;
+                               })
+        .def_property_readonly(
+            "recorded", [](const OwnedRays &self) { return self.rays.planes_of_runs() * Rays::LANES; });
 
     using Places = std::vector<double>;
     module.def(

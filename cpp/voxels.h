@@ -36,18 +36,6 @@ struct Voxels {
     }
 };
 
-// A range of a row: first and end. Empty where first is not before end.
-using Span = std::array<int, 2>;
-
-// The shortest range that holds both.
-SMOKELIFT_INLINE Span joined(const Span &a, const Span &b) {
-    if (a[0] >= a[1])
-        return b;
-    if (b[0] >= b[1])
-        return a;
-    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
-}
-
 // Ranges of rows of voxels: along z by (x, y), and along y by (x, z).
 struct Spans {
     std::vector<Span> along_z, along_y;

@@ -324,6 +324,10 @@ class Rays:
     def samples(self) -> int:
         """Samples of all rays together."""
 
+    @property
+    def recorded(self) -> int:
+        """Samples that a record holds of each channel: neighbouring rays have as many."""
+
 def pixel_rays(
     start: npt.ArrayLike,
     direction: npt.ArrayLike,
@@ -351,11 +355,12 @@ def shade(medium: Volume, support: Support, phase: Phase, lights: Lights) -> Non
     """Write the radiance that the lights scatter in every voxel towards the camera."""
 
 def shade_adjoint(
-    medium: Volume, gradient: Volume, scratch: Volume, support: Support, phase: Phase, lights: Lights
+    medium: Volume, gradient: Volume, scratch: Volume | None, support: Support, phase: Phase, lights: Lights
 ) -> None:
     """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
 
-    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1).
+    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
+    in-scattered radiance is used up.
     """
 
 def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth: Array, record: Volume | None) -> None:
@@ -367,7 +372,7 @@ def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth:
         Radiance, written.
     depth : (rows, columns)
         Optical depth, written.
-    record : (1 + channels, planes, rows, columns)
+    record : (1 + channels, `Rays.recorded`)
         What the samples held, written for `march_adjoint`; may be None.
     """
 
@@ -462,26 +467,65 @@ def depth_profile(
     columns (n,) where the pictures ``middle`` and ``width`` are read.
     """
 
-def scale_along_rays(
-    values: Array,
-    plausible: Array | None,
-    logarithm: npt.NDArray[np.floating[Any]],
-    rows: Array,
-    columns: Array,
-    visible: Mask,
-    faint: float,
-    most: float,
-    share: float,
-) -> Array:
-    """Values (n,) of voxels at places of a picture (rows, columns), times exponentials of what it holds there.
+class MarkedVoxels:
+    """The marked voxels of a grid; values (count,) are at them in their order in memory."""
 
-    Of every step a share is made. A step that leads to a value v is multiplied by p / v where it adds something and by
-    v / p where it takes something, at most by ``most``, for p the plausible value, ``faint`` added to both; without
-    plausible values by 1. Those that are not visible stay.
+    def __init__(self, voxels: Mask) -> None: ...
+    @property
+    def count(self) -> int:
+        """How many there are."""
+
+    def above_zero(self, a: Array, b: Array) -> MarkedVoxels:
+        """Those of them at which either volume (nx, ny, nz) is above 0."""
+
+    def take(self, volume: Array, out: Array | None = None) -> Array:
+        """Values of a volume, written to ``out`` if that is given."""
+
+    def put(self, values: npt.NDArray[np.floating[Any]], volume: Array, factor: float = 1.0) -> None:
+        """Write values, times a factor, into a volume."""
+
+    def share_in_cubes(self, values: Array, size: int, weight: float, out: Array) -> None:
+        """Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
+
+        Half of it is over each of two lattices, half a cube apart. The result may replace the values.
+        """
+
+    def scale_along_rays(
+        self,
+        picture: PictureMap,
+        values: Array,
+        plausible: Array | None,
+        logarithm: npt.NDArray[np.floating[Any]],
+        faint: float,
+        most: float,
+        share: float,
+        out: Array,
+    ) -> None:
+        """Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
+
+        Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
+        would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
+        some, both plus ``faint``, by ``most`` at most. The result may replace the values.
+        """
+
+def hold(values: Array, gradient: Array, density: Array, bound: float, out: Array) -> None:
+    """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
+
+def descend(
+    density: Array,
+    direction: Array,
+    scale: Array,
+    floor: Array,
+    length: float,
+    max_change: float,
+    bound: float,
+    arrived: Array,
+    moved: Array,
+) -> None:
+    """Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
+
+    A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.
     """
-
-def write_at(volume: Array, where: npt.NDArray[np.int64], values: Array, factor: float) -> None:
-    """Write values (n,), times a factor, to ascending indices of a volume's elements."""
 
 def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""

@@ -178,7 +178,8 @@ def _density(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
         for view, places, profile in zip(views.views, seen_at, profiles, strict=True)
     ]
     spread = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
-    density.ravel()[views.where] = spread / np.float32(views.optics.medium.extinction)
+    spread /= np.float32(views.optics.medium.extinction)
+    views.where.put(spread, density)
     return density
 
 

@@ -10,15 +10,14 @@ share of itself. The step is shortened until the objective falls sufficiently (A
 
 from __future__ import annotations
 
-import functools
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.blas import saxpy
 
+import smokelift._core as _core
 from smokelift.checks.array_types import Array
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
@@ -40,7 +39,7 @@ The voxel may fill, but more slowly than others (docs/experiments/density-descen
 SUFFICIENT = 1e-4
 """Share of the linear prediction that a step has to gain (Armijo's constant)."""
 
-MAX_CHANGE = np.float32(0.25)
+MAX_CHANGE = 0.25
 """Largest change of a voxel in one step, as a share of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
@@ -57,7 +56,7 @@ SHORTENINGS = 40
 def descend(
     terms: Sequence[Term],
     density: Volume,
-    hull: NDArray[np.bool_],
+    hull: _core.MarkedVoxels,
     iterations: int,
     tolerance: float,
     patience: int,
@@ -68,87 +67,106 @@ def descend(
 ) -> Fit:
     """Minimise the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
 
+    The result takes the start's place, which is zero outside the hull.
     It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
     share of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to it.
     ``recorded`` is what is left of each term's picture at the start, L - I, if the renderers hold the records of these
     pictures. ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects
     none.
     """
-    where = np.flatnonzero(hull)
-    if expected is not None:
-        where = where[(density.ravel()[where] > 0) | (expected.ravel()[where] > 0)]
-    began = density.ravel()[where]
-    current = np.minimum(began, np.float32(bound))
+    where = hull if expected is None else hull.above_zero(density, expected)
+    current = where.take(density)
+    beyond = bool(current.max(initial=0) > bound)
+    if beyond:
+        np.minimum(current, np.float32(bound), out=current)
     floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)
     if expected is not None:
-        np.minimum(floor, expected.ravel()[where], out=floor)
-    shape = hull.shape
-    problem = _Problem(terms, where, np.zeros(shape, np.float32), np.zeros(shape, np.float32), current + floor)
-    if recorded and np.array_equal(current, began):
+        np.minimum(floor, where.take(expected), out=floor)
+    problem = _Problem(terms, where, density, np.zeros(density.shape, np.float32), floor)
+    problem.scale += current
+    if recorded and not beyond:
         problem.show(current)
         residuals = recorded
     else:
         residuals = problem.residuals(current)
     loss, enough = objective(terms, residuals), noise_floor(terms)
-    curvature = _Curvature(_Neighbours(where, shape))
+    room = _Room(current.size)
+    curvature = _Curvature(where, room)
+    direction = room.take()
     gradient: Array | None = None
     step: _Step | None = None
     done = idle = 0
     while done < iterations and loss > enough and idle < patience:
-        before, gradient = gradient, problem.gradient(residuals)
+        before, gradient = gradient, problem.gradient(residuals, room.take())
         if before is not None and step is not None:
             curvature.learn(step.moved, np.subtract(gradient, before, out=before))
-        held = ((current <= 0) & (gradient > 0)) | ((current >= bound) & (gradient < 0))
-        direction = curvature.newton(np.where(held, np.float32(0), gradient))
-        direction[held] = 0
+        _core.hold(gradient, gradient, current, bound, direction)
+        curvature.newton(direction)
+        _core.hold(direction, gradient, current, bound, direction)
         slope = _dot(gradient, direction)
         if not slope > 0:
             break
         length = 1.0 if curvature.known else min(0.1 * loss / slope, MAX_FIRST_STEP)
-        reach = MAX_CHANGE * (current + floor)
-        lowest, highest = np.maximum(current - reach, 0), np.minimum(current + reach, np.float32(bound))
-        step = _step(problem, current, loss, gradient, direction, length, (lowest, highest))
+        step = _step(problem, current, loss, gradient, direction, length, bound, room)
         if step is None:
             problem.show(current)
             break
         idle = idle + 1 if loss - step.loss < tolerance * step.loss else 0
+        room.give(current)
         current, residuals, loss = step.density, step.residuals, step.loss
         done += 1
     return Fit(problem.volume, loss, residuals, done)
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """The objective of the hull's voxels, which are at `where` (n,) in the flat volume.
+class _Room:
+    """Arrays (n,) that were given back: new memory takes several times as long as the arithmetic."""
 
-    `volume` (nx, ny, nz) is the density that was shown last, `slopes` (nx, ny, nz) room for a gradient, and `scale`
-    (n,) the unit of each voxel.
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._spare: list[Array] = []
+
+    def take(self) -> Array:
+        """An array that holds anything."""
+        return self._spare.pop() if self._spare else np.empty(self._size, np.float32)
+
+    def give(self, *arrays: Array) -> None:
+        """Give back arrays that nobody reads any more."""
+        self._spare += arrays
+
+
+class _Problem:
+    """The objective of the voxels `where` of a density.
+
+    `volume` (nx, ny, nz) is the density that was shown last, and ``slopes`` (nx, ny, nz) room for a gradient. `floor`
+    (n,) is the unit of an empty voxel, `scale` (n,) that of each.
     """
 
-    terms: Sequence[Term]
-    where: NDArray[np.intp]
-    volume: Volume
-    slopes: Volume
-    scale: Array
+    def __init__(
+        self, terms: Sequence[Term], where: _core.MarkedVoxels, volume: Volume, slopes: Volume, floor: Array
+    ) -> None:
+        self.terms, self.volume, self.floor = terms, volume, floor
+        self.scale = floor.copy()
+        self._where, self._slopes = where, slopes
 
     def show(self, density: Array) -> None:
-        """Write a density of the hull's voxels (n,) into the volume."""
-        self.volume.ravel()[self.where] = density
+        """Write a density of the voxels (n,) into the volume."""
+        self._where.put(density, self.volume)
 
     def residuals(self, density: Array) -> tuple[Image, ...]:
-        """What is left of the pictures, L - I, for a density of the hull's voxels."""
+        """What is left of the pictures, L - I, for a density of the voxels."""
         self.show(density)
         return tuple(term.renderer.image(self.volume, keep_record=True) - term.view.image for term in self.terms)
 
-    def gradient(self, residuals: tuple[Image, ...]) -> Array:
+    def gradient(self, residuals: tuple[Image, ...], out: Array) -> Array:
         """Derivative of the objective (n,) in units of the scale, at the density that was rendered last."""
-        parts = (
-            term.renderer.gradient(term.image_gradient(residual), out=self.slopes).ravel().take(self.where)
-            for term, residual in zip(self.terms, residuals, strict=True)
-        )
-        found = functools.reduce(np.add, parts)
-        found *= self.scale
-        return found
+        for number, (term, residual) in enumerate(zip(self.terms, residuals, strict=True)):
+            found = term.renderer.gradient(term.image_gradient(residual), out=self._slopes)
+            if number == 0:
+                self._where.take(found, out)
+            else:
+                out += self._where.take(found)
+        out *= self.scale
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,17 +186,15 @@ def _step(
     gradient: Array,
     direction: Array,
     length: float,
-    bounds: tuple[Array, Array],
+    bound: float,
+    room: _Room,
 ) -> _Step | None:
     """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
+    density, moved = room.take(), room.take()
     for _ in range(SHORTENINGS):
-        # allocation takes as long as the arithmetic, so there is little of it
-        density = direction * np.float32(-length)
-        density *= problem.scale
-        density += current
-        np.clip(density, *bounds, out=density)
-        moved = density - current
-        moved /= problem.scale
+        _core.descend(
+            current, direction, problem.scale, problem.floor, length, MAX_CHANGE, bound, arrived=density, moved=moved
+        )
         residuals = problem.residuals(density)
         found = objective(problem.terms, residuals)
         # what the bounds leave of a long step need not lead down
@@ -193,12 +209,12 @@ class _Curvature:
 
     Of each of the last `MEMORY` steps it keeps s, the step itself, y, the change of the gradient along it, and their
     product ys = 1 / rho (Nocedal, "Updating quasi-Newton matrices with limited storage", 1980). Where nothing is known,
-    the inverse of the second derivatives is a multiple of what `neighbours` does.
+    the inverse of the second derivatives is a multiple of what neighbours share.
     """
 
-    def __init__(self, neighbours: _Neighbours) -> None:
-        self._neighbours = neighbours
-        self._steps: deque[tuple[Array, Array, float]] = deque(maxlen=MEMORY)
+    def __init__(self, where: _core.MarkedVoxels, room: _Room) -> None:
+        self._where, self._room = where, room
+        self._steps: deque[tuple[Array, Array, float]] = deque()
 
     @property
     def known(self) -> bool:
@@ -208,46 +224,37 @@ class _Curvature:
     def learn(self, s: Array, y: Array) -> None:
         """Remember a step s and the gradient's change y, unless the objective is not convex along the step."""
         ys = _dot(s, y)
-        if ys > 0:
-            self._steps.append((s, y, ys))
+        if not ys > 0:
+            self._room.give(s, y)
+            return
+        if len(self._steps) == MEMORY:
+            self._room.give(*self._steps.popleft()[:2])
+        self._steps.append((s, y, ys))
 
-    def newton(self, q: Array) -> Array:
-        """Newton's step for a gradient q, which is overwritten."""
+    def newton(self, q: Array) -> None:
+        """Newton's step for a gradient q, in its place."""
         alphas = []
         for s, y, ys in reversed(self._steps):
             alphas.append(_dot(s, q) / ys)
-            q = saxpy(y, q, a=-alphas[-1])
+            saxpy(y, q, a=-alphas[-1])
         if self._steps:
             _, y, ys = self._steps[-1]
-            q *= np.float32(ys / _dot(y, self._neighbours.shared(y)))
-        q = self._neighbours.shared(q)
+            shared = with_neighbours(self._where, y, self._room.take())
+            q *= np.float32(ys / _dot(y, shared))
+            self._room.give(shared)
+        with_neighbours(self._where, q, q)
         for (s, y, ys), alpha in zip(self._steps, reversed(alphas), strict=True):
             beta = _dot(y, q) / ys
-            q = saxpy(s, q, a=alpha - beta)
-        return q
+            saxpy(s, q, a=alpha - beta)
 
 
-class _Neighbours:
-    """Cubes of voxels that share a step, in two lattices half a cube apart, so that no cube shows.
+def with_neighbours(where: _core.MarkedVoxels, values: Array, out: Array) -> Array:
+    """The voxels' values (n,) and, `SHARED` times as much, their means over cubes.
 
-    ``where`` (n,) are the voxels in a flat volume of the shape.
+    The cubes are those of two lattices half a cube apart, so that no cube shows. The result may replace the values.
     """
-
-    def __init__(self, where: NDArray[np.intp], shape: tuple[int, ...]) -> None:
-        places = np.unravel_index(where, shape)
-        self._lattices = []
-        for offset in (0, BLOCK // 2):
-            cubes = [(count + offset) // BLOCK + 1 for count in shape]
-            cube = np.ravel_multi_index([(place + offset) // BLOCK for place in places], cubes)
-            self._lattices.append((cube, np.maximum(np.bincount(cube), 1)))
-
-    def shared(self, values: Array) -> Array:
-        """The voxels' values (n,) and, `SHARED` times as much, their means over the cubes."""
-        result = values / np.float32(1 + SHARED)
-        for cube, count in self._lattices:
-            mean = np.bincount(cube, values) * (SHARED / (1 + SHARED) / len(self._lattices)) / count
-            result += mean.astype(np.float32)[cube]
-        return result
+    where.share_in_cubes(values, BLOCK, SHARED, out)
+    return out
 
 
 def _dot(a: Array, b: Array) -> float:

@@ -130,9 +130,16 @@ class DetailedDepth:
         noise = StretchedNoise(moved, texture.width, strengths, self.seed)
         noisy = np.zeros(smooth.shape, np.float32)
         where = level.views.where
-        noisy.ravel()[where] = smooth.ravel()[where] * np.exp(noise.at(level))
+        values = noise.at(level)
+        np.exp(values, out=values)
+        values *= where.take(smooth)
+        where.put(values, noisy)
         amounts, now = (level.blurred(each, AMOUNTS * texture.width) for each in (smooth, noisy))
-        noisy.ravel()[where] *= np.minimum((amounts + TINY) / (now + TINY), np.float32(LARGEST_GAIN))
+        amounts += TINY
+        now += TINY
+        amounts /= now
+        values *= np.minimum(amounts, np.float32(LARGEST_GAIN), out=amounts)
+        where.put(values, noisy)
         return noisy
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.checks import listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
 from smokelift.density.descent import descend
@@ -133,36 +134,42 @@ class GradientFit:
         """Find a density; see `DensityFit`."""
         views, settings = depth.views, self.settings
         hull, where = views.hull, views.where
-        if not where.size:
+        if not where.count:
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
-        start = inside(hull, depth.density if initial is None else initial)
+        start, fresh = inside(hull, depth.density if initial is None else initial), initial is None
         # The terms take turns, so several cameras need as many times more iterations.
         iterations = settings.fit_iterations * len(cameras)
         plausible = smooth = None
         if depth.detail is not None:
-            plausible, smooth, fresh = depth.density, depth.detail.smooth, initial is None
+            plausible, smooth = depth.density, depth.detail.smooth
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(
             cameras, start, iterations, settings.tolerance, within=views, plausible=plausible, recorded=True
         )
-        expected, started = (float(values.ravel()[where].max()) for values in (depth.density, start))
+        expected, started = (float(where.take(values).max()) for values in (depth.density, start))
+        prior = depth.density if smooth is None else smooth
+        began = where.take(scaled.density)
+        del depth, initial, start, plausible  # the descent needs the memory
         final = descend(
             cameras,
             scaled.density,
-            hull,
+            where,
             settings.descent_iterations,
             settings.tolerance,
             settings.patience,
             bound=max(settings.bound * expected, started),
             recorded=scaled.recorded,
-            expected=depth.density if smooth is None else smooth,
+            expected=prior,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
         steady = None
         if smooth is not None:
-            steady = _without_single_voxels(scaled.density, final.density, hull) if final.iterations else scaled.density
+            steady = np.zeros(hull.shape, np.float32)
+            where.put(began, steady)
+            if final.iterations:
+                steady = _without_single_voxels(steady, final.density, hull)
         return FittedDensity(without_traces(final.density, where), hull, figures, smooth, steady)
 
 
@@ -256,23 +263,25 @@ def empty_density(views: ViewSet) -> FittedDensity:
     return FittedDensity(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 
 
-def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
-    """The density at some voxels (n,) of the flat array, without values below `MIN_DENSITY`."""
-    values = density.ravel()[within]
-    shown = values >= MIN_DENSITY
+def without_traces(density: Volume, within: _core.MarkedVoxels) -> Volume:
+    """The density at some voxels, without values below `MIN_DENSITY`."""
+    values = within.take(density)
+    values[values < MIN_DENSITY] = 0
     result = np.zeros(density.shape, np.float32)
-    result.ravel()[within[shown]] = values[shown]
+    within.put(values, result)
     return result
 
 
 def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_]) -> Volume:
-    """The density before a descent with the descent's changes, but for those of single voxels."""
+    """The density before a descent with the descent's changes, but for those of single voxels, in its place."""
     box = box_around(hull, 1)
-    blurred_before, blurred_after = (ndimage.gaussian_filter(each[box], SINGLE_VOXELS) for each in (before, after))
-    faint = FAINT_SHARE * float(blurred_before.max())
-    result = np.zeros(before.shape, np.float32)
-    result[box] = before[box] * ((blurred_after + faint) / (blurred_before + max(faint, MIN_DENSITY)))
-    return result
+    below, changed = (ndimage.gaussian_filter(each[box], SINGLE_VOXELS) for each in (before, after))
+    faint = FAINT_SHARE * float(below.max())
+    changed += faint
+    below += max(faint, MIN_DENSITY)
+    changed /= below
+    before[box] *= changed
+    return before
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Array
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import world_to_pixel
 
@@ -56,6 +57,22 @@ class Projection:
     def shown(self, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Visible voxels (nx, ny, nz) whose nearest pixel is marked (rows, columns)."""
         return self._map.shown(marked)
+
+    def scale_along_rays(
+        self,
+        voxels: _core.MarkedVoxels,
+        values: Array,
+        logarithm: NDArray[np.float32],
+        plausible: Array | None,
+        *,
+        faint: float,
+        most: float,
+        share: float,
+        out: Array,
+    ) -> Array:
+        """Values (n,) scaled along the rays of the picture; see `smokelift._core.MarkedVoxels.scale_along_rays`."""
+        voxels.scale_along_rays(self._map, values, plausible, logarithm, faint, most, share, out)
+        return out
 
     def read(self, picture: NDArray[np.floating[Any]], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """The picture (rows, columns) read at the marked voxels (n,); see `Places.read`."""

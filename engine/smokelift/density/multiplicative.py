@@ -74,6 +74,7 @@ def fit_multiplicative(
     """
     smoke, enough = _Smoke(terms, density, within, plausible), noise_floor(terms)
     current = best = smoke.values()
+    spare = np.empty_like(current)  # the best is kept, the others are overwritten: new memory takes as long
     least, done, last = np.inf, 0, False
     left: tuple[Image, ...] = ()
     for done in range(iterations + 1):
@@ -84,12 +85,14 @@ def fit_multiplicative(
         loss = objective(terms, residuals)
         gained = least - loss
         if loss < least:
+            if best is not current:
+                spare = best
             best, least, left = current, loss, residuals
         if last or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
         for turn, term in enumerate(terms):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
-            current = _scaled(smoke, current, turn, term, image)
+            current = _scaled(smoke, current, turn, term, image, spare if current is best else current)
     kept = left if recorded and last and best is current else ()
     return Fit(smoke.volume_of(best), least, left, done, kept)
 
@@ -104,7 +107,7 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int, *, within: V
     values = smoke.values()
     for _ in range(rounds):
         for turn, term in enumerate(terms):
-            values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)))
+            values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)), values)
     return smoke.volume_of(values)
 
 
@@ -117,15 +120,11 @@ class _Smoke:
     def __init__(
         self, terms: Sequence[Term], density: Volume, within: ViewSet | None, plausible: Volume | None = None
     ) -> None:
-        if within is None:
-            self._where = np.flatnonzero(density)
-            places = tuple(term.view.projection.places(density > 0) for term in terms)
-        else:
-            self._where, places = within.where, within.places
-        self._places = places
-        self._values: Array = density.ravel().take(self._where)
+        self._where = _core.MarkedVoxels(density > 0) if within is None else within.where
+        self._projections = [term.view.projection for term in terms]
+        self._values = self._where.take(density)
         self._volume = np.zeros(density.shape, np.float32)
-        self._plausible = None if plausible is None else plausible.ravel().take(self._where)
+        self._plausible = None if plausible is None else self._where.take(plausible)
         self._faint = (
             0.0 if self._plausible is None else MIN_DENSITY_SHARE * float(self._plausible.max(initial=MIN_SCALE))
         )
@@ -136,21 +135,28 @@ class _Smoke:
 
     def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
         """The volume (nx, ny, nz) with these values, times a factor; valid until the next call."""
-        _core.write_at(self._volume, self._where, values, factor)
+        self._where.put(values, self._volume, factor)
         return self._volume
 
-    def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32]) -> Array:
+    def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32], out: Array) -> Array:
         """Values scaled along a term's rays by a share (`RELAXATION`) of the logarithmic steps (rows, columns)."""
-        places, uneven = self._places[turn], (self._faint, MAX_UNEVENNESS)
-        at = (places.rows, places.columns, places.visible)
-        return _core.scale_along_rays(values, self._plausible, logarithm, *at, *uneven, RELAXATION)
+        return self._projections[turn].scale_along_rays(
+            self._where,
+            values,
+            logarithm,
+            self._plausible,
+            faint=self._faint,
+            most=MAX_UNEVENNESS,
+            share=RELAXATION,
+            out=out,
+        )
 
 
-def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image) -> Array:
+def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image, out: Array) -> Array:
     """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
-    return smoke.scaled(values, turn, _log_scale(image, transmittance, slope, term))
+    return smoke.scaled(values, turn, _log_scale(image, transmittance, slope, term), out)
 
 
 def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> Image:

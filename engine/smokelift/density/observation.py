@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
-from smokelift.density.hull import Places, Projection, common_hull, project_voxels, reached
+from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.extraction import Element
 from smokelift.footage.images import area_average, channel_mean
 from smokelift.footage.matte import certainty, matte
@@ -227,14 +228,9 @@ class ViewSet:
     frame: int = 0
 
     @cached_property
-    def where(self) -> NDArray[np.intp]:
-        """The hull's voxels (n,) in the flat grid: reading an array at them leaves the memory between untouched."""
-        return np.flatnonzero(self.hull)
-
-    @cached_property
-    def places(self) -> tuple[Places, ...]:
-        """Where the hull's voxels lie in each view's picture, in the same order."""
-        return tuple(view.projection.places(self.hull) for view in self.views)
+    def where(self) -> _core.MarkedVoxels:
+        """The hull's voxels: reading a volume at them leaves the memory between untouched."""
+        return _core.MarkedVoxels(self.hull)
 
     @cached_property
     def renderers(self) -> tuple[Renderer, ...]:

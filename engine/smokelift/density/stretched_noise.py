@@ -104,7 +104,8 @@ class StretchedNoise:
     def _sum(self, level: MomentLevel, lattices: Iterator[_Lattice]) -> _Octaves:
         """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
-        places = size * _core.marked(hull).astype(np.float32)
+        places = _core.marked(hull).astype(np.float32)
+        places *= size
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
         if level.coarser is not None:
@@ -112,15 +113,21 @@ class StretchedNoise:
             octaves = coarse.number
             noise, *motions = (_finer(values, level.coarser, level) for values in (coarse.noise, *coarse.motion))
             motion = np.stack(motions)
+        moved = np.empty_like(places)
         while octaves < len(self.strengths):
             spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
             if octaves and spacing < MIN_NODE_DISTANCE * size:
                 break
-            noise += np.float32(self.strengths[octaves]) * _octave(places + motion, spacing, next(lattices))
+            octave = _octave(np.add(places, motion, out=moved), spacing, next(lattices))
+            octave *= np.float32(self.strengths[octaves])
+            noise += octave
             octaves += 1
             if octaves < len(self.strengths):
                 reach = np.float32(STRETCH * spacing)
-                motion += reach * np.stack([_octave(places + motion, spacing, next(lattices)) for _ in range(3)])
+                drawn = [_octave(np.add(places, motion, out=moved), spacing, next(lattices)) for _ in motion]
+                for along, octave in zip(motion, drawn, strict=True):
+                    octave *= reach
+                    along += octave
         return _Octaves(noise, motion, octaves)
 
 
@@ -135,7 +142,7 @@ class _Octaves(NamedTuple):
 def _finer(values: NDArray[np.float32], coarser: MomentLevel, level: MomentLevel) -> NDArray[np.float32]:
     """Values at the voxels of one grid that may hold smoke, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
-    field.ravel()[coarser.views.where] = values
+    coarser.views.where.put(values, field)
     return coarser.finer(field, level)
 
 
@@ -160,5 +167,7 @@ def _lattices(seed: int, count: int) -> tuple[_Lattice, ...]:
 
 
 def _octave(places: NDArray[np.float32], spacing: float, lattice: _Lattice) -> NDArray[np.float32]:
-    """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart."""
-    return _core.read_lattice(lattice.values, places / np.float32(spacing) + lattice.corner)
+    """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart; uses the places up."""
+    places /= np.float32(spacing)
+    places += lattice.corner
+    return _core.read_lattice(lattice.values, places)

@@ -124,13 +124,13 @@ class GuidedSimulation:
         wanted, have = (detail.amounts(values) for values in (detail.smooth, carried.density))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         if carried.smooth is not None:
-            came, smooth = (values.ravel()[where] for values in (carried.smooth, detail.smooth))
+            came, smooth = (where.take(values) for values in (carried.smooth, detail.smooth))
             faint = (MIN_NEW_DENSITY * smooth.mean()) ** 2 + TINY
             reached *= np.minimum(1, (np.float32(LARGEST_GAIN) * came * smooth + faint) / (smooth**2 + faint))
-        taken_over = carried.density.ravel()[where] * reached / np.maximum(have, TINY)
-        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density.ravel()[where]
+        taken_over = where.take(carried.density) * reached / np.maximum(have, TINY)
+        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * where.take(depth.density)
         total = float(started.sum(dtype=np.float64))
         share = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
         density = np.zeros(views.hull.shape, np.float32)
-        density.ravel()[where] = started
+        where.put(started, density)
         return Start(density, {"share": share})

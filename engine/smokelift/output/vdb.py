@@ -15,7 +15,7 @@ import importlib
 import importlib.util
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -31,9 +31,13 @@ from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.transport import StaggeredGrid, at_centres, faces_in
+from smokelift.transport.grid import finite
 
 VELOCITY_MARGIN = 2
 """Voxels around the smoke in which velocity is kept: motion blur reads it beyond the edge."""
+
+SLAB = 64
+"""Voxels along x whose velocity is written at once, as many as eight leaves of OpenVDB's tree hold."""
 
 SETTINGS = "smokelift_settings"
 """Name of the grid metadata that holds the settings as JSON."""
@@ -134,14 +138,18 @@ def write_vdb(
     vdb = vdb_module()
     rho = checked_volume(density, domain.shape, "density")
     box = _around(rho > 0.0, VELOCITY_MARGIN)
-    near = None if velocity is None else _part(velocity, box, domain)
+    if velocity is not None and not isinstance(velocity, StaggeredGrid):
+        velocity = np.ascontiguousarray(velocity, np.float32)
+    if velocity is not None:
+        _check_velocity(velocity, domain)
     lattice = lattice or domain
     first = domain.first_in(lattice)
     rho_box, corner = rho[box], _index(box, first)
     grids = {"density": _fog(vdb, rho_box, corner)}
-    if near is not None:
+    if velocity is not None:
         grids[velocity_name] = vdb.Vec3SGrid()
-        grids[velocity_name].copyFromArray(_near(rho_box, near), ijk=corner)
+        for slab, near in _near(rho_box, velocity, box):
+            grids[velocity_name].copyFromArray(near, ijk=_index(slab, first))
     if flame is not None:
         emission = checked_volume(flame, domain.shape, FLAME)
         box = _around(emission > 0.0, 0)
@@ -178,7 +186,7 @@ def checked_volume(values: npt.ArrayLike, shape: tuple[int, int, int], name: str
     volume = np.ascontiguousarray(values, np.float32)
     if volume.shape != shape:
         raise ValueError(f"{name} {volume.shape} does not fit the domain's {shape} voxels")
-    if not np.isfinite(volume).all() or volume.min() < 0.0:
+    if not finite(volume) or volume.min() < 0.0:
         raise ValueError(f"{name} must be finite and not negative")
     return volume
 
@@ -191,29 +199,39 @@ def _fog(vdb: ModuleType, values: Array, corner: tuple[int, ...]) -> Any:
     return grid
 
 
-def _part(velocity: npt.ArrayLike | StaggeredGrid, box: tuple[slice, ...], domain: Domain) -> Array:
-    """The velocity at the voxel centres of a box, shape (x, y, z, 3); at those of the domain it may not fit memory."""
+def _check_velocity(velocity: Array | StaggeredGrid, domain: Domain) -> None:
+    """Refuse a velocity that does not fit the domain, or is not finite."""
+    parts: Sequence[Array]
+    shape: tuple[int, ...]
     if isinstance(velocity, StaggeredGrid):
-        shape: tuple[int, ...] = (*velocity.shape, 3)
-        finite = all(np.isfinite(component).all() for component in velocity.faces)
-        part = np.stack(at_centres(faces_in(velocity.faces, box)), axis=-1)
+        parts, shape = velocity.faces, (*velocity.shape, 3)
     else:
-        centres = np.ascontiguousarray(velocity, np.float32)
-        shape, finite, part = centres.shape, bool(np.isfinite(centres).all()), centres[box].copy()
+        parts, shape = [velocity], velocity.shape
     if shape != (*domain.shape, 3):
         raise ValueError(f"velocity {shape} does not fit the domain's {domain.shape} voxels; resample it")
-    if not finite:
+    if not all(map(finite, parts)):
         raise ValueError("velocity must be finite; set other values to 0")
-    return part
 
 
-def _near(rho: Array, velocity: Array) -> Array:
-    """The velocity that is stored, written over the one given: there is none away from smoke."""
+def _near(
+    rho: Array, velocity: Array | StaggeredGrid, box: tuple[slice, ...]
+) -> Iterator[tuple[tuple[slice, ...], Array]]:
+    """The velocity (x, y, z, 3) that is stored in a box of density, none away from smoke, slab by slab.
+
+    All of the box's at once takes more memory than the frame.
+    """
     near = rho > 0.0
     if near.any():
         near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
-    np.copyto(velocity, np.float32(0.0), where=~near[..., None])
-    return np.clip(velocity, -_LIMIT, _LIMIT, out=velocity)
+    for start in range(0, len(near), SLAB):
+        there = near[start : start + SLAB]
+        slab = (slice(box[0].start + start, box[0].start + start + len(there)), *box[1:])
+        if isinstance(velocity, StaggeredGrid):
+            part = np.stack(at_centres(faces_in(velocity.faces, slab)), axis=-1)
+        else:
+            part = velocity[slab].copy()
+        np.copyto(part, np.float32(0.0), where=~there[..., None])
+        yield slab, np.clip(part, -_LIMIT, _LIMIT, out=part)
 
 
 def _index(box: tuple[slice, ...], first: tuple[int, ...]) -> tuple[int, ...]:

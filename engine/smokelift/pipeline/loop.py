@@ -171,17 +171,22 @@ def _density(
         return _unseen(shot.optics.domain, _carried(before, predicted, shot)), {}
     depth = method.depth_prior.estimate(views)
     carried = _carried(before, predicted, shot)
-    if before is None or carried is None:
-        return method.density_fit.fit(views, depth, None), {}
-    start = method.temporal_prior.start(depth.views, depth, carried)
-    # what a moving camera does not see now it may have seen before
-    unseen = carried.density if shot.moves else None
-    del carried  # the fit needs the memory
-    fitted = method.density_fit.fit(views, depth, start.density)
+    initial: Volume | None = None
+    unseen: Volume | None = None
+    figures: Mapping[str, float] = {}
+    if before is not None and carried is not None:
+        start = method.temporal_prior.start(depth.views, depth, carried)
+        initial, figures = start.density, start.figures
+        # what a moving camera does not see now it may have seen before
+        unseen = carried.density if shot.moves else None
+        del start
+    priors, starts = [depth], [initial]
+    del carried, depth, initial  # the fit needs the memory, and frees what it has read unless others hold it
+    fitted = method.density_fit.fit(views, priors.pop(), starts.pop())
     if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
         fitted = replace(fitted, density=np.where(visible, fitted.density, unseen), steady=None)
-    return fitted, start.figures
+    return fitted, figures
 
 
 def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> Smoke | None:

@@ -84,7 +84,7 @@ class CpuBackend:
         if self._diffuse:
             self._diffuse.add(self._medium)
         if keep_record and self._record is None:
-            self._record = _core.zeros((plan.lighting.channels + 1, max(plan.shape), *self._depth.shape))
+            self._record = _core.zeros((plan.lighting.channels + 1, self._rays.recorded))
         record = self._record if keep_record else None
         _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
         return self._scattered, self._depth
@@ -106,7 +106,7 @@ class CpuBackend:
         if self._diffuse:
             self._diffuse.pull_back(self._medium, self._gradient)
         if plan.shadows:
-            if self._scratch is None:
+            if self._scratch is None and len(self._lights) > 1:
                 self._scratch = _core.zeros((*self._medium.shape[:3], 1))
             _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, self._lights)
         result = _core.zeros(plan.domain.resolution) if out is None else out

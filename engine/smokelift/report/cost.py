@@ -60,7 +60,7 @@ BASE_BYTES = 190 * 2**20
 BYTES_A_PIXEL = 210
 """Bytes of memory for each pixel of the clips' frames: decoded frames and estimates from them."""
 
-BYTES_A_VOXEL = 12, 380
+BYTES_A_VOXEL = 12, 230
 """Bytes at a run's peak for each voxel of the box, and in addition for each that may hold smoke."""
 
 SMALL = 2**23

@@ -2,17 +2,22 @@
 
 import numpy as np
 
-from smokelift.density.descent import _Neighbours
+import smokelift._core as _core
+from smokelift.checks.array_types import Array
+from smokelift.density.descent import with_neighbours
 
 
 def test_neighbours_share_a_step() -> None:
     """What one voxel wants reaches its cube, evenly both ways, and what all want alike stays as it is."""
     shape, random = (9, 7, 8), np.random.default_rng(5)
-    where = np.flatnonzero(random.random(shape) < 0.7)
-    neighbours = _Neighbours(where, shape)
-    one, other = random.standard_normal((2, where.size)).astype(np.float32)
-    np.testing.assert_allclose(neighbours.shared(np.ones_like(one)), 1, rtol=1e-6)
-    np.testing.assert_allclose(one @ neighbours.shared(other), neighbours.shared(one) @ other, rtol=1e-4)
+    where = _core.MarkedVoxels(random.random(shape) < 0.7)
+    one, other = random.standard_normal((2, where.count)).astype(np.float32)
+
+    def shared(values: Array) -> Array:
+        return with_neighbours(where, values, np.empty_like(values))
+
+    np.testing.assert_allclose(shared(np.ones_like(one)), 1, rtol=1e-6)
+    np.testing.assert_allclose(one @ shared(other), shared(one) @ other, rtol=1e-4)
     alone = np.zeros_like(one)
     alone[0] = 1
-    assert 1 < np.count_nonzero(neighbours.shared(alone)) < where.size
+    assert 1 < np.count_nonzero(shared(alone)) < where.count

@@ -11,7 +11,7 @@ import smokelift._core as _core
 from smokelift.density import DensitySettings, FittedDensity, Observation, ObservedView, reconstruct_density
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
-from smokelift.density.hull import Places, common_hull, project_voxels, visual_hull
+from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.profile import FLATNESS, ROOM, DepthProfile, inflated
@@ -264,16 +264,27 @@ def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
 
 @pytest.mark.parametrize("even", [True, False])
 def test_compiled_steps_are_those_of_the_formula(even) -> None:
-    random = np.random.default_rng(0)
-    values, plausible = random.lognormal(size=(2, 20000)).astype(np.float32)
-    rows, columns = random.uniform(-1, 10, (2, 20000)).astype(np.float32)
-    visible, picture = random.random(20000) > 0.1, random.normal(size=(10, 10)).astype(np.float32)
-    step = np.where(visible, Places(rows, columns, visible).read(picture), 0)
+    domain = Domain((-1, -0.5, -1), (1, 0.5, 1), (40, 20, 40))  # wider than the picture
+    random, projection = np.random.default_rng(0), project_voxels(GRID, domain)
+    marked = random.random(domain.resolution) > 0.3
+    voxels, places = _core.MarkedVoxels(marked), projection.places(marked)
+    values, plausible = random.lognormal(size=(2, voxels.count)).astype(np.float32)
+    picture, visible = random.normal(size=(32, 24)).astype(np.float32), places.visible
+    assert 0 < np.count_nonzero(visible) < voxels.count
+    step = np.where(visible, places.read(picture), 0)
     if not even:
         gain = (plausible + 0.1) / (values * np.exp(step) + 0.1)
         step *= np.minimum(np.where(step < 0, 1 / gain, gain), 2)
-    at = (picture, rows, columns, visible)
-    found = _core.scale_along_rays(values, None if even else plausible, *at, 0.1, 2.0, 0.9)
+    found = projection.scale_along_rays(
+        voxels,
+        values,
+        picture,
+        None if even else plausible,
+        faint=0.1,
+        most=2.0,
+        share=0.9,
+        out=np.empty_like(values),
+    )
     np.testing.assert_allclose(found, values * np.exp(0.9 * step), rtol=1e-5)
     np.testing.assert_array_equal(found[~visible], values[~visible])
 
@@ -307,7 +318,7 @@ def even_start(density: np.ndarray, scene: Scene) -> tuple[Term, np.ndarray, np.
     hull = visual_hull(target.max(-1) > 0.01, project_voxels(scene.camera, scene.domain))
     term = term_of(scene, Observation(scene.camera, target), hull)
     exact = replace(term.view, noise=np.zeros_like(term.view.noise))
-    return replace(term, view=exact), hull, np.where(hull, np.float32(0.02), np.float32(0))
+    return replace(term, view=exact), _core.MarkedVoxels(hull), np.where(hull, np.float32(0.02), np.float32(0))
 
 
 @pytest.mark.parametrize("thickness", [1.0, 30.0])
@@ -315,18 +326,18 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     """Each further step leaves the picture as near or nearer, in thick smoke too, where bare steps overshoot."""
     scene = replace(small, medium=replace(small.medium, extinction=thickness * small.medium.extinction))
     term, hull, start = even_start(plume.densities[1], scene)
-    losses = [descend([term], start, hull, steps, 0.0, 2).loss for steps in range(20)]
+    losses = [descend([term], start.copy(), hull, steps, 0.0, 2).loss for steps in range(20)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.3 * losses[0]
 
 
 def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     term, hull, start = even_start(plume.densities[1], small)
-    free = descend([term], start, hull, 20, 0.0, 2)
+    free = descend([term], start.copy(), hull, 20, 0.0, 2)
     most = 0.5 * float(free.density.max())
-    bound = descend([term], start, hull, 20, 0.0, 2, bound=most)
+    bound = descend([term], start.copy(), hull, 20, 0.0, 2, bound=most)
     assert bound.density.max() == pytest.approx(most)
-    assert free.loss < bound.loss < 0.5 * descend([term], start, hull, 0, 0.0, 2).loss
+    assert free.loss < bound.loss < 0.5 * descend([term], start.copy(), hull, 0, 0.0, 2).loss
 
 
 def test_the_figures_are_those_of_the_density(plume, small) -> None:
