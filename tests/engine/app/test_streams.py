@@ -84,6 +84,34 @@ sys.exit(smokelift_command.main())
     assert (done.returncode, done.stderr) == (130, b"Cancelled.\n")
 
 
+def test_the_engine_loads_while_another_program_holds_its_input() -> None:
+    words = [sys.executable, "-m", "smokelift_command.tethered", "doctor"]
+    with subprocess.Popen(words, env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        assert process.wait(timeout=60) == 0
+
+
+def test_the_end_of_its_input_cancels() -> None:
+    code = """
+import sys, time
+import smokelift_command
+from smokelift_command import tethered
+
+def work():
+    print("working", flush=True)
+    while True:
+        time.sleep(0.01)
+
+smokelift_command.main = work
+sys.exit(tethered.main())
+"""
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], env=ENVIRONMENT, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"working\n"
+        assert process.communicate(timeout=60) == (b"", b"Cancelled.\n")
+        assert process.returncode == 130
+
+
 def test_an_import_changes_nothing_of_the_process() -> None:
     """A program that imports the engine keeps its own hook and handlers, in `python -m` of its own too."""
     code = """
