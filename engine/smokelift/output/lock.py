@@ -60,7 +60,7 @@ def _try_lock(file: int) -> bool:
 
         try:
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-        except OSError:  # by which number another one's lock is told differs between C libraries
+        except OSError:  # the number for the lock of another differs between C libraries
             return False
     else:
         import fcntl

@@ -65,6 +65,7 @@ def test_control_characters_of_a_path_are_spelt_out(capsys, path, spelt) -> None
     assert (status, lines) == (2, [r"r\xe4uchern.toml: cannot be read: No such file or directory"])
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals to send")
 @pytest.mark.parametrize("number", ["SIGTERM", "SIGINT"])
 def test_a_signal_while_the_engine_is_loaded_cancels(number) -> None:
     code = f"""
@@ -107,8 +108,8 @@ sys.exit(tethered.main())
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", code], env=ENVIRONMENT, **pipes) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() == b"working\n"
-        assert process.communicate(timeout=60) == (b"", b"Cancelled.\n")
+        assert process.stdout.readline().split() == [b"working"]
+        assert process.communicate(timeout=60)[1].split() == [b"Cancelled."]
         assert process.returncode == 130
 
 
