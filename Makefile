@@ -3,6 +3,7 @@
 # make sanitize       tests of the compiled core with one that checks itself for accesses outside arrays and the like
 # make stability      damaged files and failing systems against the command line; CASES=300 of each kind take an hour
 # make extension      the Blender extension's zips in dist/, with the manual; ENGINE_WHEELS=DIR adds platforms built elsewhere
+# make cross-wheels   on Linux, the engine's wheels for Windows and macOS, and what they need of these systems
 # make manual         the manual in build/manual/index.html; a link that leads nowhere fails
 # make test-blender   those zips in the bpy wheels and, beside them, in a real Blender
 # All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; those of the
@@ -29,7 +30,7 @@ HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u
 # What a step that failed left behind is not taken for its result.
 .DELETE_ON_ERROR:
 
-.PHONY: demo test pytest lint sanitize stability manual extension test-blender clean
+.PHONY: demo test pytest lint sanitize stability manual extension cross-wheels test-blender clean
 
 demo: $(VENV)/engine.stamp
 	rm -rf demo/sequence
@@ -99,6 +100,13 @@ build/engine-wheels/stamp: $(VENV)/extension.stamp tools/engine_wheels.py $(ENGI
 
 $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	$(QUIET_PIP) --group extension
+	touch $@
+
+cross-wheels: $(VENV)/cross.stamp
+	$(BIN)/python tools/cross_wheels.py --out build/cross-wheels
+
+$(VENV)/cross.stamp: $(VENV)/engine.stamp
+	$(QUIET_PIP) --group cross
 	touch $@
 
 test-blender: dist/extension.stamp $(VENV)/tools.stamp

@@ -14,6 +14,7 @@ import platform
 import queue
 import subprocess
 import sys
+import sysconfig
 import threading
 import time
 import tomllib
@@ -94,7 +95,7 @@ def require_fitting_zip() -> None:
     except (OSError, ValueError):  # it runs without being installed
         manifest = {}
     own_python = LIBRARIES.removeprefix("python")
-    system = (sys.platform, platform.machine().lower())
+    system = (sys.platform, _processor())
     own_platform = PLATFORMS.get(system, "-".join(system))
     platforms = manifest.get("platforms", [own_platform])
     if own_python in (pythons or [own_python]) and own_platform in platforms:
@@ -106,6 +107,11 @@ def require_fitting_zip() -> None:
     names = {"blenders": BLENDERS[own_python], "platform": own_platform.replace("-", "_")}
     name = ZIP_FILE.format(version=manifest.get("version", "*"), **names)
     raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
+
+
+def _processor() -> str:
+    """What this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own."""
+    return sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
 
 
 class Job:

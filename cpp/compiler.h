@@ -10,7 +10,7 @@
 #define SMOKELIFT_CLONES
 #endif
 
-#if defined(__GNUC__)
+#if defined(__GNUC__) || defined(__clang__) // clang-cl says only the latter
 #define SMOKELIFT_INLINE inline __attribute__((always_inline))
 #define SMOKELIFT_INLINE_LAMBDA __attribute__((always_inline))
 #else

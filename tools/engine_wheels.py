@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -156,21 +157,32 @@ def build(programs: Path, folder: Path, out: Path, compiled: Path | None, *, cer
         Whether it is for other machines too, so that on Linux it is checked and named for those it runs on.
     """
     portable = platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
-    environment = os.environ | {"PATH": os.pathsep.join([str(programs), os.environ["PATH"]])}
-    if platform.system() == "Darwin":
-        environment["MACOSX_DEPLOYMENT_TARGET"] = "11.0"  # Blender's own
+    environment = {"MACOSX_DEPLOYMENT_TARGET": "11.0"} if platform.system() == "Darwin" else {}  # Blender's own
     with tempfile.TemporaryDirectory() as made:
-        wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", made, f"-Cbuild-dir={folder}"]
-        if portable:
-            wheel.append("-Ccmake.define.OLD_GLIBC=ON")
-        # said even if there are none: CMake remembers those of the time before
-        wheel.append(f"-Ccmake.define.NUMERICS_FROM={compiled or ''}")
-        subprocess.run([*_pip(programs), *wheel, str(ROOT)], env=environment, check=True)
-        (built,) = Path(made).glob("*.whl")
+        built = run_build(programs, folder, Path(made), compiled, {"OLD_GLIBC": "ON"} if portable else {}, environment)
         if portable and certified:
             _certify(built, out)
         else:
             (out / built.name).write_bytes(built.read_bytes())
+
+
+def run_build(
+    programs: Path,
+    folder: Path,
+    out: Path,
+    compiled: Path | None,
+    defines: Mapping[str, str],
+    environment: Mapping[str, str],
+) -> Path:
+    """Build one wheel into an empty folder, with definitions for CMake and environment variables; returns the wheel."""
+    wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(out), f"-Cbuild-dir={folder}"]
+    # numerics are said even if there are none: CMake remembers those of the time before
+    for name, value in {**defines, "NUMERICS_FROM": str(compiled or "")}.items():
+        wheel.append(f"-Ccmake.define.{name}={value}")
+    path = os.pathsep.join([str(programs), os.environ["PATH"]])
+    subprocess.run([*_pip(programs), *wheel, str(ROOT)], env={**os.environ, "PATH": path, **environment}, check=True)
+    (built,) = out.glob("*.whl")
+    return built
 
 
 def _pip(programs: Path) -> list[str]:

@@ -11,11 +11,15 @@ import signal
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import smokelift_command
 
 GRACE_SECONDS = 8.0
 """Time to end in order. Files appear whole or not at all, so an end at once does no harm after that."""
+
+POLL_SECONDS = 0.1
+"""Between two looks at standard input, where none can wait for its end."""
 
 
 def main() -> int:
@@ -30,11 +34,27 @@ def main() -> int:
 
 
 def _end_with_input() -> None:
-    while os.read(0, 4096):  # a buffered reader would hold its lock at the interpreter's end
-        pass
+    _wait_for_end_of_input()
     _thread.interrupt_main()
     time.sleep(GRACE_SECONDS)
     os._exit(smokelift_command.CANCELLED)
+
+
+def _wait_for_end_of_input() -> None:
+    if sys.platform == "win32":
+        # A read that waits there has all others who ask for the pipe's state wait too, and NumPy does as it is loaded:
+        # https://github.com/numpy/numpy/issues/24290
+        import _winapi
+        import msvcrt
+
+        pipe = msvcrt.get_osfhandle(0)
+        with suppress(OSError):  # the other end is closed
+            while True:
+                _winapi.PeekNamedPipe(pipe, 0)
+                time.sleep(POLL_SECONDS)
+    else:
+        while os.read(0, 4096):  # a buffered reader would hold its lock at the interpreter's end
+            pass
 
 
 if __name__ == "__main__":

@@ -326,6 +326,17 @@ def test_the_zip_for_another_blender_is_not_enabled(tmp_path, monkeypatch, folde
             ask()
 
 
+def test_an_x64_blender_on_arm_takes_the_zip_for_x64(tmp_path, monkeypatch) -> None:
+    (tmp_path / "python3.13").mkdir()
+    (tmp_path / "blender_manifest.toml").write_text('version = "1.2.3"\nplatforms = ["windows-x64"]\n')
+    monkeypatch.setattr(module, "HOME", tmp_path)
+    monkeypatch.setattr(module, "LIBRARIES", "python3.13")
+    monkeypatch.setattr(module.sys, "platform", "win32")
+    monkeypatch.setattr(module.sysconfig, "get_platform", lambda: "win-amd64")
+    monkeypatch.setattr(module.platform, "machine", lambda: "ARM64")
+    assert str(tmp_path / "python3.13") in engine_command([])
+
+
 def test_a_blender_that_there_is_no_zip_for(tmp_path, monkeypatch) -> None:
     (tmp_path / "python3.11").mkdir()
     monkeypatch.setattr(module, "HOME", tmp_path)

@@ -33,7 +33,8 @@ class OutputError(OSError):
 
     def __init__(self, error: OSError) -> None:
         super().__init__(f"Standard output cannot be written: {error.strerror}.")
-        self.closed = isinstance(error, BrokenPipeError)
+        # Windows calls it an invalid argument
+        self.closed = isinstance(error, BrokenPipeError) or (sys.platform == "win32" and error.errno == errno.EINVAL)
 
 
 def printable_lines(text: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from smokelift.checks import shown
-from smokelift.scene.files import read_text
+from smokelift.scene.files import advice_on_backslashes, read_text
 from smokelift.scene.toml_lines import Place, find_lines, line_of
 
 OPTIONS = (
@@ -63,7 +63,7 @@ def read_shots(path: Path, check: Callable[[Sequence[str]], None]) -> tuple[Batc
     try:
         data = tomllib.loads(text)
     except (RecursionError, ValueError) as error:
-        raise ValueError(f"{path.name}: is not valid TOML: {error}") from error
+        raise ValueError(f"{path.name}: is not valid TOML: {error}{advice_on_backslashes(text)}") from error
     try:
         return tuple(_shots(path.absolute().parent, data, check))
     except _ListError as error:

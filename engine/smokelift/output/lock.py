@@ -55,15 +55,18 @@ class Lock:
 
 
 def _try_lock(file: int) -> bool:
-    try:
-        if sys.platform == "win32":
-            import msvcrt
+    if sys.platform == "win32":
+        import msvcrt
 
+        try:
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
+        except OSError:  # the number for the lock of another differs between C libraries
+            return False
+    else:
+        import fcntl
 
+        try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError):  # what Linux and macOS, and Windows, call it
-        return False
+        except BlockingIOError:
+            return False
     return True

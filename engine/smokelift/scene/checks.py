@@ -19,8 +19,8 @@ LARGEST, SMALLEST = 1e9, 1e-9
 """No number of a scene is larger, and none that must be above 0 is smaller: what is computed of a few of them stays a
 normal number of 32 bits."""
 
-ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
-"""Begins the address of a file on a network. A drive of Windows has one letter."""
+ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:[/\\]")
+"""Begins the address of a file on a network; in a path of Windows / is \\, and a drive has one letter."""
 
 
 class SceneError(ValueError):

@@ -25,3 +25,8 @@ def read_text(path: Path) -> str:
         if error.strerror is None:
             raise
         raise type(error)(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def advice_on_backslashes(text: str) -> str:
+    """Return how to write a path of Windows where a text that is no TOML has a backslash, else nothing."""
+    return "; write a path with / or between single quotes" if "\\" in text else ""

@@ -24,7 +24,7 @@ from smokelift.checks import one_of, shown
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
 from smokelift.scene.checks import SceneError, file_path, positive, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet
-from smokelift.scene.files import read_text
+from smokelift.scene.files import advice_on_backslashes, read_text
 from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
 from smokelift.scene.toml_lines import Place, find_lines, line_of
@@ -58,7 +58,7 @@ def read_file(path: Path, build: Callable[..., Described]) -> Described:
     except RecursionError as error:
         raise SceneError(f"{path.name}: is not a scene: lists or tables are nested too deeply") from error
     except ValueError as error:  # an integer of 5000 digits is no error of TOML's
-        raise SceneError(f"{path.name}: is not valid TOML: {error}") from error
+        raise SceneError(f"{path.name}: is not valid TOML: {error}{advice_on_backslashes(text)}") from error
     return _Reader(path.name, path.absolute().parent, find_lines(text)).scene(data, build)
 
 

@@ -65,6 +65,7 @@ def test_control_characters_of_a_path_are_spelt_out(capsys, path, spelt) -> None
     assert (status, lines) == (2, [r"r\xe4uchern.toml: cannot be read: No such file or directory"])
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals to send")
 @pytest.mark.parametrize("number", ["SIGTERM", "SIGINT"])
 def test_a_signal_while_the_engine_is_loaded_cancels(number) -> None:
     code = f"""
@@ -82,6 +83,34 @@ sys.exit(smokelift_command.main())
 """
     done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (130, b"Cancelled.\n")
+
+
+def test_the_engine_loads_while_another_program_holds_its_input() -> None:
+    words = [sys.executable, "-m", "smokelift_command.tethered", "doctor"]
+    with subprocess.Popen(words, env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        assert process.wait(timeout=60) == 0
+
+
+def test_the_end_of_its_input_cancels() -> None:
+    code = """
+import sys, time
+import smokelift_command
+from smokelift_command import tethered
+
+def work():
+    print("working", flush=True)
+    while True:
+        time.sleep(0.01)
+
+smokelift_command.main = work
+sys.exit(tethered.main())
+"""
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], env=ENVIRONMENT, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().split() == [b"working"]
+        assert process.communicate(timeout=60)[1].split() == [b"Cancelled."]
+        assert process.returncode == 130
 
 
 def test_an_import_changes_nothing_of_the_process() -> None:

@@ -190,6 +190,11 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
             "line 25: [[inlet]] is outside the domain",
         ),
         ("albedo = 0.5", "albedo = ", "scene.toml: is not valid TOML:"),
+        (
+            "fps = 24",
+            r'path = "C:\users\clip.mp4"',
+            "is not valid TOML: Invalid hex value (at line 4, column 13); write a path with /",
+        ),
         ("fps = 24", "fps = 1e-38", "line 4: [clip] fps"),
         ("albedo = 0.5", "extinction = 1e-40", "extinction must be a number above 0, 1e-09 at least"),
         ("albedo = 0.5", "extinction = 1e300", "extinction must be a number above 0, 1e+09 at most"),
