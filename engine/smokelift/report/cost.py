@@ -235,4 +235,4 @@ def _seconds_a_voxel() -> float:
 
 
 def _solve(field: npt.NDArray[np.float32]) -> None:
-    scipy.fft.idctn(scipy.fft.dctn(field, workers=WORKERS), workers=WORKERS)
+    scipy.fft.idctn(scipy.fft.dctn(field))  # on one thread: a system may allow no more
