@@ -27,8 +27,8 @@ from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
+from smokelift.velocity.estimator import DensityPair
 from smokelift.velocity.near_smoke import carry, near_smoke
-from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.seen_motion import with_seen_motion
 
 
