@@ -7,7 +7,6 @@
 #include "projected_cg.h"
 #include "prolongation.h"
 #include "python.h"
-#include "refinement.h"
 #include "vectors.h"
 
 #include <optional>
@@ -112,15 +111,6 @@ void register_motion(py::module_ &module) {
             });
         },
         "density"_a, "source"_a, "trust"_a, "prediction"_a, "closed"_a);
-
-    module.def(
-        "refine",
-        [](const Array3 &u, const Shape &shape, const Box::Closed &closed) {
-            const StaggeredIn coarse = view(u, closed);
-            return filled(Box{shape, closed},
-                          [&](const StaggeredOut &fine, Workers &workers) { refine(coarse, fine, workers); });
-        },
-        "u"_a, "shape"_a, "closed"_a);
 
     module.def(
         "prolong",

@@ -60,7 +60,7 @@ class UnprojectedPrediction(CoarseToFine):
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """Return the velocity carried along by itself."""
-        return replace(advect(velocity, velocity, dt), residual=velocity.residual)
+        return advect(velocity, velocity, dt)
 
 
 def leave_out(part: str, method: Method) -> Method:
@@ -69,7 +69,6 @@ def leave_out(part: str, method: Method) -> Method:
     - transport: every frame starts from its own pictures
     - hull: smoke may be wherever a camera looks
     - depth: the initial density is even along the rays, without detail (settings leave out the detail alone)
-    - sources: smoke that enters is taken for motion
     - projection: the predicted velocity keeps its divergence
     - pictures: the velocity of one view is estimated as that of several, and no motion in the pictures corrects it
 
@@ -85,14 +84,11 @@ def leave_out(part: str, method: Method) -> Method:
         return replace(method, density_fit=WithoutHull(method.density_fit))
     if part == "depth":
         return replace(method, depth_prior=EvenDepth())
-    if part == "sources" and isinstance(estimator, CoarseToFine):
-        settings = replace(estimator.settings, sources=None)
-        return replace(method, velocity_estimator=replace(estimator, settings=settings))
     if part == "projection" and isinstance(estimator, CoarseToFine):
         return replace(method, velocity_estimator=UnprojectedPrediction(estimator.settings))
     if part == "pictures":
         return replace(method, follows_picture=False)
-    parts = "transport, hull, depth, sources, projection or pictures"
+    parts = "transport, hull, depth, projection or pictures"
     raise ValueError(f"without={part}: expected {parts} of the default method.")
 
 

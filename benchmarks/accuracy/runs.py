@@ -4,7 +4,7 @@ A name is a quality or "paper", then further views, then changes:
 
 - ``balanced``, ``paper``
 - ``balanced+90``, ``balanced+90+45``: the views 90 and 45 are input too; of a capture ``balanced+camera00``
-- ``balanced:transport=0``, ``fine:velocity.levels=2``, ``draft:resolution=32x32x48``: settings that differ
+- ``balanced:transport=0``, ``fine:velocity.coarsening=1``, ``draft:resolution=32x32x48``: settings that differ
 - ``fine:resolution=auto``: as many voxels as the clip's detail deserves and the quality allows
 - ``balanced:velocity.solver=primal-dual``: the other solver
 - ``balanced:detail=0``, ``balanced:seed=1``: the smooth answer; another plausible one
@@ -140,7 +140,7 @@ def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
 
 
 def _changed(settings: Settings, key: str, text: str) -> Settings:
-    """Return settings with a field, or with a field of a group ("velocity.levels"), read from text."""
+    """Return settings with a field, or with a field of a group ("velocity.coarsening"), read from text."""
     try:
         value: Any = json.loads(text)
     except json.JSONDecodeError:

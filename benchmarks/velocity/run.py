@@ -65,7 +65,7 @@ USUAL = Plan(
     pairs=3,
     iterations=(2, 3, 5, 10, 20),
     primal_dual_iterations=(2, 5, 20, 100),
-    others=({"linearisations": 1}, {"linearisations": 3}, {"levels": 1}, {"levels": 2}, {"method": "paper"}),
+    others=({"linearisations": 1}, {"linearisations": 3}, {"method": "paper"}),
 )
 
 SHORT = Plan(
@@ -87,7 +87,7 @@ class Variant:
     Attributes
     ----------
     setting
-        What is varied: ``iterations``, ``primal_dual_iterations``, ``linearisations``, ``levels`` or ``method``.
+        What is varied: ``iterations``, ``primal_dual_iterations``, ``linearisations`` or ``method``.
     value
         The setting's value.
     default

@@ -116,9 +116,6 @@ def add_momentum(
         May be None where ``trust`` is zero.
     """
 
-def refine(u: Faces, shape: tuple[int, ...], closed: Closed) -> list[Array]:
-    """A velocity in the cells of a grid that is twice as fine and has ``shape`` cells: linear, then projected."""
-
 def prolong(u: Faces) -> list[Array]:
     """A velocity in the cells of a grid that is twice as fine, each with the divergence of its coarse one."""
 

@@ -54,8 +54,8 @@ def test_a_run_says_what_was_changed() -> None:
     assert (run.series, run.changes, run.label) == ("fine", {"transport": "0"}, "transport 0")
     grid = Run("fine:resolution=32x32x48", "default", "32x32x48", 1.0, {})
     assert (grid.changes, grid.chosen, grid.label) == ({}, False, "48")
-    detail = Run("balanced:velocity.levels=2,detail=0.25", "default", "32x32x48", 1.0, {})
-    assert detail.changes == {"levels": "2", "detail": "0.25"}
+    detail = Run("balanced:velocity.coarsening=2,detail=0.25", "default", "32x32x48", 1.0, {})
+    assert detail.changes == {"coarsening": "2", "detail": "0.25"}
     chosen = Run("fine:resolution=auto", "default", "62x62x93", 1.0, {})
     assert (chosen.changes, chosen.chosen, chosen.label) == ({}, True, "fine")
 

@@ -30,10 +30,10 @@ OPTICS = Optics(
 
 
 def test_a_name_says_quality_views_and_changes():
-    run = "draft+90+45:transport=0.2,velocity.levels=2,resolution=8x9x10"
+    run = "draft+90+45:transport=0.2,velocity.coarsening=2,resolution=8x9x10"
     settings = run_settings(run)
     assert run_views(run) == ["90", "45"]
-    assert (settings.quality, settings.transport, settings.velocity.levels) == ("draft", 0.2, 2)
+    assert (settings.quality, settings.transport, settings.velocity.coarsening) == ("draft", 0.2, 2)
     assert settings.resolution == (8, 9, 10)
     assert run_settings("fine:resolution=auto").resolution == "auto"
     assert run_settings("paper").method == "paper"
@@ -52,9 +52,10 @@ def test_a_method_without_a_part_is_a_composition():
     assert leave_out("pictures", usual) == replace(usual, follows_picture=False)
     assert isinstance(run_method("draft", settings).depth_prior, DetailedDepth)
     assert isinstance(run_method("draft", replace(settings, detail=0.0)).depth_prior, RoundDepth)
-    both = run_method("draft:without=projection,without=sources", settings).velocity_estimator
-    assert both == UnprojectedPrediction(replace(settings.velocity, sources=None))
-    for run in ("draft:without=luck", "paper:without=sources"):
+    both = run_method("draft:without=projection,without=pictures", settings)
+    assert both.velocity_estimator == UnprojectedPrediction(settings.velocity)
+    assert not both.follows_picture
+    for run in ("draft:without=luck", "paper:without=projection"):
         with pytest.raises(ValueError, match="expected transport, hull"):
             run_method(run, run_settings(run))
 

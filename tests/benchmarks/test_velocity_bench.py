@@ -149,7 +149,7 @@ def test_a_time_is_paired_with_the_solves_around_it(monkeypatch):
     ("setting", "value", "name"),
     [
         ("linearisations", 1, "1 linearisation"),
-        ("levels", 2, "2 levels"),
+        ("linearisations", 3, "3 linearisations"),
         ("primal_dual_iterations", 5, "5 primal-dual steps"),
     ],
 )

@@ -14,11 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import VelocityEstimate, checked, motion_weight, predict_velocity
+from smokelift.velocity.estimator import DensityPair, VelocityEstimate, checked, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Regularisation, least_squares, linearise
-from smokelift.velocity.pair import DensityPair
 from smokelift.velocity.preparation import without_noise
-from smokelift.velocity.pyramid import Level
 from smokelift.velocity.solver import PrimalDual, Solver
 
 
@@ -33,30 +31,25 @@ class PaperVelocity:
         decides what nothing else does.
     blur
         Standard deviation in voxels of the Gaussian that smooths the densities.
-    smoke_threshold
-        Fraction of the largest density from which a voxel counts as smoke.
     """
 
     smoothness: float = 0.03
     kinetic: float = 0.003
     blur: float = 0.5
-    smoke_threshold: float = 0.01
     solver: Solver = field(default_factory=PrimalDual)
 
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """Estimate as by `smokelift.velocity.estimate_velocity`; a prediction is not used."""
-        first, second = checked(pair, prediction)
-        (first, second, _), _ = without_noise(first, second, ((self.blur, np.inf),), self.smoke_threshold)
+        pair = checked(pair)
+        (first, second, _), _ = without_noise(pair.before, pair.after, (self.blur,), np.inf)
         rest = StaggeredGrid.zero(first.shape, 1.0, pair.closed)
-        level = Level(first, second, motion_weight(first.shape, pair.inflow))
-        linear = linearise(level, rest, self.smoke_threshold, None)
+        linear = linearise(first, second, motion_weight(first.shape, pair.inflow), rest)
         if linear is None:
             return Velocity.zero(first.shape, pair.voxel_size, pair.closed)
         terms = Regularisation(first_order=self.smoothness, kinetic=self.kinetic)
         u, figures = self.solver.solve(least_squares(linear, rest, terms), rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
-        nothing = np.zeros_like(second)
-        return VelocityEstimate(u, measures, nothing + 1, nothing, None).velocity(pair.dt, pair.voxel_size)
+        return VelocityEstimate(u, measures, np.ones_like(second)).velocity(pair.dt, pair.voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""

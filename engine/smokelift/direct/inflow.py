@@ -13,9 +13,9 @@ from scipy import ndimage
 from smokelift.checks.array_types import Mask
 from smokelift.direct.constraint import FaceMasks, faces_of
 from smokelift.direct.moment import Moment
+from smokelift.direct.source_detection import ResidualMeans, SourceDetection
 from smokelift.scene.domain import box_around
-from smokelift.transport import Array, ResidualMeans, advect, faces_in
-from smokelift.velocity.source_detection import SourceDetection
+from smokelift.transport import Array, advect, faces_in
 
 MOTION = 0.5
 """Share of its change that may be motion in a voxel of an inlet, at most."""
@@ -130,7 +130,7 @@ def _means(changes: Sequence[tuple[Array, Array]]) -> ResidualMeans:
     """Means over changes, one at least, that velocities do not explain."""
     means = None
     for number, (residual, densest) in enumerate(changes, 1):
-        means = SourceDetection(news=1 / number).means(residual, densest, 1.0, means)
+        means = SourceDetection(news=1 / number).means(residual, densest, means)
     assert means is not None
     return means
 

@@ -22,14 +22,14 @@ from smokelift.density.hull import project_voxels
 from smokelift.footage.images import Picture
 from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
-from smokelift.pipeline.seen_motion import followed_picture, with_seen_motion
 from smokelift.render import Volume
 from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
+from smokelift.velocity.estimator import DensityPair
 from smokelift.velocity.near_smoke import carry, near_smoke
-from smokelift.velocity.pair import DensityPair
+from smokelift.velocity.seen_motion import with_seen_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +144,8 @@ def _seen(index: int, shot: Shot) -> ViewSet | None:
 
 
 def _followed(views: ViewSet | None) -> Picture | None:
-    """What is followed of the only camera's picture; None if it shows nothing of the domain."""
-    return None if views is None else followed_picture(views.views[0])
+    """What is followed of the only camera's picture, so that thin smoke counts; None if it shows nothing."""
+    return None if views is None else np.sqrt(views.views[0].optical_depth)
 
 
 def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:

@@ -41,7 +41,7 @@ class Method:
         What a frame takes over from the one before.
     follows_picture
         Whether, where one camera that stands still alone sees the smoke, the velocity is estimated as of one view and
-        corrected by what moves in the picture (`VelocityEstimator.of_one_view`, `pipeline.seen_motion`).
+        corrected by what moves in the picture (`VelocityEstimator.of_one_view`, `velocity.seen_motion`).
     """
 
     density_fit: DensityFit

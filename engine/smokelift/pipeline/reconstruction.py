@@ -20,7 +20,7 @@ from smokelift.scene import Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.transport import ResidualMeans, Velocity, halved
+from smokelift.transport import Velocity, halved
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,18 +154,14 @@ def reconstruct(
 
 def _state(carried: Frame) -> ResumeState:
     """What is carried to the next frame, for a run that goes on."""
-    memory = carried.estimated.residual
-    kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
     volumes = {"smooth": carried.smooth, "steady": carried.steady}
-    kept |= {name: volume for name, volume in volumes.items() if volume is not None}
+    kept = {name: volume for name, volume in volumes.items() if volume is not None}
     return ResumeState(carried.number, carried.density, carried.estimated.faces, kept)
 
 
 def _resumed(state: ResumeState, shot: Shot) -> Frame:
     """The inverse of `_state`."""
-    mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
-    residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
-    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
+    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed)
     shape = shot.optics.domain.resolution
     while shape != velocity.shape:
         shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)

@@ -15,7 +15,6 @@ from smokelift.setup.backdrop_remarks import BLACK
 from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.geometry import PICTURE_HEIGHT
-from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
 CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
@@ -178,12 +177,11 @@ def _estimate(shot: Shot, what: str) -> Estimate[Any] | None:
     return next((estimate for estimate in shot.estimates if estimate.what == what), None)
 
 
-def boundaries(scene: CompleteScene, settings: Settings) -> tuple[Remark, ...]:
+def boundaries(scene: CompleteScene) -> tuple[Remark, ...]:
     """How smoke gets into the box and out of it."""
     inflow = scene.inflow()
     if inflow is None:
-        search = settings.method == "default" and settings.velocity.sources
-        entry = Remark("inlets found later" if search else "no inlets")
+        entry = Remark("no inlets")
     else:
         entry = Remark("inlets", {"inlets": len(scene.inlets), "voxels": int(inflow.sum())})
     return entry, Remark("closed sides", {"sides": ", ".join(scene.closed)}) if scene.closed else Remark("open box")

@@ -163,7 +163,6 @@ SENTENCES: Mapping[str, str] = {
     ),
     "resolution without smoke": "Resolution: {value} voxels, since no smoke is seen.",
     "inlets": "Smoke enters at {inlets:marked inlet} ({voxels:voxel}); no others are searched for.",
-    "inlets found later": "No inlet marked: where smoke enters is found from the densities.",
     "no inlets": "No inlet marked: none is assumed.",
     "open box": "All sides of the box are open.",
     "closed sides": "Closed sides of the box: {sides}; the others are open.",

@@ -4,7 +4,6 @@ from smokelift.checks.array_types import Array
 from smokelift.transport.advection import advect, advect_cells
 from smokelift.transport.grid import (
     Faces,
-    ResidualMeans,
     StaggeredGrid,
     Velocity,
     VoxelBox,
@@ -22,7 +21,6 @@ from smokelift.transport.pressure import divergence, outflow, project, without_d
 __all__ = [
     "Array",
     "Faces",
-    "ResidualMeans",
     "StaggeredGrid",
     "Velocity",
     "VoxelBox",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 
@@ -94,19 +94,6 @@ class StaggeredGrid:
         return replace(self, faces=(x, y, z))
 
 
-class ResidualMeans(NamedTuple):
-    """Means over a few voxels, and over past frames, of the change that velocities leave unexplained.
-
-    Attributes
-    ----------
-    mean, magnitude : (nx, ny, nz) float32
-        Of the residual and of its magnitude, as shares of the largest density.
-    """
-
-    mean: Array
-    magnitude: Array
-
-
 @dataclass(frozen=True, eq=False)
 class Velocity(StaggeredGrid):
     """A velocity in m/s on the faces of voxels, with what is known of its estimate.
@@ -122,11 +109,6 @@ class Velocity(StaggeredGrid):
     confidence
         Of an estimate, shape (nx, ny, nz), 0 to 1: how far the densities show the motion there. Smoothness and
         incompressibility fill in the rest.
-    source
-        Of an estimate, shape (nx, ny, nz): density that enters per second, >= 0.
-    residual
-        Of an estimate, on its own grid: what it and those before it leave unexplained. The next estimate finds
-        sources by it.
     known_finite
         Whether the faces are known to be finite; they are not read then, which takes long on a large grid.
 
@@ -139,8 +121,6 @@ class Velocity(StaggeredGrid):
 
     figures: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     confidence: Array | None = field(default=None, kw_only=True)
-    source: Array | None = field(default=None, kw_only=True)
-    residual: ResidualMeans | None = field(default=None, kw_only=True)
     known_finite: InitVar[bool] = field(default=False, kw_only=True)
 
     def __post_init__(self, known_finite: bool) -> None:
@@ -197,18 +177,16 @@ def faces_in(faces: Faces, box: tuple[slice, ...]) -> Faces:
 
 
 def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
-    """A velocity in a box of its voxels, without the residual; sides that cut the domain are open."""
+    """A velocity in a box of its voxels; sides that cut the domain are open."""
     ends = [(side.start == 0, side.stop == count) for side, count in zip(box, velocity.shape, strict=True)]
     outer = [end for pair in ends for end in pair]
     closed = tuple(side for side, wall, shared in zip(SIDES, velocity.walls, outer, strict=True) if wall and shared)
-    confidence, source = (None if values is None else values[box] for values in (velocity.confidence, velocity.source))
     return Velocity(
         faces_in(velocity.faces, box),
         velocity.voxel_size,
         closed,
         figures=velocity.figures,
-        confidence=confidence,
-        source=source,
+        confidence=None if velocity.confidence is None else velocity.confidence[box],
         known_finite=True,
     )
 

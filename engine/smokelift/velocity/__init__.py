@@ -10,14 +10,14 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     r = (after(x) - before(x - u_k(x))) / s       what the estimate so far, u_k, leaves unexplained
     g = grad (after(x) + before(x - u_k(x))) / 2s
     s = root mean square of |grad| inside the smoke
-    W = 0 where smoke enters (`source_detection`), else 1
+    W = 0 where smoke is known to enter, else 1
     u_p = t prediction + P(momentum)              both fitted with a few numbers (`momentum`)
     R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)
 
-from coarse to fine grids (`pyramid`), linearised anew after every solve (`linearisation`, `coarse_to_fine`). Before and
-after are the densities as `preparation` makes them. Division by s makes every weight independent of the scales of
-density, space and time. k is `unexplained` over the share of the change that u_p leaves unexplained: it grows as u_p
-gets better.
+on one grid after a prediction, which is coarse in a reconstruction; else from a coarse grid to the one that is asked
+for (`coarse_to_fine`). It is linearised anew after the first solve (`linearisation`). Before and after are as
+`preparation` makes them. Division by s makes every weight independent of the scales of density, space and time. k is
+`UNEXPLAINED` over the share of the change that u_p leaves unexplained: it grows as u_p gets better.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
 """
@@ -30,12 +30,9 @@ import numpy.typing as npt
 from smokelift.checks import require_kind
 from smokelift.scene import Side
 from smokelift.transport import Velocity
-from smokelift.velocity.coarse_to_fine import CoarseToFine
-from smokelift.velocity.estimator import VelocityEstimator, predict_velocity, refined_to
-from smokelift.velocity.pair import DensityPair
-from smokelift.velocity.settings import VelocitySettings
+from smokelift.velocity.coarse_to_fine import CoarseToFine, VelocitySettings
+from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity, refined_to
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
-from smokelift.velocity.source_detection import SourceDetection
 
 
 def estimate_velocity(
@@ -65,8 +62,8 @@ def estimate_velocity(
         Sides of the box that are walls. None by default: the box of a video is cut out of the air around the
         smoke, which goes in and out through it freely. A floor, say, is ``("z-",)``.
     inflow
-        True in voxels where smoke enters, shape (nx, ny, nz). Density changes there are treated as inflow. Mark every
-        inlet: no others are searched for. Without it, sources are searched for.
+        True in voxels where smoke enters, shape (nx, ny, nz): no motion is taken from changes of density there. Inlets
+        that are not marked are read as motion.
     prediction
         What the velocity should be near, such as `predict_velocity` of the frame before. How near is decided by how
         much of the change it explains; one that explains less than half is not used.
@@ -74,8 +71,8 @@ def estimate_velocity(
     Returns
     -------
     Velocity
-        In m/s, without divergence, such that after(x) = before(x - u(x) dt), with the `confidence` and the `source`
-        of every voxel. `figures` has ``iterations``, ``products`` and ``projections`` of the whole estimate, the last
+        In m/s, without divergence, such that after(x) = before(x - u(x) dt), with the `confidence` of every
+        voxel. `figures` has ``iterations``, ``products`` and ``projections`` of the whole estimate, the last
         ``residual`` of the solver, the ``divergence`` (max |div u| voxel size / max |u|), the ``unexplained`` share of
         the change that the centre of the regulariser leaves, the ``trust`` in the prediction and the ``dissipation``,
         the share of the smoke that dissolves in `dt`, below zero where all of it gets denser. Zero if there is no
@@ -112,7 +109,6 @@ __all__ = [
     "PrimalDual",
     "ProjectedCG",
     "Solver",
-    "SourceDetection",
     "Velocity",
     "VelocityEstimator",
     "VelocitySettings",

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import numbers, require_kind
 from smokelift.checks.array_types import Mask
+from smokelift.scene import Side
+from smokelift.scene.domain import checked_sides
 from smokelift.transport import (
     Array,
-    ResidualMeans,
     StaggeredGrid,
     Velocity,
     VoxelBox,
@@ -26,14 +28,41 @@ from smokelift.transport import (
     require_same_shape,
     without_divergence,
 )
-from smokelift.velocity.pair import Density, DensityPair
 from smokelift.velocity.pyramid import coarsen_faces, prolonged
+
+Density = npt.NDArray[np.floating[Any]]
 
 REACH = 1
 """Coarse voxels around a box that its fine velocity depends on; see `prolonged`."""
 
 LARGEST_DENSITY = 1e12
 """Largest density of which sums of fourth powers are finite in 32 bits."""
+
+
+@dataclass(frozen=True, eq=False)
+class DensityPair:
+    """Two densities, and what is known of the box between them.
+
+    Attributes
+    ----------
+    before, after : (nx, ny, nz)
+        Densities >= 0.
+    dt
+        Time between them in seconds.
+    voxel_size
+        Edge of a voxel in metres.
+    closed
+        Sides of the box that are walls.
+    inflow : (nx, ny, nz)
+        True where smoke enters; None where that is not known.
+    """
+
+    before: Density
+    after: Density
+    dt: float
+    voxel_size: float
+    closed: tuple[Side, ...] = ()
+    inflow: Mask | None = None
 
 
 class VelocityEstimator(Protocol):
@@ -56,29 +85,26 @@ class VelocityEstimator(Protocol):
 
 
 def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
-    """The velocity of the next frame (after ``dt`` seconds) if no force acts: carried along by itself, then projected.
-
-    Its residual stays as it is, because inlets stand still.
-    """
-    return replace(project(advect(velocity, velocity, dt)), residual=velocity.residual)
+    """The velocity after ``dt`` seconds in which no force acts: carried along by itself, then projected."""
+    return project(advect(velocity, velocity, dt))
 
 
 def coarsened(velocity: Velocity) -> Velocity:
-    """A velocity on a grid half as fine, where its residual already is."""
+    """A velocity on a grid half as fine."""
     coarse = coarsen_faces(velocity)
-    return Velocity(coarse.faces, coarse.voxel_size, coarse.closed, residual=velocity.residual)
+    return Velocity(coarse.faces, coarse.voxel_size, coarse.closed)
 
 
 def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     """A velocity refined to the grid (shape) that its own was halved from; itself if it is on that already.
 
-    It has no divergence there. The residual stays as it is.
+    It has no divergence there.
     """
     if coarse.shape == shape:
         return coarse
     x, y, z = (slice(0, count) for count in shape)
     fine = refined_in(coarse, shape, (x, y, z))
-    return replace(fine, figures=refined_figures(coarse, fine), residual=coarse.residual)
+    return replace(fine, figures=refined_figures(coarse, fine))
 
 
 def refined_figures(coarse: Velocity, fine: Velocity) -> dict[str, float]:
@@ -89,7 +115,7 @@ def refined_figures(coarse: Velocity, fine: Velocity) -> dict[str, float]:
 
 
 def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
-    """What `refined_to` gives in a box of its voxels, as the velocity of a box of its own, without a residual."""
+    """What `refined_to` gives in a box of its voxels, as the velocity of a box of its own."""
     if coarse.shape == shape:
         return part_of(coarse, box)
     half = halved(shape)
@@ -99,16 +125,14 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     )
     part = refined_in(coarse, half, (x, y, z))
     counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
-    confidence, source = (
-        None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]
-        for values in (part.confidence, part.source)
-    )
+    confidence = part.confidence
+    if confidence is not None:
+        confidence = confidence.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]
     fine = Velocity(
         prolonged(part, counts),
         part.voxel_size / 2,
         part.closed,
         confidence=confidence,
-        source=source,
         known_finite=True,
     )
     i, j, k = (
@@ -120,16 +144,11 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
 
 @dataclass(frozen=True, eq=False)
 class VelocityEstimate:
-    """A velocity `u` in voxels a frame, how it was found, and what is known of it.
-
-    The rest is as in `Velocity`, but `source` is per frame.
-    """
+    """A velocity `u` in voxels a frame, how it was found, and what is known of it, as in `Velocity`."""
 
     u: StaggeredGrid
     figures: Mapping[str, float]
     confidence: Array
-    source: Array
-    residual: ResidualMeans | None
 
     def velocity(self, dt: float, voxel_size: float) -> Velocity:
         """The velocity in m/s, projected a last time."""
@@ -142,24 +161,19 @@ class VelocityEstimate:
             u.closed,
             figures={**self.figures, "divergence": largest},
             confidence=self.confidence,
-            source=self.source / np.float32(dt),
-            residual=self.residual,
         )
 
 
-def checked(pair: DensityPair, prediction: Velocity | None) -> tuple[Array, Array]:
-    """The two densities as float32; ValueError for what no estimator takes."""
+def checked(pair: DensityPair) -> DensityPair:
+    """The pair with its densities as float32; ValueError for what no estimator takes."""
     require_positive("dt", pair.dt)
     require_positive("voxel_size", pair.voxel_size)
     first, second = _density("before", pair.before), _density("after", pair.after)
     require_same_shape("after", second.shape, first.shape)
     require_kind(pair.inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
-    require_kind(prediction, Velocity | None, "prediction", "a Velocity")
     if pair.inflow is not None:
         require_same_shape("inflow", pair.inflow.shape, first.shape)
-    if prediction is not None:
-        require_same_shape("the prediction", prediction.shape, first.shape)
-    return first, second
+    return replace(pair, before=first, after=second, closed=checked_sides(pair.closed))
 
 
 def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:

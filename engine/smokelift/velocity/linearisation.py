@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 import smokelift._core as _core
 from smokelift.transport import Array, Faces, StaggeredGrid
-from smokelift.velocity.pyramid import Level
-from smokelift.velocity.source_detection import SourceDetection
+
+SMOKE_THRESHOLD = 0.01
+"""Fraction of the largest density from which a voxel counts as smoke."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,23 +65,12 @@ class Regularisation:
     irrotational: float = 0.0
 
 
-def linearise(
-    level: Level, u: StaggeredGrid, threshold: float, sources: SourceDetection | None
-) -> Linearisation | None:
-    """The change around `u`, in voxels of the level a frame; None where there is no structure to follow.
-
-    A voxel counts as smoke from the fraction ``threshold`` of the largest density. Without ``sources`` no smoke that
-    enters is searched for.
-    """
-    (gx, gy, gz), offset, residual, carried, density, smoke, scale = _core.linearise(
-        level.before, level.after, u.faces, threshold
-    )
+def linearise(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> Linearisation | None:
+    """The change between densities around `u` (voxels per frame); None where there is no structure to follow."""
+    (gx, gy, gz), offset, _, carried, _, smoke, scale = _core.linearise(before, after, u.faces, SMOKE_THRESHOLD)
     if scale == 0:
         return None
-    weight = np.ascontiguousarray(level.weight)
-    if sources is not None:
-        weight = weight * sources.weight(sources.means(residual, density, level.coarseness, level.past), smoke)
-    return Linearisation((gx, gy, gz), offset, carried, weight, smoke, scale)
+    return Linearisation((gx, gy, gz), offset, carried, np.ascontiguousarray(weight), smoke, scale)
 
 
 def least_squares(linear: Linearisation, centre: StaggeredGrid, terms: Regularisation) -> _core.LeastSquares:

@@ -26,6 +26,14 @@ import smokelift._core as _core
 from smokelift.transport import Array, StaggeredGrid, Velocity
 from smokelift.velocity.linearisation import Linearisation
 
+MOMENTUM = 0.8
+"""Share of the fitted momentum that an estimate without a prediction starts from. Below one, because the fit is to
+noise as well (docs/experiments/velocity-momentum.md)."""
+
+BRIGHTENING = 0.5
+"""Without a prediction, overall brightening is allowed only if it cuts the unexplained change to this share. Flicker
+does; smoke that enters does not (docs/experiments/velocity-momentum.md)."""
+
 RIDGE = 1e-3
 """Ridge over the diagonal of the normal equations: what the smoke does not determine stays small."""
 
@@ -67,23 +75,11 @@ class Centre:
         weight, faces = self.trust * prediction.scale, prediction.velocity.faces
         return grid.with_faces(_core.add_momentum(density, self.momentum, weight, faces, grid.walls))
 
-    def refined(self) -> Centre:
-        """The centre on a grid twice as fine."""
-        return Centre(self.trust, self.dissipation, 2 * self.momentum)
 
-
-def fit_centre(
-    prediction: Prediction | None,
-    density: Array,
-    linear: Linearisation,
-    grid: StaggeredGrid,
-    share: float,
-    brightening: float,
-) -> Centre:
+def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisation, grid: StaggeredGrid) -> Centre:
     """Fit trust, momentum and dissipation to a linearised change.
 
-    The density (nx, ny, nz) is what momentum goes with. ``grid`` is any field on the estimate's grid. ``share`` is the
-    part of the fitted momentum that is kept; `VelocitySettings` has ``brightening``.
+    The density (nx, ny, nz) is what momentum goes with. ``grid`` is any field on the estimate's grid.
     """
     rows = 4 if prediction is None else 1
     columns = []
@@ -98,9 +94,10 @@ def fit_centre(
     if dissipation < 0 and prediction is None:
         kept = np.delete(np.arange(len(products)), -2)
         steady, without = _least_squares(products[np.ix_(kept, kept)])
-        if rest > brightening * without:
+        if rest > BRIGHTENING * without:
             dissipation, found = 0.0, steady
     trust = 0.0 if prediction is None else float(np.clip(found[3 * rows] / prediction.scale, 0, 1))
+    share = MOMENTUM if prediction is None else 1.0
     return Centre(trust, dissipation, share * found[: 3 * rows].reshape(rows, 3))
 
 

@@ -56,15 +56,14 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
     if velocity.shape == smoke.shape:
         return velocity
     i, j, k = (np.zeros(shape, np.float32) for shape in face_shapes(smoke.shape))
-    confidence, source = (None if values is None else np.zeros(smoke.shape, np.float32) for values in _known(velocity))
+    confidence = None if velocity.confidence is None else np.zeros(smoke.shape, np.float32)
     figures: dict[str, float] = {}
     for box, _ in _boxes(smoke, _reach(velocity, dt / voxel_size)):
         part = refined_in(velocity, (x, y, z), box)
         for component, found in zip(faces_in((i, j, k), box), part.faces, strict=True):
             component[...] = found
-        for values, found_values in zip((confidence, source), _known(part), strict=True):
-            if values is not None and found_values is not None:
-                np.copyto(values[box], found_values, where=found_values != 0)
+        if confidence is not None and part.confidence is not None:
+            np.copyto(confidence[box], part.confidence, where=part.confidence != 0)
         found_figures = refined_figures(velocity, part)
         figures = {name: max(value, figures.get(name, value)) for name, value in found_figures.items()}
     return Velocity(
@@ -73,15 +72,8 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
         velocity.closed,
         figures=figures,
         confidence=confidence,
-        source=source,
-        residual=velocity.residual,
         known_finite=True,
     )
-
-
-def _known(velocity: Velocity) -> tuple[Array | None, Array | None]:
-    """The confidence and the source of a velocity."""
-    return velocity.confidence, velocity.source
 
 
 def _reach(velocity: Velocity, voxels_at_one: float) -> int:

@@ -20,7 +20,18 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.transport import Array
-from smokelift.velocity.settings import VelocitySettings
+from smokelift.velocity.linearisation import SMOKE_THRESHOLD
+
+BLUR = 0.5
+"""Standard deviation (voxels) of the Gaussian that smooths densities which are neither smooth nor noisy."""
+
+NOISE = 0.35
+"""Allowed noise in the difference of two densities, divided by the root mean square gradient: voxels of motion
+(docs/experiments/velocity-noise.md)."""
+
+SMOOTH = 0.045
+"""Noise in the same unit below which densities are smooth already, and neither blurred nor compressed
+(docs/experiments/velocity-noise.md)."""
 
 NOISE_WIDTHS = (1.0, 1.5, 2.0)
 """Standard deviations (voxels) to choose from where the usual blur leaves too much noise."""
@@ -34,38 +45,29 @@ class PreparedPair:
     """Two densities (nx, ny, nz) as their motion is estimated from: blurred, and perhaps with less contrast.
 
     `noise` is the variance of the noise that is left in their difference. If `reduced`, they are the power of 3/4 of
-    the densities. If `noisy`, noise is so strong that smoke at rest seems to move.
+    the densities.
     """
 
     before: Array
     after: Array
     noise: float
     reduced: bool
-    noisy: bool = False
-
-    def density(self, values: Array) -> Array:
-        """The density that such values stand for."""
-        return values * np.cbrt(values) if self.reduced else values
 
     def density_dissipation(self, share: float) -> float:
         """The share of the density that dissolves where a share of the values does."""
         return float(1 - (1 - share) ** (4 / 3)) if self.reduced else share
 
 
-def prepare(before: Array, after: Array, settings: VelocitySettings) -> PreparedPair:
+def prepare(before: Array, after: Array) -> PreparedPair:
     """Blur two densities and reduce their contrast; leave smooth ones as they are, and only blur noisy ones."""
-    threshold = settings.smoke_threshold
-    smooth, enough = without_noise(before, after, ((0.0, settings.smooth),), threshold)
+    smooth, enough = without_noise(before, after, (0.0,), SMOOTH)
     if enough:
         return PreparedPair(*smooth, reduced=False)
-    usual = ((settings.blur, settings.noise),)
-    sharp, enough = without_noise(reduced_contrast(before), reduced_contrast(after), usual, threshold)
+    sharp, enough = without_noise(reduced_contrast(before), reduced_contrast(after), (BLUR,), NOISE)
     if enough:
         return PreparedPair(*sharp, reduced=True)
-    widths = (settings.blur, *(width for width in NOISE_WIDTHS if width > settings.blur))
-    limits = tuple((width, settings.noise) for width in widths)
-    noisy, _ = without_noise(before, after, limits, threshold)
-    return PreparedPair(*noisy, reduced=False, noisy=True)
+    noisy, _ = without_noise(before, after, (BLUR, *NOISE_WIDTHS), NOISE)
+    return PreparedPair(*noisy, reduced=False)
 
 
 def reduced_contrast(density: Array) -> Array:
@@ -90,21 +92,20 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
 
 
 def without_noise(
-    before: Array, after: Array, widths: tuple[tuple[float, float], ...], threshold: float
+    before: Array, after: Array, widths: tuple[float, ...], allowed: float
 ) -> tuple[tuple[Array, Array, float], bool]:
     """Blur two densities as much as their noise asks for.
 
-    ``widths`` are standard deviations in voxels (0 for none), rising, each with the noise that it may leave, in root
-    mean square gradients. The last is taken where none is enough. A voxel counts as smoke from the fraction
-    ``threshold`` of the largest density. Returned are the densities with the variance of the noise that is left in
-    their difference, and whether that is within the limit.
+    ``widths`` are standard deviations in voxels (0 for none), rising; the last is taken where none is enough. The noise
+    ``allowed`` is in root mean square gradients. Returned are the densities with the variance of the noise that is left
+    in their difference, and whether that is within the limit.
     """
-    smoke = after > threshold * after.max()
+    smoke = after > SMOKE_THRESHOLD * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
-    for width, share in widths:
+    for width in widths:
         first, second = (_core.blur(a, width, 4.0) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
-        enough = left <= share * _gradient(second, smoke)
+        enough = left <= allowed * _gradient(second, smoke)
         if enough:
             break
     return (first, second, left**2), enough

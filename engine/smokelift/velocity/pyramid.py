@@ -3,48 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, Velocity, faces_in, without_divergence
+from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, faces_in, without_divergence
 
 SMOOTHING = 1 / 4
 """Weight of each neighbour along an axis, which leaves nothing of what changes its sign from voxel to voxel.
 
 What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-grid.md)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """One grid of the pyramid, whose voxels are each `coarseness` voxels of the finest grid wide.
-
-    `weight` (nx, ny, nz) is how far changes may be taken for motion, as far as that is known beforehand. `past` is what
-    velocities left unexplained up to the frame before, on the finest grid.
-    """
-
-    before: Array
-    after: Array
-    weight: Array
-    coarseness: float = 1.0
-    past: ResidualMeans | None = None
-
-
-def pyramid(finest: Level, levels: int) -> list[Level]:
-    """Grids from the coarsest, with at least eight voxels a side, to the given one."""
-    result = [finest]
-    while len(result) < levels and min(result[0].before.shape) >= 16:
-        last = result[0]
-        before, after, weight = (coarsen(a) for a in (last.before, last.after, last.weight))
-        result.insert(0, Level(before, after, weight, 2 * last.coarseness))
-    return result
-
-
-def refine(u: StaggeredGrid, shape: Sequence[int]) -> StaggeredGrid:
-    """A velocity in voxels a frame on the next finer grid, in its voxels, without divergence."""
-    x, y, z = _core.refine(u.faces, tuple(shape), u.walls)
-    return StaggeredGrid((x, y, z), u.voxel_size, u.closed)
 
 
 def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:

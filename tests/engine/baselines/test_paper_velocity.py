@@ -7,7 +7,7 @@ from scipy import ndimage
 
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.velocity import VelocitySettings
-from smokelift.velocity.pair import DensityPair
+from smokelift.velocity.estimator import DensityPair
 from tests.engine.velocity.known_motions import DT, SHAPE, VOXEL, error_in_smoke, rotation, translation
 
 PAPER = PaperVelocity()

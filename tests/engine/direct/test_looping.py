@@ -6,14 +6,17 @@ import pytest
 from smokelift.direct import Moment, loop_sequence, open_source
 from smokelift.direct.looping import mix_by_edges, seam
 from smokelift.output.sequence import Sequence
-from smokelift.scene import SIDES
+from smokelift.scene import SIDES, Domain
 from smokelift.transport import Velocity
+from tests.engine.direct import rising
 from tests.engine.direct.rising import DOMAIN, DT, blob, write_plume
 
 
-def test_a_seam_moves_a_shape_instead_of_fading_it():
-    way = 4 * DOMAIN.voxel_size
-    still = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",))
+def test_a_seam_moves_a_shape_instead_of_fading_it(monkeypatch):
+    domain = Domain(DOMAIN.min, DOMAIN.max, (32, 32, 48))
+    monkeypatch.setattr(rising, "DOMAIN", domain)
+    way = 8 * domain.voxel_size
+    still = Velocity.zero(domain.shape, domain.voxel_size, ("z-",))
     end, start = (Moment(blob((x, 0, 1), 0.25), still) for x in (-way / 2, way / 2))
     found = seam(end, start, 0.5, 12 * DT)
     true = blob((0, 0, 1), 0.25)

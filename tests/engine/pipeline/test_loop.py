@@ -23,7 +23,6 @@ from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
 from smokelift.pipeline.loop import frames_after
-from smokelift.pipeline.seen_motion import with_seen_motion
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
 from smokelift.setup.prepare import prepare_shot
@@ -31,6 +30,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine, DensityPair
+from smokelift.velocity.seen_motion import with_seen_motion
 from tests.engine.conftest import Plume
 from tests.engine.setup.shots import burning
 

@@ -32,7 +32,6 @@ def test_part_of_a_finer_velocity_is_what_the_whole_has_there(shape, box):
         4.0,
         ("y-",),
         confidence=rng.random(coarse_shape, np.float32),
-        source=rng.random(coarse_shape, np.float32),
     )
     found, expected = refined_in(coarse, shape, box), part_of(refined_to(coarse, shape), box)
     assert found.voxel_size == 1.0
@@ -40,4 +39,3 @@ def test_part_of_a_finer_velocity_is_what_the_whole_has_there(shape, box):
     for mine, other in zip(found.faces, expected.faces, strict=True):
         np.testing.assert_allclose(mine, other, atol=1e-6)
     np.testing.assert_array_equal(found.confidence, expected.confidence)
-    np.testing.assert_array_equal(found.source, expected.source)

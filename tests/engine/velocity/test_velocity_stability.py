@@ -135,11 +135,10 @@ def rising_column(speed, frame):
     return np.exp(-(x**2 + y**2) / 25) * texture * ends, (x**2 + y**2 < 49) & (np.abs(z - 6) <= 2 + speed)
 
 
-@pytest.mark.parametrize("given", [False, True], ids=["found", "given"])
 @pytest.mark.parametrize("speed", [0.3, 1, 3])
-def test_smoke_rises_from_its_inlet(speed, given):
+def test_smoke_rises_from_its_inlet(speed):
     (before, _), (after, inlet) = rising_column(speed, 0), rising_column(speed, 1)
-    found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL, inflow=inlet if given else None))[..., 2]
+    found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL, inflow=inlet))[..., 2]
     for height in (6, 7, 8, 10, 14, 20, 30):
         assert 0.3 < np.average(found[..., height], weights=after[..., height]) / speed < 1.4
 
@@ -160,11 +159,10 @@ def test_smoke_that_is_gone_has_no_velocity(prediction):
 
 
 @pytest.mark.parametrize("before", [0.0, 1e-6, 1e-3])
-def test_smoke_that_was_not_there_is_a_source(before):
+def test_smoke_that_was_not_there_has_no_motion(before):
     density = moved((0, 0, 0))[0].astype(np.float32)
     found = estimate_velocity(before * density, density, DT, VOXEL)
     assert np.abs(voxels_a_frame(found)).max() == 0
-    np.testing.assert_allclose(found.source, (1 - before) * density / DT, rtol=1e-5)
     assert not found.confidence.any()
 
 

@@ -65,7 +65,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
         domain = shot.scene.domain
-        remarks = (*shot.remarks, *foreseen(shot), *boundaries(shot.scene, settings), *shot.estimates, *made_up(shot))
+        remarks = (*shot.remarks, *foreseen(shot), *boundaries(shot.scene), *shot.estimates, *made_up(shot))
         for remark in remarks:
             say.note(remark)
         work = Workload.of(shot, settings)

@@ -9,8 +9,9 @@ frame, the correction d of every cell, about as wide as a voxel of the velocity,
     r = after(x) - before(x - q(x)),     g = gradient of (after(x) + before(x - q(x))) / 2
 
 where before and after are roots of optical depths, so that thin smoke counts too. It is given to all voxels of a ray
-alike. Then the velocity is averaged along the line of sight: where along it smoke moves faster the pictures do not
-show, and the mean over what is possible hardly changes (docs/experiments/velocity-one-view.md).
+alike. Then the velocity is averaged along the line of sight. The depth and the profile of the smoke along a ray are
+assumed, and the expected velocity, the mean over all that they may be, hardly changes along it
+(docs/experiments/velocity-one-view.md).
 """
 
 from __future__ import annotations
@@ -23,13 +24,10 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
-from smokelift.density import ObservedView
-from smokelift.footage.images import Picture
-from smokelift.render import Volume
+from smokelift.checks.array_types import Array
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
-from smokelift.transport import Velocity, on_faces
-from smokelift.velocity.line_of_sight import averaged_along
+from smokelift.transport import Velocity, on_faces, without_divergence
 from smokelift.velocity.pyramid import coarsen
 
 CURVATURE, REST = 0.05, 0.14
@@ -42,20 +40,21 @@ TOLERANCE, MAX_STEPS = 1e-2, 50
 ANYWHERE = 1e-3
 """Share of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
 
+SPREAD = 1 / 8
+"""Standard deviation of the average, in shortest sides of the box, which is cut out around the smoke."""
 
-def followed_picture(view: ObservedView) -> Picture:
-    """What is followed of a camera's picture (rows, columns)."""
-    return np.sqrt(view.optical_depth)
+REACH = 2.5
+"""Reach of the average, in standard deviations."""
 
 
 def with_seen_motion(
-    velocity: Velocity, before: Picture, after: Picture, camera: Camera, domain: Domain, density: Volume, dt: float
+    velocity: Velocity, before: Array, after: Array, camera: Camera, domain: Domain, density: Array, dt: float
 ) -> Velocity:
     """A velocity that moves the smoke in the picture as the camera saw it move, averaged along the line of sight.
 
-    The velocity is on the density's grid or on one that was halved from it. `before` and `after` are what
-    `followed_picture` gives of two frames of the camera, `dt` seconds apart; domain and density (nx, ny, nz) are those
-    of the second.
+    The velocity is on the density's grid or on one that was halved from it. `before` and `after` (rows, columns)
+    are roots of the optical depths in two frames of the camera, `dt` seconds apart; domain and density (nx, ny, nz) are
+    those of the second.
     """
     middle = np.array(domain.centre)
     ray = np.array(camera.matrix)[:3, 2] if camera.type == "orthographic" else middle - camera.position
@@ -71,9 +70,34 @@ def with_seen_motion(
     return averaged_along(velocity, (float(ray[0]), float(ray[1]), float(ray[2])))
 
 
+def averaged_along(velocity: Velocity, line: tuple[float, float, float]) -> Velocity:
+    """A velocity averaged along a line of sight, without divergence; what is known of it stays as it is.
+
+    The line has any length and either direction.
+    """
+    kernel = _line(np.array(line) / np.linalg.norm(line), SPREAD * min(velocity.shape))
+    # one kernel for all components keeps the divergence zero, but not at the sides of the box
+    means = (ndimage.correlate(component, kernel, mode="nearest") for component in velocity.faces)
+    return velocity.with_faces(without_divergence(velocity.with_faces(means))[0].faces)
+
+
+def _line(direction: NDArray[np.float64], deviation: float) -> Array:
+    """A Gaussian of so many voxels on a line through the middle of a box: eight voxels share every point."""
+    ends = int(np.ceil(REACH * deviation))
+    along = np.arange(-ends, ends + 1)
+    points, amounts = along[:, None] * direction, np.exp(-0.5 * np.square(along / deviation))
+    half = np.ceil(np.abs(ends * direction)).astype(int) + 1
+    kernel = np.zeros(2 * half + 1)
+    low = np.floor(points).astype(int)
+    for corner in np.ndindex(2, 2, 2):
+        shares = np.prod(np.where(corner, points - low, 1 - (points - low)), axis=1)
+        np.add.at(kernel, tuple((low + corner + half).T), amounts * shares)
+    return np.asarray(kernel / kernel.sum(), np.float32)
+
+
 def _correction(
-    screen: _Screen, motion: NDArray[np.float64], before: Picture, after: Picture, smoke: NDArray[np.bool_]
-) -> NDArray[np.float32]:
+    screen: _Screen, motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
+) -> Array:
     """What the motion (cells, 2) of the picture lacks, in columns and rows a frame."""
     columns, rows = (screen.pixels @ motion).T.reshape(2, *after.shape)
     down, across = np.indices(after.shape)
@@ -143,14 +167,14 @@ class _Screen:
         stiffness *= sizes[0] * sizes[1]
         return _Screen(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
 
-    def mean_motion(self, motion: NDArray[np.float32], density: Volume) -> NDArray[np.float64]:
+    def mean_motion(self, motion: Array, density: Array) -> NDArray[np.float64]:
         """Mean along the rays (cells, 2), in columns and rows a frame, of a motion (nx, ny, nz, 3) in voxels."""
         weight = density.ravel() + ANYWHERE * float(density.max()) + np.finfo(np.float32).tiny
         across = np.einsum("nij,nj->ni", self.moved, motion.reshape(-1, 3))
         sums = self.voxels.T @ np.column_stack([weight[:, None] * across, weight])
         return np.asarray(sums[:, :2] / np.maximum(sums[:, 2:], np.finfo(np.float64).tiny))
 
-    def lifted(self, motion: NDArray[np.float32]) -> NDArray[np.float32]:
+    def lifted(self, motion: Array) -> Array:
         """The least motion (nx, ny, nz, 3) in voxels that looks like one of the picture, (cells, 2)."""
         seen = self.voxels @ motion
         return np.asarray(np.einsum("nij,nj->ni", self.least, seen).reshape(*self.shape, 3), np.float32)
