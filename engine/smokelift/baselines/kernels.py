@@ -2,19 +2,35 @@
 # Taichi compiles this module: its annotations are no Python types.
 """The paper's light volume, algorithm 2 with its record, and algorithm 3; `paper_renderer` has the formulas.
 
-The medium is [x + 1, y + 1, z + 1, channel] with a border of one voxel, as the light sweeps read and write it:
-extinction, then J of one light. In-scattered radiance is [x, y, z, value]: J of every channel, of all lights, then J x
-way of the light of every channel. Positions are in voxels, voxel
+Extinction is [x + 1, y + 1, z + 1, 0] with a border of one voxel, as the light sweeps read it. In-scattered radiance
+is [x, y, z, value]: J of every channel, then J x way of the light of every channel. Positions are in voxels, voxel
 centres at integers. Volumes are read trilinearly, and beyond the outermost centres as the nearest voxel, so that a
 sample's weights always add up to one.
 """
 
 import taichi as ti
 
-from smokelift.render.gpu.camera_kernels import ndarray2
-from smokelift.render.gpu.light_kernels import ndarray3, ndarray4, vec3
+from smokelift.render.gpu.light_kernels import (
+    affine,
+    faces_voxel,
+    ndarray3,
+    ndarray4,
+    parallel_at_voxel,
+    phase,
+    point_at_voxel,
+    vec2,
+    vec3,
+)
 
+ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
 samples_type = ti.types.ndarray(dtype=ti.i32, ndim=3)
+
+
+@ti.kernel
+def pack(density: ndarray3, extinction: ndarray4, per_density: ti.f32):
+    """Write the extinction (1/m) of every voxel; ``per_density`` is that at density 1."""
+    for index in ti.grouped(ti.ndrange(*density.shape)):
+        extinction[index[0] + 1, index[1] + 1, index[2] + 1, 0] = per_density * density[index]
 
 
 @ti.func
@@ -27,22 +43,70 @@ def _way(index, size, travel, voxel_size):
     return voxel_size * shortest * travel.norm()
 
 
-@ti.kernel
-def add_light(
-    medium: ndarray4, inscatter: ndarray4, diverging: ti.f32, start: vec3, voxel_size: ti.f32, channels: ti.template()
-):
-    """J and J x way += those of one light, whose J is in the medium.
+@ti.func
+def _write(inscatter: ti.template(), index, energy, lit, way, channels: ti.template(), add):
+    for c in ti.static(range(channels)):
+        here = energy[c] * lit
+        shadowed = here * way
+        if add != 0:
+            here += inscatter[index[0], index[1], index[2], c]
+            shadowed += inscatter[index[0], index[1], index[2], channels + c]
+        inscatter[index[0], index[1], index[2], c] = here
+        inscatter[index[0], index[1], index[2], channels + c] = shadowed
 
-    Light travels along ``start`` if it is parallel (``diverging`` 0), else (1) along the voxel's index plus ``start``.
-    """
+
+@ti.kernel
+def shade_parallel(
+    columns: ndarray3,
+    inscatter: ndarray4,
+    axis: ti.template(),
+    slope_b: ti.f32,
+    slope_c: ti.f32,
+    first: ti.i32,
+    step: ti.f32,
+    direction: vec3,
+    energy: vec3,
+    to_eye: affine,
+    anisotropy: ti.f32,
+    albedo: ti.f32,
+    voxel_size: ti.f32,
+    channels: ti.template(),
+    add: ti.i32,
+):
+    """Write, or ``add``, J = albedo p E V and J x way of a parallel light from its sweep."""
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
-        i, j, k = index[0], index[1], index[2]
-        way = _way(index, size, diverging * index + start, voxel_size)
-        for c in ti.static(range(channels)):
-            lit = medium[i + 1, j + 1, k + 1, c + 1]
-            inscatter[i, j, k, c] += lit
-            inscatter[i, j, k, channels + c] += lit * way
+        lit = phase(index, to_eye, direction, anisotropy, albedo)
+        lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
+        _write(inscatter, index, energy, lit, _way(index, size, direction, voxel_size), channels, add)
+
+
+@ti.kernel
+def shade_point(
+    columns: ndarray3,
+    inscatter: ndarray4,
+    axis: ti.template(),
+    travel: ti.i32,
+    first: ti.i32,
+    far: ti.f32,
+    begin: vec2,
+    position: vec3,
+    energy: vec3,
+    to_eye: affine,
+    anisotropy: ti.f32,
+    albedo: ti.f32,
+    voxel_size: ti.f32,
+    channels: ti.template(),
+    add: ti.i32,
+):
+    """Write, or ``add``, the same of a point light, for the voxels of one face's sweep."""
+    size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
+    for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
+        if faces_voxel(axis, travel, position, index):
+            away = index - position
+            lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
+            lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
+            _write(inscatter, index, energy, lit, _way(index, size, away, voxel_size), channels, add)
 
 
 @ti.func
@@ -75,7 +139,7 @@ def _corner(low, high, fraction, corner: ti.template()):
 
 @ti.kernel
 def march(
-    medium: ndarray4,
+    extinction: ndarray4,
     inscatter: ndarray4,
     first: ndarray3,
     step: ndarray3,
@@ -106,7 +170,7 @@ def march(
             low, high, fraction = _cell(p, size)
             for corner in ti.static(range(8)):
                 index, weight = _corner(low, high, fraction, corner)
-                kappa += weight * medium[index[0] + 1, index[1] + 1, index[2] + 1, 0]
+                kappa += weight * extinction[index[0] + 1, index[1] + 1, index[2] + 1, 0]
                 for m in ti.static(range(2 * channels if shadows else channels)):
                     glow[m] += weight * inscatter[index[0], index[1], index[2], m]
             tau = ti.exp(-optical_depth)

@@ -44,7 +44,7 @@ from smokelift.render.gpu import taichi_runtime as taichi
 # isort: split
 # what imports Taichi comes after the runtime, which suppresses its greeting
 from smokelift.baselines import kernels as kernels
-from smokelift.render.gpu import camera_kernels, light_kernels
+from smokelift.render.gpu import light_kernels
 from smokelift.render.light_sweeps import ParallelSweep
 from smokelift.render.plan import plan_render
 from smokelift.render.renderer import Image, Volume
@@ -79,8 +79,7 @@ class PaperRenderer:
         self._channels = len(self._colour)
         x, y, z = domain.resolution
         self._to_eye = taichi.matrix(setup.to_eye)
-        self._everywhere = taichi.upload(np.ones((x, y, z), np.int32))
-        self._medium = taichi.zeros((x + 2, y + 2, z + 2, self._channels + 1))
+        self._extinction = taichi.zeros((x + 2, y + 2, z + 2, 1))
         self._inscatter = taichi.zeros((x, y, z, 2 * self._channels))
         self._columns: dict[tuple[int, int, int], Any] = {}
         if self._lights and not self._shadows:
@@ -98,11 +97,11 @@ class PaperRenderer:
 
     def image(self, density: Volume) -> Image:
         """Render a density (nx, ny, nz) in linear radiance (rows, columns, 3), and record its derivatives."""
-        camera_kernels.pack(taichi.upload(density), self._everywhere, self._medium, self.medium.extinction)
+        kernels.pack(taichi.upload(density), self._extinction, self.medium.extinction)
         if self._shadows:
             self._shade()
         kernels.march(
-            self._medium, self._inscatter, self._first, self._step, self._samples,
+            self._extinction, self._inscatter, self._first, self._step, self._samples,
             self._position, self._grad, self._scattered, self._depth,
             self.medium.extinction, self.domain.voxel_size, self._shadows, self._channels,
         )  # fmt: skip
@@ -127,31 +126,26 @@ class PaperRenderer:
 
     def _shade(self) -> None:
         """Make the volume of in-scattered radiance, by the exact renderer's sweeps."""
-        medium = self.medium
-        self._inscatter.fill(0.0)
-        for light in self._lights:
-            volumes = (self._everywhere, self._medium, self._medium)
+        h, medium = self.domain.voxel_size, self.medium
+        for number, light in enumerate(self._lights):
             energy = taichi.vector(np.resize(light.energy, 3))
-            scatters = (energy, self._to_eye, medium.anisotropy, medium.albedo, 0, False)
+            scatters = (energy, self._to_eye, medium.anisotropy, medium.albedo, h, self._channels, number)
             if isinstance(light, ParallelSweep):
                 slopes = (*light.slope, light.first)
                 x, y, z = (n + (axis != light.axis) for axis, n in enumerate(self.domain.resolution))
                 columns = self._buffer((x, y, z))
-                light_kernels.accumulate_columns(self._medium, columns, light.axis, light.travel, *slopes)
-                direction = taichi.vector(light.direction)
-                light_kernels.scatter_parallel(
-                    columns, *volumes, light.axis, *slopes, light.step, direction, *scatters
+                light_kernels.accumulate_columns(self._extinction, columns, light.axis, light.travel, *slopes)
+                kernels.shade_parallel(
+                    columns, self._inscatter, light.axis, *slopes, light.step,
+                    taichi.vector(light.direction), *scatters,
                 )  # fmt: skip
-                travel = (0.0, direction)
-            else:
-                for face in light.faces:
-                    columns = self._buffer((face.planes, face.columns_b[1], face.columns_c[1]))
-                    begin = taichi.vector(np.array([face.columns_b[0], face.columns_c[0]]))
-                    rays = (face.axis, face.travel, face.first, face.far, begin, taichi.vector(light.position))
-                    light_kernels.accumulate_rays(self._medium, columns, *rays, light.voxel_size)
-                    light_kernels.scatter_point(columns, *volumes, *rays, *scatters)
-                travel = (1.0, taichi.vector(-light.position))
-            kernels.add_light(self._medium, self._inscatter, *travel, self.domain.voxel_size, self._channels)
+                continue
+            for face in light.faces:
+                columns = self._buffer((face.planes, face.columns_b[1], face.columns_c[1]))
+                begin = taichi.vector(np.array([face.columns_b[0], face.columns_c[0]]))
+                rays = (face.axis, face.travel, face.first, face.far, begin, taichi.vector(light.position))
+                light_kernels.accumulate_rays(self._extinction, columns, *rays, light.voxel_size)
+                kernels.shade_point(columns, self._inscatter, *rays, *scatters)
 
     def _buffer(self, shape: tuple[int, int, int]) -> Any:
         if shape not in self._columns:
