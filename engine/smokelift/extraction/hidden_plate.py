@@ -88,8 +88,8 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
 def _likeliest(frames: Sequence[Cells], plate: Plate, source: Picture) -> Picture:
     """The plate by cell (rows, columns, 3) that best explains all frames as mixtures, beside its continuation.
 
-    A frame's loss is that of the noise's Student t distribution at the likeliest T. J varies in brightness by
-    `BRIGHTNESS_RANGE`, so its variance is 1 - T times that along J; errors of the continuation are normal.
+    A frame's loss is that of the noise's Student t distribution at the likeliest T. The brightness of J varies by
+    `BRIGHTNESS_RANGE`, and so does that of S = (1 - T) J; errors of the continuation are normal.
     """
     start = frames[0].behind
     where = frames[0].unknown > MIN_UNKNOWN
@@ -114,7 +114,7 @@ def _likeliest(frames: Sequence[Cells], plate: Plate, source: Picture) -> Pictur
 
 
 def _misfit(left: Picture, sent: Picture, noise: Picture) -> Picture:
-    """The loss (n,) of what smoke should send in cells, ``left`` (n, 3), where it sends ``sent`` (3,) on the mean."""
+    """The loss (n,) of cells of which T B leaves ``left`` (n, 3) for S, whose mean is ``sent`` (3,)."""
     apart, spread = left - sent, np.square(BRIGHTNESS_RANGE)
     along = spread * np.square(apart @ sent) / (noise + spread * (sent @ sent))
     squares = (np.square(apart).sum(-1) - along) / noise

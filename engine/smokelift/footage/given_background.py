@@ -12,7 +12,7 @@ from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import is_pattern, is_video
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
-from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
+from smokelift.scene import Background, Camera, Scene, shared_part
 
 ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.9
 """Difference in sRGB values up to which a pixel has a backdrop's colour, and smallest share of such pixels: the others
@@ -75,7 +75,7 @@ def _mean_of_frames(numbers: Sequence[int], clip: Clip) -> Picture:
     return np.asarray(sum(whole.frame(number) for number in numbers) / np.float32(len(numbers)), np.float32)
 
 
-def background_picture(scene: Scene | CompleteScene, camera: Camera | None = None) -> Picture:
+def background_picture(scene: Scene, camera: Camera | None = None) -> Picture:
     """Return the linear background as a camera sees it: (rows, columns, 3), or (3,) if it is one colour.
 
     A plate that changes is shown at the clip's first frame; without a background it is black. The camera is by default

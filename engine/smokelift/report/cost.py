@@ -77,7 +77,7 @@ TIMED, TIMES = (64, 64, 64), 40
 """Voxels of the grid whose solve is timed, and how often: the processor's clock of some systems counts in 16 ms."""
 
 WORKERS = 2
-"""Threads of a solve that is timed."""
+"""Threads of a run, which share the processor time of a solve."""
 
 BYTES_A_SIMULATED_VOXEL = 170
 """Bytes at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a ball, less
@@ -223,7 +223,7 @@ def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
 def _seconds_a_voxel() -> float:
     """Return the seconds that a Poisson solve takes on this machine for each voxel; timed once.
 
-    By the time of its threads on the processor: what passes is up to three times as much while other programs, or a run
+    By its processor time on one thread: what passes is up to three times as much while other programs, or a run
     of our own, are at work.
     """
     field = np.zeros(TIMED, np.float32)
