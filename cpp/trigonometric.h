@@ -1,6 +1,6 @@
 // Discrete cosine and sine transforms of lines (Strang 1999, SIAM Review 41, 135; Martucci 1994, IEEE Trans.
 // Signal Processing 42, 1038). A solve takes half the time that it takes with a library's
-// (docs/experiments/transport-scheme.md).
+// (docs/experiments/velocity-solver.md).
 #pragma once
 
 #include <vector>

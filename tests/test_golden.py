@@ -44,7 +44,7 @@ GOLDEN: Mapping[str, Figures] = {
 
 DECIBELS = 0.13
 """Half the width of the band of ``psnr``: whole runs that differ in rounding alone differ by up to so much
-(docs/experiments/long-runs.md). These short shots differ by 0.001 dB and 0.1 % where the extinction differs by 1e-6 to
+(CONTRIBUTING.md, *Pages*). These short shots differ by 0.001 dB and 0.1 % where the extinction differs by 1e-6 to
 1e-4, and not at all by the number of threads: another compiler or processor stays well inside."""
 
 FRACTION = 10 ** (DECIBELS / 20) - 1

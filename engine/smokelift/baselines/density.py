@@ -68,7 +68,7 @@ class FixedRateDescent:
     ----------
     rate
         Change of density by one step in the steepest voxel of the prior's fog. The paper gives no figure
-        (docs/experiments/paper-baseline.md).
+        (docs/experiments/density-descent.md).
     iterations
         Largest number of steps.
     least_loss

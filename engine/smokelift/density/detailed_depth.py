@@ -66,7 +66,7 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 
 FRESH_STEP, CARRIED_STEP = 0.6, 0.5
 """Shares of a step towards a picture that are made, for fresh smoke and for carried smoke: more of the second flickers
-(docs/experiments/level-layers.md)."""
+(docs/experiments/every-view.md)."""
 
 STEP_RANGE = (0.3, 3.0)
 """Largest change of a ray's smoke in one step."""

@@ -5,7 +5,7 @@ vertical that faces these rays. The planes of all azimuths share the vertical. S
 up as 1 / k at a wave number k across the vertical, and smoke is drawn up in level layers (backprojection without its
 ramp filter: Kak and Slaney, "Principles of Computerized Tomographic Imaging", 1988, ch. 3). Here every wave of a
 picture is weighed by the root of the sine of its angle with the vertical. That undoes the layers and keeps how much of
-each size there is (docs/experiments/level-layers.md).
+each size there is (docs/experiments/every-view.md).
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ true smoke dark rays are longer than thin ones, by which a smooth answer gains n
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
 density can have, so a ray's middle is moved along it until most of the profile is inside too
-(docs/experiments/support.md).
+(docs/experiments/density-profile.md).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ how far its width may be wrong (docs/experiments/every-view.md)."""
 
 ROOM = 0.5
 """Distance, in A, of a ray's middle from the ends of its way through the domain: about four fifths of the profile
-are inside then (docs/experiments/support.md)."""
+are inside then (docs/experiments/density-profile.md)."""
 
 SILHOUETTE = 0.05
 """Share of the smoke's usual amount from which a pixel belongs to the silhouette

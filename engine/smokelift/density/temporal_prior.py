@@ -32,7 +32,7 @@ has entered, or has moved otherwise than was predicted."""
 
 MIN_NEW_DENSITY = np.float32(0.3)
 """Mean densities of the smooth answer below which nothing is taken to have entered. Faint smoke that leaves at the
-support's edge would be filled up again in every frame and show as a shell (docs/experiments/level-layers.md)."""
+support's edge would be filled up again in every frame and show as a shell (docs/experiments/every-view.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ class GuidedSimulation:
 
     Detail is born where nothing is carried, at inlets above all, and moves on from there. A hole at an inlet is
     narrower than the blur, and a gap may be detail: the smooth answer, which has no gaps, tells them apart
-    (docs/experiments/level-layers.md). `kept` is the share of the detail that a frame takes over: the rest is renewed
+    (docs/experiments/every-view.md). `kept` is the share of the detail that a frame takes over: the rest is renewed
     (docs/experiments/every-view.md). `share` is that of `BlendCarried`, which stands in where the depth prior makes
     nothing up.
     """

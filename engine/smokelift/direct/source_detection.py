@@ -37,7 +37,7 @@ class ResidualMeans(NamedTuple):
 
 @dataclass(frozen=True)
 class SourceDetection:
-    """How smoke that enters is distinguished from motion. docs/experiments/velocity-sources.md has the sweeps.
+    """How smoke that enters is distinguished from motion. docs/experiments/velocity-weights.md has the sweeps.
 
     Attributes
     ----------

@@ -5,7 +5,7 @@ does not. So where B has detail, how much of it is left shows T, whatever the li
 brightness do. S = (1 - T) J, with the source radiance J of smoke in a light: its brightness varies by shadows, its
 color hardly. The opacity 1 - T and ln J are sums over the levels of a pyramid, whose coefficients are independent
 (`cpp/extraction.cpp` solves for them). What does not fit, such as a hand before the smoke, counts less: it is an
-outlier of the noise. Figures: docs/experiments/extraction.md, docs/experiments/unseen-extraction.md.
+outlier of the noise. Figures: docs/experiments/extraction.md.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 A patch is smoke if noise makes so large and so strong a one too rarely: `FALSE_ALARMS` are expected in a picture of any
 size (Desolneux, Moisan and Morel, "Meaningful alignments", 2000). So a wide veil may be hardly above the noise, while a
 speck must be far above it. Within a patch, the more a pixel deviates, the more certain it is.
-Figures: docs/experiments/background.md, docs/experiments/support.md.
+Figures: docs/experiments/background.md, docs/experiments/density-profile.md.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PATCH_GROWTH = 4.06
 "Statistics of lattice animals", 2000)."""
 
 MIN_DEVIATION, FULL_DEVIATION = 1.5, 3.0
-"""Deviations above which a pixel counts, and counts fully, in units of noise (docs/experiments/support.md)."""
+"""Deviations above which a pixel counts, and counts fully, in units of noise (docs/experiments/density-profile.md)."""
 
 MEASURED_DEVIATION = 4.0
 """Deviation, in units of noise, above which smoke is used to measure the box, the light and the colour."""

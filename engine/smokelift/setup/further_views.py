@@ -3,7 +3,7 @@
 Cameras have exposures and white balances of their own. But every slice across two cameras holds as much smoke in one
 picture as in the other. So one density is fitted to both, on coarse frames. A camera's gain is how much brighter than
 that density it shows the smoke, over how much brighter the input does. Both are fitted again with the gain evened out,
-until little is left. Figures: docs/experiments/view-gain.md.
+until little is left. Figures: docs/experiments/further-views.md.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ SAME_RATE = 0.01
 """Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""
 
 ROUNDS = 3
-"""Fits from which a gain is found: a fourth changes it by .3 % at most (docs/experiments/view-gain.md)."""
+"""Fits from which a gain is found: a fourth changes it by .3 % at most (docs/experiments/further-views.md)."""
 
 RATIO = 1.35
 """Smallest ratio of brightness that is the cameras' own, where light is assumed to come from everywhere. Smoke lit from
-one side is brighter there: cameras exposed alike differ by up to 1.30 (docs/experiments/view-gain.md)."""
+one side is brighter there: cameras exposed alike differ by up to 1.30 (docs/experiments/further-views.md)."""
 
 MAX_GAIN = 8.0
 """Largest gain, and the inverse of the smallest: three stops. What asks for more has another background."""

@@ -3,7 +3,7 @@
 A pixel shows T behind + (1 - T) source, where the source radiance is the light times the smoke's colour. So the source
 lies on the line from the background through the smoke, beyond the thickest smoke that is seen. Before black that line
 has one colour, else many. Smoke has a colour of its own if no source on the line has one that light may have: white, as
-cameras balance it, or the background's, which stands in the same light. Figures: docs/experiments/smoke-color.md.
+cameras balance it, or the background's, which stands in the same light. Figures: docs/experiments/unknown-light.md.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ class SelectionSettings:
         (docs/experiments/scattering.md).
     velocity_side
         Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
-        velocities follow its errors (docs/experiments/velocity-grid.md).
+        velocities follow its errors (docs/experiments/velocity-solver.md).
     """
 
     measure: bool = True

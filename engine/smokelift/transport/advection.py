@@ -43,7 +43,7 @@ def advect(
         For a density: restore the mass, which a flow without divergence keeps. Mass that leaves through open sides is
         gone; none comes in. The repair goes where interpolation is in doubt, that is, where the two schemes differ,
         and changes each voxel by no more than they differ there. All smoke shares the rest in proportion. The repair
-        makes nothing negative and no smoke where there is none. docs/experiments/transport-scheme.md has the drift
+        makes nothing negative and no smoke where there is none. docs/experiments/velocity-solver.md has the drift
         without it.
 
     Returns
@@ -62,7 +62,7 @@ def advect(
     -----
     The way back is one straight step, whatever its length. For an estimated velocity that is exact, since it is
     the displacement at arrival. A physical path bends, but neither a midpoint step nor two half steps predict baked
-    scenes better (docs/experiments/transport-scheme.md).
+    scenes better (docs/experiments/velocity-solver.md).
 
     Examples
     --------

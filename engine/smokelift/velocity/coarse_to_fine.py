@@ -32,7 +32,7 @@ anew in every frame moves as well (docs/experiments/velocity-one-view.md)."""
 
 COARSEST_SIDE, MIN_SIDE = 30, 8
 """Voxels along the longest side of the first grid at most, as in a reconstruction, if no side gets shorter than the
-second. Motion of several voxels is found there (docs/experiments/velocity-pyramid.md)."""
+second. Motion of several voxels is found there (docs/experiments/velocity-solver.md)."""
 
 IRROTATIONAL = 0.05
 """Weight of vorticity where there is no smoke that could show it (docs/experiments/velocity-weights.md)."""
@@ -47,11 +47,11 @@ proportion to that share, down to the second one (docs/experiments/velocity-weig
 
 WORTHLESS = 0.5
 """Share of the change left unexplained from which a prediction is not used: after a cut, say, or a gust
-(docs/experiments/velocity-momentum.md)."""
+(docs/experiments/velocity-weights.md)."""
 
 MAX_INCREMENT = 1.0
 """Voxels of the grid at hand. A linearisation of the density holds no further, so the increment is clamped
-(docs/experiments/velocity-pyramid.md)."""
+(docs/experiments/velocity-solver.md)."""
 
 CONFIDENCE_WIDTH = 2.0
 """Standard deviation (voxels) over which gradients count: smoothness carries what they show about as far."""
@@ -71,7 +71,7 @@ class VelocitySettings:
         leaves at most 30 voxels along the longest side in a clip (see `smokelift.setup`), and the densities' own grid
         between two densities alone.
     linearisations
-        Linearisations on each grid (velocity-pyramid.md).
+        Linearisations on each grid (docs/experiments/velocity-solver.md).
     smoothness
         Weight of the differences of vorticity.
     solver

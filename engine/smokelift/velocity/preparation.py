@@ -27,11 +27,11 @@ BLUR = 0.5
 
 NOISE = 0.35
 """Allowed noise in the difference of two densities, divided by the root mean square gradient: voxels of motion
-(docs/experiments/velocity-noise.md)."""
+(docs/experiments/velocity-weights.md)."""
 
 SMOOTH = 0.045
 """Noise in the same unit below which densities are smooth already, and neither blurred nor compressed
-(docs/experiments/velocity-noise.md)."""
+(docs/experiments/velocity-weights.md)."""
 
 NOISE_WIDTHS = (1.0, 1.5, 2.0)
 """Standard deviations (voxels) to choose from where the usual blur leaves too much noise."""

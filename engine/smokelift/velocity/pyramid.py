@@ -12,7 +12,7 @@ from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, faces_in,
 SMOOTHING = 1 / 4
 """Weight of each neighbour along an axis, which leaves nothing of what changes its sign from voxel to voxel.
 
-What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-grid.md)."""
+What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-solver.md)."""
 
 
 def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
