@@ -6,7 +6,7 @@ rest of the file may show what is behind the smoke of a short part.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -116,20 +116,19 @@ class Proxy:
     def shot(self, clip: Clip) -> tuple[Proxy, tuple[int, int] | None]:
         """Return the frames of a clip's shot, and the file's frames before and after a cut within the clip, if any.
 
-        At a cut most of the picture changes at once and for good, while little changes just before and after it.
+        At a cut most of the picture changes at once and for good, while little changes in as many frames beside it: on
+        the clip's side, for beyond a cut anything may be; on both sides of one within the clip, which smoke may fill.
         """
         tiny = [small(picture) for picture in self.pictures]
-        shares = [_alike(one, other) for one, other in pairwise(tiny)]
         first, last, within = self.numbers[0], self.numbers[-1], None
-        for n in range(len(shares)):
-            # at either end of the file a change is its own neighbour
-            least = max if n in (0, len(shares) - 1) else min
-            beside = least(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
-            if shares[n] >= SAME_SHOT or beside < STEADY:
+        for n, (before, after) in enumerate(pairwise(self.numbers)):
+            if _alike(tiny[n], tiny[n + 1]) >= SAME_SHOT:
+                continue
+            steady = self._steady(tiny, n)
+            if (steady[1] if after <= self.clip[0] else steady[0] if before >= self.clip[1] else min(steady)) < STEADY:
                 continue
             if _alike(*(np.median(side, axis=0) for side in (tiny[: n + 1], tiny[n + 1 :]))) >= SAME_SHOT:
                 continue
-            before, after = self.numbers[n], self.numbers[n + 1]
             if after <= self.clip[0]:
                 first = after
             elif before >= self.clip[1]:
@@ -137,6 +136,19 @@ class Proxy:
             elif within is None:
                 within = _cut(clip, before, after, tiny[n], tiny[n + 1])
         return self.between(first, last), within
+
+    def _steady(self, tiny: Sequence[Picture], n: int) -> tuple[float, float]:
+        """How alike frames are before frame ``n``, and after the next, in as many frames as lie between these two.
+
+        At either end of the file there are none; then it is what the other side says.
+        """
+        before, after = self.numbers[n], self.numbers[n + 1]
+        earlier = [other for other in range(n) if self.numbers[other] <= 2 * before - after]
+        later = [other for other in range(n + 2, len(tiny)) if self.numbers[other] >= 2 * after - before]
+        one = _alike(tiny[earlier[-1]], tiny[n]) if earlier else None
+        other = _alike(tiny[n + 1], tiny[later[0]]) if later else None
+        sides = [side for side in (one, other) if side is not None] or [0.0]
+        return sides[0], sides[-1]
 
     def only(self, which: NDArray[np.intp]) -> Proxy:
         """Return some of the frames, by their indices here."""

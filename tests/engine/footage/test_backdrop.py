@@ -92,6 +92,19 @@ def test_a_trimmed_clip_has_the_background_of_its_file(tmp_path: Path) -> None:
     assert np.percentile(codes_apart(plate.image, truth), 95) < 5
 
 
+def test_what_follows_a_cut_is_not_behind_the_smoke(tmp_path: Path) -> None:
+    """A shot that stands still, and after it pictures of which none is like the next."""
+    truth, random = wall(0.2, 0.5), np.random.default_rng(3)
+    film(tmp_path, truth, puff, 0.6)
+    for n in range(14, COUNT):
+        shown = np.kron(random.uniform(0, 0.6, (HEIGHT // 8, WIDTH // 8, 3)), np.ones((8, 8, 1)))
+        write_image(tmp_path / f"frame_{n:03d}.png", srgb_to_linear(shown))
+    clip = Clip.open(tmp_path / "frame_###.png", fps=24, frames=(4, 8))
+    found = find_backdrop(clip, None, None)
+    assert found.shot == (0, 13)
+    assert np.percentile(codes_apart(found.plates.at(0).image, truth), 95) < 8
+
+
 @pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
 def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
     truth = np.full((HEIGHT, WIDTH, 3), colour)
