@@ -4,7 +4,8 @@ A plate that was found in a clip is continued from its surroundings where no fra
 of what is there, in each frame another part. The turns start from the plate that explains all frames best, cell by
 cell: in each of them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T. Then what an element leaves
 of a picture, (I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to
-the last shows next to nothing, and what is behind it stays as it was.
+the last shows next to nothing, and what is behind it stays as it was. Of the J that is found before the turns and the
+one found after them, that with which the frames are likelier is the smoke's.
 """
 
 from __future__ import annotations
@@ -53,7 +54,11 @@ def plates_and_source(clip: Clip, shot: Clip, plates: Plates, smoky: Sequence[in
     if not isinstance(plates, Plate):
         return plates, source
     better = plate_in_turn(shot, plates, source)
-    return better, source if better is plates else clip_source(clip, better, smoky)
+    if better is plates:
+        return plates, source
+    shrunk, sources = _shrunk(shot, plates), (source, clip_source(clip, better, smoky))
+    # a plate that holds bright smoke makes what it leaves look like dark smoke
+    return better, min(sources, key=lambda each: _likeliest(*shrunk, each)[1])
 
 
 def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
@@ -63,14 +68,10 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
     """
     if (1 - plate.confidence).mean() < MIN_UNKNOWN or not plate.errors.any():
         return plate
-    size = reduced_size(*clip.size, SIDE)
-    finer = tuple(min(round(FINER * cells), pixels) for cells, pixels in zip(size, clip.size, strict=True))
-    pictures = [clip.stored(frame).averaged(*finer) for frame in clip.spread(FRAMES)]
-    pixels = clip.size[0] * clip.size[1] / (finer[0] * finer[1])
-    first = found = plate.through(lambda part: area_average(part, *finer), pixels)
+    pictures, first, size = _shrunk(clip, plate)
     behind = area_average(first.image, *size)
     variance = float(np.trace(plate.errors)) / 3
-    start = _likeliest([Cells.of(picture, first, size) for picture in pictures], first, source)
+    start, _ = _likeliest(pictures, first, size, source)
     found = replace(first, image=_changed(first, start - behind))
     for _ in range(TURNS):
         best, clearest = np.zeros_like(behind[..., :1]), start
@@ -85,12 +86,25 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
     return replace(plate, image=_changed(plate, change), confidence=confidence)
 
 
-def _likeliest(frames: Sequence[Cells], plate: Plate, source: Picture) -> Picture:
+def _shrunk(clip: Clip, plate: Plate) -> tuple[list[Picture], Plate, tuple[int, int]]:
+    """Some frames of a clip and its plate, some pixels to a cell, and the numbers of columns and rows of cells."""
+    size = reduced_size(*clip.size, SIDE)
+    finer = [min(round(FINER * cells), pixels) for cells, pixels in zip(size, clip.size, strict=True)]
+    pixels = clip.size[0] * clip.size[1] / (finer[0] * finer[1])
+    pictures = [clip.stored(frame).averaged(*finer) for frame in clip.spread(FRAMES)]
+    return pictures, plate.through(lambda part: area_average(part, *finer), pixels), size
+
+
+def _likeliest(
+    pictures: Sequence[Picture], plate: Plate, size: tuple[int, int], source: Picture
+) -> tuple[Picture, float]:
     """The plate by cell (rows, columns, 3) that best explains all frames as mixtures, beside its continuation.
 
-    A frame's loss is that of the noise's Student t distribution at the likeliest T. The brightness of J varies by
-    `BRIGHTNESS_RANGE`, and so does that of S = (1 - T) J; errors of the continuation are normal.
+    The other value is its mean loss. A frame's is that of the noise's Student t distribution at the likeliest T. The
+    brightness of J varies by `BRIGHTNESS_RANGE`, and so does that of S = (1 - T) J; errors of the continuation are
+    normal.
     """
+    frames = [Cells.of(picture, plate, size) for picture in pictures]
     start = frames[0].behind
     where = frames[0].unknown > MIN_UNKNOWN
     continued = start[where].astype(np.float64)
@@ -110,7 +124,7 @@ def _likeliest(frames: Sequence[Cells], plate: Plate, source: Picture) -> Pictur
         best, least = np.where(better[:, None], each, best), np.minimum(loss, least)
     found = start.copy()
     found[where] = best
-    return found
+    return found, float(least.mean())
 
 
 def _misfit(left: Picture, sent: Picture, noise: Picture) -> Picture:
