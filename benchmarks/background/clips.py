@@ -13,7 +13,7 @@ import numpy.typing as npt
 from av.video.reformatter import Interpolation
 from scipy import ndimage
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
@@ -123,12 +123,12 @@ class Case:
 class Frames:
     """Frames in memory; a `smokelift.footage.frame_source.FrameSource`."""
 
-    warning: Remark | None = None
+    warning: Finding | None = None
     lens: float | None = None
     backdrop: float | None = None
     fps = FPS
     files: tuple[Path, ...] = ()
-    notes: tuple[Remark, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.background.clips import Smoke, backdrop, exposed, filmed, sky, wall
+from smokelift.checks import UNDETERMINED
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
-from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.medium import smoke_colour, source_radiance
 

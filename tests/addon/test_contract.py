@@ -17,6 +17,7 @@ from addon.pictures import Pictures, pictures_from
 from addon.toml import dumps
 from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.commands import continue_, loop, retime
+from smokelift.checks import Source
 from smokelift.direct import new_sequence, playback
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import numbered_pictures
@@ -24,7 +25,6 @@ from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.layout import INDEX, frame_path, proxy_path
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS
-from smokelift.report.provenance import Origin
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 from smokelift_command import BAD_INPUT, CANCELLED, DONE
@@ -38,7 +38,7 @@ def test_names_are_the_engines() -> None:
     assert contract.PROXY_FILE.format(12) == proxy_path(Path(), 12).name
     assert contract.PROXY_VOXELS == MIN_PROXY_VOXELS
     assert (contract.EXPORT_FILE, contract.ASSET_FILE) == (NOTE, ASSET)
-    assert contract.MADE_UP in get_args(Origin)
+    assert contract.MADE_UP in get_args(Source)
     assert contract.QUALITIES == QUALITIES
     assert sorted(contract.SIDES) == sorted(SIDES)
 

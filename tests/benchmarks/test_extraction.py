@@ -86,7 +86,7 @@ def test_scene_files_know_the_plate_a_frame_or_nothing(before_planks) -> None:
     named = Scene.load(before_planks / f"{FRAME}.toml")
     assert named.clip is not None and named.background == Background(frame=(0,))
     with Clip.open(named.clip) as clip, Clip.open(unknown.clip) as used:
-        assert clip.first == 1 and len(clip) == len(used) == FRAMES
+        assert clip.numbers[0] == 1 and len(clip) == len(used) == FRAMES
         empty = clip.whole().frame(0)
     assert np.abs(empty - read_image(before_planks / "plate.png")).mean() < 0.02
 

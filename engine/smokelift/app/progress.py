@@ -17,9 +17,9 @@ from typing import Any, Literal, Protocol, Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from smokelift.checks import Doubt, Figures, Remark, printable
+from smokelift.checks import Figures, Finding, printable
 from smokelift.output.sequence import Sequence
-from smokelift.report.sentences import all_figures, sentence
+from smokelift.report.views import message, sentence
 
 Style = Literal["text", "json"]
 
@@ -70,7 +70,7 @@ class Reporter(Protocol):
         """The frames' bar ends."""
         return
 
-    def note(self, said: Remark | str) -> None:
+    def note(self, said: Finding | str) -> None:
         """Something that was assumed or noticed."""
 
     def start(self, total: int, done: int, seconds: float | None = None) -> None:
@@ -79,7 +79,7 @@ class Reporter(Protocol):
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         """One more frame is finished."""
 
-    def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
+    def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
         """The job is done."""
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
@@ -103,7 +103,7 @@ def say_sequence(
 ) -> None:
     """Say every frame of a sequence while it is written, the first number being ``start``; and how it ends.
 
-    The last sentence is a remark of ``kind`` with ``figures`` of its own.
+    The last sentence is a finding of ``kind`` with ``figures`` of its own.
     """
     began, new = time.monotonic(), set[int]()
     for number, of_frame in written:
@@ -114,7 +114,7 @@ def say_sequence(
     earlier = seconds_before(Sequence.open(directory), new) if min(new, default=start) > start else 0.0
     seconds = round(time.monotonic() - began + earlier, 1)
     result: Figures = {"directory": str(directory), "frames": total, "seconds": seconds}
-    say.finish(Remark(kind, {**result, **figures}), result)
+    say.finish(Finding(kind, {**result, **figures}), result)
 
 
 def work_seconds(figures: Mapping[str, Any]) -> float:
@@ -135,14 +135,12 @@ def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
     return median(decibels) if decibels else None
 
 
-def _words(said: Remark | str) -> str:
+def _words(said: Finding | str) -> str:
     return said if isinstance(said, str) else sentence(said)
 
 
-def _fields(said: Remark | str) -> dict[str, Any]:
-    """The text of an event, with the kind and figures from which programs make their own."""
-    known = {} if isinstance(said, str) else {"kind": said.kind, "figures": all_figures(said)}
-    return {"text": _words(said), **known}
+def _fields(said: Finding | str) -> dict[str, Any]:
+    return {"text": said} if isinstance(said, str) else message(said)
 
 
 class _Text(Reporter):
@@ -166,7 +164,7 @@ class _Text(Reporter):
             if self._bar.live.is_started:  # else the bar would leave an empty line
                 self._bar.stop()
 
-    def note(self, said: Remark | str) -> None:
+    def note(self, said: Finding | str) -> None:
         with _output():
             self._console.print(printable_lines(_words(said)), markup=False, soft_wrap=True)
 
@@ -184,7 +182,7 @@ class _Text(Reporter):
         with _output():
             self._bar.update(self._task, advance=1, fit=fit)
 
-    def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
+    def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
         self.stop()
         self.note(said)
 
@@ -196,7 +194,7 @@ class _Text(Reporter):
 class _Json(Reporter):
     """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, one a line.
 
-    What is said has its ``text``; a remark has its ``kind`` and ``figures`` too. A note says if it is a ``doubt``.
+    What is said has its ``text``; a finding has its ``kind`` and ``figures`` too. A note says if it is a ``doubt``.
     """
 
     def __init__(self) -> None:
@@ -204,8 +202,8 @@ class _Json(Reporter):
         self._pace: deque[float] = deque(maxlen=PACE_FRAMES)
         self._before = time.monotonic()
 
-    def note(self, said: Remark | str) -> None:
-        self._say("note", **_fields(said), doubt=isinstance(said, Doubt))
+    def note(self, said: Finding | str) -> None:
+        self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)
 
     def start(self, total: int, done: int, seconds: float | None = None) -> None:
         self._total, self._done, self._before = total, done, time.monotonic()
@@ -231,7 +229,7 @@ class _Json(Reporter):
             figures=dict(figures),
         )
 
-    def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
+    def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
         self._say("done", **_fields(said), **details)
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:

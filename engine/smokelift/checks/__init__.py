@@ -1,13 +1,15 @@
-"""What every package says of a value that it is given: in which words, and when it refuses it; and what a remark is."""
+"""What every package says of a value that it is given: in which words, and when it refuses it; what a finding is."""
 
 from smokelift.checks.arguments import described, listed, numbers, radiance, require_kind
-from smokelift.checks.remark import Doubt, Figures, Remark
+from smokelift.checks.finding import UNDETERMINED, Figure, Figures, Finding, Source
 from smokelift.checks.words import counted, one_of, printable, shown
 
 __all__ = [
-    "Doubt",
+    "UNDETERMINED",
+    "Figure",
     "Figures",
-    "Remark",
+    "Finding",
+    "Source",
     "counted",
     "described",
     "listed",

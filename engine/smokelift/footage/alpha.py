@@ -16,7 +16,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 
 Picture = npt.NDArray[np.float32]
 Association = Literal["straight", "premultiplied in linear light", "premultiplied in code values"]
@@ -45,6 +45,6 @@ def association(pictures: Iterable[npt.NDArray[Any]], decode: Callable[[npt.Arra
     return kinds[int(np.argmin(np.nan_to_num(variation, nan=np.inf).round(6)))]
 
 
-def association_notes(held: Association) -> tuple[Remark, ...]:
+def association_notes(held: Association) -> tuple[Finding, ...]:
     """Return how colours are read, where they are not straight."""
-    return () if held == "straight" else (Remark("premultiplied colours", {"held": held}),)
+    return () if held == "straight" else (Finding("premultiplied colours", {"held": held}),)

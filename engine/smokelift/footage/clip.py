@@ -6,13 +6,14 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
+from dataclasses import replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.exposure import COMPARED_SIDE
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.image_sequence import ImageSequence, is_video
@@ -45,10 +46,10 @@ class Clip:
         Frames a second.
     size
         Width and height in pixels, upright.
-    first
-        Number in the file of the clip's frame 0 (not 0 if a range was asked for).
+    numbers
+        The frames' numbers in the file, which has them from 0. Everything outside the engine names frames by these.
     warning
-        A remark on a defect (a truncated file, say), else None.
+        What is said of a defect (a truncated file, say), else None.
     lens
         Focal length in millimetres on 35 mm film, if the file says it.
     backdrop
@@ -135,20 +136,17 @@ class Clip:
     def files(self) -> tuple[Path, ...]:
         """What the frames are read from: the video, or the pictures of the range that exist."""
         files = self._source.files
-        own = files if len(files) == 1 else files[self.first : self._last + 1]
+        own = files if len(files) == 1 else files[self.numbers.start : self.numbers.stop]
         return tuple(file for file in own if file.exists())
 
-    @property
-    def notes(self) -> tuple[Remark, ...]:
-        """How the pictures are read where that is not the usual way."""
-        return self._source.notes
-
-    def remarks(self) -> tuple[Remark, ...]:
-        """Remarks on the clip: defects, frames that are replaced, how pictures are read; ClipError as of `damaged`."""
-        remarks = [self.warning] if self.warning else []
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what is found of the file: defects, frames that are replaced, how pictures are read where that is not
+        the usual way; ClipError as of `damaged`."""
+        found = [self.warning] if self.warning else []
         if self.damaged:
-            remarks.append(Remark("damaged frames", {"path": str(self.path), "frames": self.damaged_frames}))
-        return (*remarks, *self.notes)
+            figures = {"path": str(self.path), "frames": numbered([self.numbers[n] for n in self.damaged])}
+            found.append(Finding("damaged frames", figures, about="some pictures", source="assumed"))
+        return (*found, *(replace(note, about="pictures", source="measured") for note in self._source.notes))
 
     @property
     def damaged(self) -> tuple[int, ...]:
@@ -159,18 +157,13 @@ class Clip:
         ClipError
             If there are more of them than of others.
         """
-        damaged = self._damaged(self.first, self._last)
+        damaged = self._damaged(self.numbers[0], self.numbers[-1])
         if 2 * len(damaged) > len(self) > 1:
             raise ClipError(
                 f"{self.path}: {len(damaged)} of its {len(self)} frames are missing or cannot be decoded; export "
                 "the clip again, or choose other frames"
             )
-        return tuple(n - self.first for n in damaged)
-
-    @property
-    def damaged_frames(self) -> str:
-        """The damaged frames by their numbers in the file, counted from 0 as a range of frames is: see `numbered`."""
-        return numbered([self.first + n for n in self.damaged])
+        return tuple(map(self.numbers.index, damaged))
 
     def frame(self, n: int) -> Picture:
         """Return frame ``n``, counted from 0 at the start of the range: linear (height, width, 3), float32, read-only.
@@ -188,7 +181,7 @@ class Clip:
 
     def seen(self, n: int, width: int, height: int) -> Seen | None:
         """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask."""
-        return None if self.mask is None else self.mask.seen(self.first + n, width, height)
+        return None if self.mask is None else self.mask.seen(self.numbers[n], width, height)
 
     def as_seen(self, n: int, picture: Picture) -> Picture:
         """Return a picture (rows, columns, 3) of frame ``n`` in which what is hidden is not a number."""
@@ -197,7 +190,7 @@ class Clip:
         return picture if seen is None else np.where(seen[..., None], picture, np.float32(np.nan))
 
     def __len__(self) -> int:
-        return self._last - self.first + 1
+        return len(self.numbers)
 
     def __iter__(self) -> Iterator[Picture]:
         return (self.frame(n) for n in range(len(self)))
@@ -213,7 +206,7 @@ class Clip:
 
     def part(self, first: int, last: int) -> Clip:
         """Return the frames of the file from one number to another, both included."""
-        return self if (first, last) == (self.first, self._last) else self._with(frames=(first, last))
+        return self if self.numbers == range(first, last + 1) else self._with(frames=(first, last))
 
     def as_filmed(self) -> Clip:
         """Return the clip with what a mask hides, as the file has it."""
@@ -228,7 +221,7 @@ class Clip:
 
         ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
-        before, first = self._read, self.first
+        before, first = self._read, self.numbers[0]
 
         def read(number: int) -> StoredPicture:
             image, n = before(number), number - first
@@ -270,21 +263,22 @@ class Clip:
         """A clip of the same open file with other frames or attributes."""
         clip = copy(self)
         vars(clip).update(attributes)
-        clip._use(frames or (self.first, self._last))
+        clip._use(frames or (self.numbers[0], self.numbers[-1]))
         return clip
 
     def _use(self, frames: tuple[int, int]) -> None:
         """Use the file's frames from one number to another, both included."""
-        self.first, self._last = frames
-        if not 0 <= self.first <= self._last < self._count:
+        first, last = frames
+        if not 0 <= first <= last < self._count:
             raise ClipError(
-                f"{self.path}: there are no frames {self.first} to {self._last}; choose some of 0 to {self._count - 1}"
+                f"{self.path}: there are no frames {first} to {last}; choose some of 0 to {self._count - 1}"
             )
+        self.numbers = range(first, last + 1)
         self._stored, self._linear = Kept(), Kept()
 
     def _behind(self, path: Path) -> Clip:
         """The clip with what a mask hides continued from around it."""
-        mask, filmed = Mask(path, range(self.first, self._last + 1), self.size), self._filmed
+        mask, filmed = Mask(path, self.numbers, self.size), self._filmed
         read = partial(_kept, Kept(), STORED_BYTES, lambda number: mask.applied(number, filmed(number)))
         count = min(self._count, mask.count or self._count)
         return self._with(_read=read, mask=mask, _count=count)
@@ -294,13 +288,13 @@ class Clip:
         if not isinstance(n, int | np.integer) or not 0 <= n < len(self):
             raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {len(self) - 1}")
         try:
-            return self._read(self.first + n)
+            return self._read(self.numbers[n])
         except DamagedFrameError as error:
             damage = error
         for other in (*reversed(range(n)), *range(n + 1, len(self))):
             if other not in self.damaged:
                 with suppress(DamagedFrameError):
-                    return self._read(self.first + other)
+                    return self._read(self.numbers[other])
         raise damage
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import scipy.sparse
 
 import smokelift._core as _core
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.images import Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
@@ -128,7 +128,7 @@ class FrameSource(Protocol):
     fps
         Frames a second.
     warning
-        A remark on a defect, else None.
+        What is said of a defect, else None.
     files
         The video, or one picture for each frame.
     lens
@@ -139,13 +139,13 @@ class FrameSource(Protocol):
 
     count: int
     fps: float
-    warning: Remark | None
+    warning: Finding | None
     files: tuple[Path, ...]
     lens: float | None
     backdrop: float | None
 
     @property
-    def notes(self) -> tuple[Remark, ...]:
+    def notes(self) -> tuple[Finding, ...]:
         """How the pictures are read, where that is unusual."""
         ...
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from PIL import Image
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.alpha import association, association_notes
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
@@ -54,7 +54,7 @@ class ImageSequence:
         self.fps = DEFAULT_FPS
         self.warning = None
         if fps is None and self.count > 1:
-            self.warning = Remark("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
+            self.warning = Finding("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
         self.lens = _focal_length(self.files[0])
         self._size: tuple[int, int] | None = None
         encoded = sound_samples(self.count, lambda n: _readable(read_encoded, self.files[n]))
@@ -62,12 +62,12 @@ class ImageSequence:
         self.backdrop = backdrop_of(sound_samples(self.count, self._layer))
 
     @property
-    def notes(self) -> tuple[Remark, ...]:
+    def notes(self) -> tuple[Finding, ...]:
         """How colours are held beside alpha, and that the pictures are reduced, if they are."""
         held = association_notes(self._held)
         if self._size is None or self._size == (small := readable_size(*self._size)):
             return held
-        return (*held, Remark("scaled pictures", {"size": self._size, "scaled": small}))
+        return (*held, Finding("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
         """Return a picture; raise ClipError if it is damaged or its size is not the first one's."""

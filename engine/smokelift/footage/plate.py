@@ -144,7 +144,7 @@ def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
     ``plates`` has a frame for each one of the clip's file, resized to the clip if need be. ValueError is raised if
     there are too few, ClipError if a frame cannot be read.
     """
-    last, (width, height) = clip.first + len(clip) - 1, clip.size
+    last, (width, height) = clip.numbers[-1], clip.size
     if last >= len(plates):
         raise ValueError(
             f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
@@ -153,7 +153,7 @@ def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
     known = np.ones((height, width), np.float32)
 
     def of(frame: int) -> Plate:
-        return Plate(area_average(plates.frame(clip.first + frame), width, height), known, NO_NOISE)
+        return Plate(area_average(plates.frame(clip.numbers[frame]), width, height), known, NO_NOISE)
 
     silent = ChangingPlate(of, NO_NOISE, plates.files)
     return replace(silent, noise=noise_about(*_noise_samples(silent, clip)))

@@ -71,14 +71,14 @@ class Proxy:
     @staticmethod
     def of(clip: Clip, beyond: bool = True) -> Proxy:
         """Read the frames, ``beyond`` the part in use too; ClipError is raised if one of that part cannot be read."""
-        first, last = clip.first, clip.first + len(clip) - 1
+        numbers = clip.numbers
         (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
         pictures, seen, blocks = {}, [], {}
-        own = [first + number for number in clip.spread(FRAMES)]
+        own = [numbers[n] for n in clip.spread(FRAMES)]
         noisy = {own[n] for n in np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int)}
         for number in sorted({*own} | set(whole.spread(FRAMES) if beyond else ())):
-            inside = first <= number <= last
-            of, n = (clip, number - first) if inside else (whole, number)
+            inside = number in numbers
+            of, n = (clip, numbers.index(number)) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
                 picture = of.stored(n)
                 pictures[number] = picture.averaged(columns, rows)
@@ -89,7 +89,7 @@ class Proxy:
                     blocks[number] = picture.cut(some_blocks), None if hides is None else some_blocks(hides)
         scale = max(clip.size) / max(columns, rows)
         whole_file = np.stack(list(pictures.values()))
-        return Proxy(tuple(pictures), (first, last), whole_file, np.stack(seen), blocks, scale)
+        return Proxy(tuple(pictures), (numbers[0], numbers[-1]), whole_file, np.stack(seen), blocks, scale)
 
     @cached_property
     def encoded(self) -> Picture:

@@ -30,7 +30,7 @@ from av.video.reformatter import ColorRange, Interpolation
 from av.video.stream import VideoStream
 
 import smokelift._core as _core
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.alpha import Association, association, association_notes
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.frame_source import (
@@ -82,7 +82,7 @@ class Video:
         self._path = path
         self.files: tuple[Path, ...] = (path,)
         self._transfer = transfer
-        self.warning: Remark | None = None
+        self.warning: Finding | None = None
         if not path.exists():
             raise ClipError(f"{path}: no such file")
         if path.is_dir():
@@ -97,7 +97,7 @@ class Video:
         self._times, broken = self._index()
         if broken:
             self._drop_undecodable_end()
-            self.warning = Remark("truncated clip", {"path": str(path), "frames": len(self._times)})
+            self.warning = Finding("truncated clip", {"path": str(path), "frames": len(self._times)})
         if not self._times:
             self.close()
             raise ClipError(f"{path}: holds no frame that can be decoded; export it again")
@@ -110,9 +110,9 @@ class Video:
         self.lens = focal_length({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
 
     @property
-    def notes(self) -> tuple[Remark, ...]:
+    def notes(self) -> tuple[Finding, ...]:
         """How the pictures are read, as far as they have been, where that is unusual."""
-        return (*self._format, Remark("interlaced clip")) if self._interlaced else self._format
+        return (*self._format, Finding("interlaced clip")) if self._interlaced else self._format
 
     def read(self, n: int) -> StoredPicture:
         """Return a frame; raise `DamagedFrameError` if it cannot be decoded."""
@@ -262,18 +262,18 @@ class Video:
         shown = [bisect.bisect_right(self._times, self._times[0] + mean * n + 0.5) - 1 for n in range(count)]
         return float(Fraction(1) / (Fraction(mean) * base)), shown
 
-    def _described(self) -> tuple[Remark, ...]:
-        """Remarks on how the file's format is read."""
+    def _described(self) -> tuple[Finding, ...]:
+        """How the file's format is read."""
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
-        notes = [Remark("varying frame rate", {"fps": self.fps})] * self._varies
+        notes = [Finding("varying frame rate", {"fps": self.fps})] * self._varies
         notes.extend(association_notes(self._held))
         if encoding in ("hlg", "pq") and self._transfer is None:
-            notes.append(Remark("high dynamic range", {"transfer": encoding.upper()}))
+            notes.append(Finding("high dynamic range", {"transfer": encoding.upper()}))
         if primaries is not None:
-            notes.append(Remark("other primaries", {"primaries": primaries}))
+            notes.append(Finding("other primaries", {"primaries": primaries}))
         if self._size() != (stream.width, stream.height):
-            notes.append(Remark("scaled pictures", {"size": (stream.width, stream.height), "scaled": self._size()}))
+            notes.append(Finding("scaled pictures", {"size": (stream.width, stream.height), "scaled": self._size()}))
         return tuple(notes)
 
     def _decode(self, index: int) -> av.VideoFrame:

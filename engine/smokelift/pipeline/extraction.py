@@ -86,7 +86,7 @@ class Extraction:
         digits = pattern.name.count("#")
         before, after = pattern.name.split("#" * digits)
         for frame, element in enumerate(self):
-            file = pattern.with_name(f"{before}{self.clip.first + frame:0{digits}d}{after}")
+            file = pattern.with_name(f"{before}{self.clip.numbers[frame]:0{digits}d}{after}")
             write_image(file, element.rgba())
             yield file
 

@@ -15,7 +15,8 @@ from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.pipeline.source_files import sources
-from smokelift.report.provenance import provenance, record
+from smokelift.report.result import provenance
+from smokelift.report.views import choices, part
 from smokelift.scene import Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
@@ -92,8 +93,8 @@ class Reconstruction:
             resume=resume,
             background=shot.found_background,
             start_number=start_number,
-            choices=[record(estimate) for estimate in shot.estimates],
-            provenance=[part.as_dict() for part in provenance(shot)],
+            choices=choices(shot.findings),
+            provenance=[part(finding) for finding in provenance(shot)],
             sources=sources(shot),
         ) as writer:
             if writer.state is not None or not writer.finished:

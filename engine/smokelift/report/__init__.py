@@ -1,1 +1,1 @@
-"""What is known of a shot, in words: sentences of remarks and estimates, facts, the page of `inspect`, forecasts."""
+"""What is known of a shot and said of a result: findings, their words, the page of `inspect`, forecasts."""

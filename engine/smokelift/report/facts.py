@@ -1,19 +1,12 @@
-"""What is known of a shot before it is reconstructed, fact by fact: its value, and where that comes from."""
+"""What is known of a shot before it is reconstructed: what its set-up found, and what the rest of the page says."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from smokelift.checks import Remark, counted
+from smokelift.checks import Figure, Figures, Finding, Source
 from smokelift.footage.exposure import shows_exposure, small
 from smokelift.footage.plate import Plate
 from smokelift.report.cost import Cost
-from smokelift.report.page import Fact
-from smokelift.report.sentences import sentence
 from smokelift.scene import CompleteScene, Scene
-from smokelift.setup.backdrop_remarks import BLACK
-from smokelift.setup.estimate import UNDETERMINED, Estimate
-from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
 
@@ -22,166 +15,92 @@ CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
 (docs/experiments/background.md)."""
 
 
-def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
-    """Return what is known of a shot; ``given`` is the user's scene."""
-    scene, domain = shot.scene, shot.scene.domain
-    plate = shot.views[0].plates.at(0)
-    size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
-    has_camera, has_box = given.camera is not None, given.domain is not None
-    has_scale = has_box or shot.settings.distance is not None
-    height = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
-    return (
-        _background(shot, given, plate),
+def facts(shot: Shot, given: Scene, cost: Cost) -> list[Finding]:
+    """Return what is known of a shot, one finding for each line of a table; ``given`` is the user's scene."""
+    found = {each.about: each for each in reversed(shot.findings) if "view" not in each.figures}
+    scene, medium, plate = shot.scene, shot.scene.medium, shot.views[0].plates.at(0)
+
+    def known(about: str, value: Figure, is_given: bool = True) -> Finding:
+        """What the set-up found, or else what is given or, if it is not, assumed."""
+        return found.get(about) or _line(about, value, "given" if is_given else "assumed")
+
+    has_scale = given.domain is not None or shot.settings.distance is not None
+    scale: Figures = {"size": scene.domain.size, "height": PICTURE_HEIGHT}
+    has_medium = "medium" not in found
+    color = "gray" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
+    spent = {"seconds": cost.seconds, "memory": cost.memory / 2**30, "disk": cost.disk / 1e6}
+    return [
+        known("background", "as given"),
         *_mask(shot),
-        _exposure(shot, plate),
+        found.get("exposure") or _exposure(plate),
         _noise(plate),
-        _given_or_undetermined(
-            "camera",
-            f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}",
-            has_camera,
-            _said(shot, "assumed camera"),
-        ),
-        _given_or_undetermined(
-            "scale", f"box of {size} m", has_scale, f"{height} Give its distance, or camera and box, in meters."
-        ),
-        _box(shot, has_box),
-        _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
-        *_medium(shot, not any(remark.kind == "assumed medium" for remark in shot.remarks)),
-        *_light(shot, given),
-        _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
-        _place(shot),
-        _cost(shot, cost),
-    )
+        known("camera", f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}"),
+        Finding("scale", scale, about="scale", source="given" if has_scale else "assumed"),
+        known("box", "as given"),
+        known("resolution", scene.domain.resolution),
+        known("extinction", medium.extinction, has_medium),
+        known("albedo", medium.albedo, has_medium),
+        known("smoke color", color),
+        *_light(scene, given, found.get("source radiance")),
+        known("scattering", scene.scattering, given.scattering is not None),
+        found.get("axis depth") or _place(shot),
+        Finding("cost", {**spent, "free": cost.memory_free / 2**30}, about="cost", source="estimated"),
+    ]
 
 
-def _box(shot: Shot, is_given: bool) -> Fact:
-    if is_given:
-        return Fact("box", "as given", "given")
-    if not shot.smoky:
-        return Fact("box", "over all of the picture", UNDETERMINED, _said(shot, "box"))
-    return Fact("box", "around the smoke of the whole clip", "estimated", _said(shot, "box"))
-
-
-def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
-    medium, know = shot.scene.medium, "Give the medium if you know it."
-    extinction = f"{medium.extinction:.3g} 1/m at density 1"
-    colour = "gray" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
-    product = f"A picture shows it times the density only. {know}"
-    light = f"A picture shows it times the light only. {know}"
-    return (
-        _given_or_undetermined("extinction", extinction, is_given, product),
-        _given_or_undetermined("albedo", f"{medium.albedo:.3g}", is_given, light),
-        _chosen(shot, "smoke colour", "smoke color", colour, is_given),
-    )
-
-
-def _cost(shot: Shot, cost: Cost) -> Fact:
-    spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
-    free = f"Right to a factor of 1.5 if nothing else runs; {cost.memory_free / 2**30:.1f} GiB of memory are free."
-    return Fact("cost", f"{counted(shot.length, 'frame')}: {spent}", "estimated", free)
-
-
-def _said(shot: Shot, *about: str) -> str:
-    """The sentence of the remark on the input whose kind begins with one of ``about``, else nothing."""
-    own = (remark for remark in shot.remarks if "view" not in remark.figures)
-    return next((sentence(remark) for remark in own if remark.kind.startswith(about)), "")
-
-
-def _given_or_undetermined(what: str, value: str, is_given: bool, how: str) -> Fact:
-    """The fact about what a user may give and no measurement determines."""
-    return Fact(what, value, "given") if is_given else Fact(what, value, UNDETERMINED, how)
-
-
-def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
-    if given.background is not None and not given.background.estimated:
-        return Fact("background", "as given", "given")
-    unknown = float(unknown_part(plate, shot.clip, 0).mean())
-    colour = plate.image[0, 0]
-    value = "a picture"
-    if (plate.image == colour).all():
-        value = "black" if colour.max() < BLACK else f"one color, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
-    assumed = any(remark.kind == "background assumed" for remark in shot.remarks)
-    return Fact(
-        "background",
-        f"{value}, {unknown:.0%} of it unknown" if unknown else value,
-        UNDETERMINED if assumed else "estimated",
-        _said(shot, "background", "black background"),
-    )
-
-
-def _mask(shot: Shot) -> tuple[Fact, ...]:
-    """The fact about the mask, if there is one."""
+def _mask(shot: Shot) -> list[Finding]:
+    """How much a mask hides, if there is one."""
     seen = shot.clip.seen(0, *shot.clip.size)
     if seen is None or shot.clip.mask is None or not shot.clip.mask.files:
-        return ()
-    how = "No smoke is made there, and the fit ignores it."
-    return (Fact("mask", f"hides {1 - seen.mean():.0%} of the first frame", "given", how),)
+        return []
+    return [Finding("mask", {"hidden": 1 - float(seen.mean())}, about="mask", source="given")]
 
 
-def _exposure(shot: Shot, plate: Plate) -> Fact:
-    if not shows_exposure(small(plate.image)):
-        how = "The background is too dark or too bright to show it, so what flickers is taken for smoke."
-        return Fact("exposure", "taken to be steady", UNDETERMINED, how)
-    changes = [remark.figures["change"] for remark in shot.remarks if remark.kind == "exposure"]
-    value = f"changes by up to {changes[0]:.0%}, evened out" if changes else "steady"
-    return Fact("exposure", value, "measured", "Measured on what does not move, against the background.")
+def _exposure(plate: Plate) -> Finding:
+    if shows_exposure(small(plate.image)):
+        return Finding("steady exposure", about="exposure", source="measured")
+    return Finding("exposure unseen", about="exposure", source="assumed")
 
 
-def _noise(plate: Plate) -> Fact:
-    codes = 255 * float(plate.noise.total.max())
-    kind = "clean" if codes <= CLEAN_NOISE else "noisy: thin smoke is lost in it" if codes >= HEAVY_NOISE else "usual"
-    lasting = 255 * float(plate.noise.lasting.max())
-    return Fact(
-        "noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighboring pixels."
-    )
+def _noise(plate: Plate) -> Finding:
+    codes, lasting = (255 * float(noise.max()) for noise in (plate.noise.total, plate.noise.lasting))
+    level = "clean" if codes <= CLEAN_NOISE else "noisy: thin smoke is lost in it" if codes >= HEAVY_NOISE else "usual"
+    return Finding("noise", {"level": level, "codes": codes, "lasting": lasting}, about="noise", source="measured")
 
 
-def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
-    """The facts about the light: how strong it is, and what one picture does not show of it."""
-    if shot.scene.scattering == "absorption":
-        return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
-    colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    if given.lights or _estimate(shot, "source radiance") is None:
-        return (Fact("light", "as given", "given"),)
-    return (
-        _chosen(shot, "source radiance", "light strength", f"smoke of radiance {colour}", False),
-        Fact("sun's direction", "no sun", UNDETERMINED, "Suns from many sides look the same. Give the lights."),
-        Fact("sun's color", "that of all light", UNDETERMINED),
-        Fact("ambient share", "all light is from everywhere", UNDETERMINED),
-    )
+def _light(scene: CompleteScene, given: Scene, brightness: Finding | None) -> list[Finding]:
+    """How strong the light is, and what one picture does not show of it."""
+    if scene.scattering == "absorption":
+        return [_line("light", "none is needed", "estimated" if given.scattering is None else "given")]
+    if brightness is None:
+        return [_line("light", "as given", "given")]
+    return [
+        brightness,
+        _line("sun's direction", "no sun", "assumed"),
+        _line("sun's color", "that of all light", "assumed"),
+        _line("ambient share", "all light is from everywhere", "assumed"),
+    ]
 
 
-def _place(shot: Shot) -> Fact:
-    given, place = shot.settings.distance, shot.place
-    if given is not None:
-        return Fact("place in depth", f"{given:.2f} m from the camera", "given")
+def _place(shot: Shot) -> Finding:
+    """Where in depth the smoke stands if it was not searched for."""
     if len(shot.views) > 1:
-        return Fact("place in depth", "as the cameras show it", "estimated")
-    value = "the middle of the box"
-    if place is not None:
-        depth = round(place.depth, 2) + 0.0  # no minus before zero
-        value = f"{depth:.2f} m behind the middle of the box, give or take {place.deviation:.2f} m"
-    return _chosen(shot, "axis depth", "place in depth", value, False)
+        return _line("axis depth", "as the cameras show it", "estimated")
+    if shot.settings.distance is not None:
+        return _line("axis depth", f"{shot.settings.distance:.2f} m from the camera", "given")
+    return _line("axis depth", "the middle of the box", "assumed")
 
 
-def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fact:
-    """The fact about an estimate, or about what was given or not measured instead."""
-    estimate = _estimate(shot, what)
-    if is_given or estimate is None:
-        return Fact(name, value, "given" if is_given else UNDETERMINED)
-    origin = {"given": "by hand", "measured": "measured", "assumed": UNDETERMINED}[estimate.source]
-    return Fact(name, value, origin, sentence(estimate))
+def _line(about: str, value: Figure, source: Source) -> Finding:
+    """What is taken without a search; its kind is what it is about."""
+    return Finding(about, about=about, value=value, source=source)
 
 
-def _estimate(shot: Shot, what: str) -> Estimate[Any] | None:
-    return next((estimate for estimate in shot.estimates if estimate.what == what), None)
-
-
-def boundaries(scene: CompleteScene) -> tuple[Remark, ...]:
-    """How smoke gets into the box and out of it."""
+def boundaries(scene: CompleteScene) -> list[Finding]:
+    """Return how smoke gets into the box and out of it."""
     inflow = scene.inflow()
-    if inflow is None:
-        entry = Remark("no inlets")
-    else:
-        entry = Remark("inlets", {"inlets": len(scene.inlets), "voxels": int(inflow.sum())})
-    return entry, Remark("closed sides", {"sides": ", ".join(scene.closed)}) if scene.closed else Remark("open box")
+    entry = Finding("no inlets")
+    if inflow is not None:
+        entry = Finding("inlets", {"inlets": len(scene.inlets), "voxels": int(inflow.sum())})
+    closed = Finding("closed sides", {"sides": ", ".join(scene.closed)}) if scene.closed else Finding("open box")
+    return [entry, closed]

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from smokelift.checks import Doubt, Remark, counted
+from smokelift.checks import Finding, counted
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit
-from smokelift.report.page import TILE, Fact, Page, Panel, fitted
-from smokelift.report.sentences import sentence
+from smokelift.report.page import TILE, Page, Panel, fitted
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project_points
 from smokelift.setup.first_estimate import unknown_part
@@ -42,11 +41,10 @@ BINS = 96
 """Bins of the histogram."""
 
 
-def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: Iterable[Remark]) -> Page:
+def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings: Iterable[Finding]) -> Page:
     """Return the page of a shot, of which the user's scene was ``given``.
 
-    The facts (``known``) are those of `smokelift.report.facts`. Remarks that they do not say follow below; doubts stand
-    above the pictures.
+    What is ``known`` is that of `smokelift.report.facts`. Other findings follow below; doubts stand above the pictures.
     """
     number = shot.smoky[0] if shot.smoky else 0
     columns, rows = fitted(*shot.clip.size)
@@ -61,12 +59,11 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
     lit = " and the light" if _light_starts(shot, shot.scene.domain) else ""
     hidden = shot.clip.mask
     masked = "" if hidden is None else ", the mask's outline" if hidden.files else ", the edge of what it shows"
+    frame = f"frame {shot.clip.numbers[number]}"
     panels = [
-        Panel(f"frame {shot.clip.first + number} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
+        Panel(f"{frame} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
         Panel("background", eight_bit(plate.image)),
-        Panel(
-            f"smoke of frame {shot.clip.first + number}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)
-        ),
+        Panel(f"smoke of {frame}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)),
         Panel(f"unknown background: {unknown.mean():.1%} of the picture", _unknown_picture(plate, unknown)),
         Panel("brightness: frame (gray), its smoke (orange), background (blue)", _histogram(picture, plate, seen)),
         *([] if path is None else [Panel("path of the box's middle while the camera moves", path)]),
@@ -74,10 +71,10 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
     name = given.clip.path.name if given.clip is not None else "clip"
     width, height = shot.clip.size
     frames = f"{counted(shot.length, 'frame')} of {width} x {height} at {shot.clip.fps:.4g} a second"
-    doubts = [sentence(remark) for remark in shot.remarks if isinstance(remark, Doubt)]
-    said = {*doubts, *(fact.how for fact in known)}
-    others = [words for words in map(sentence, remarks) if words not in said]
-    return Page(f"{name}: {frames}", doubts, panels, known, others)
+    doubts, notes = (
+        [each for each in findings if each.doubt is doubt and each not in known] for doubt in (True, False)
+    )
+    return Page(f"{name}: {frames}", doubts, panels, known, notes)
 
 
 def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: int) -> Tile:

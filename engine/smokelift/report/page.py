@@ -5,16 +5,17 @@ from __future__ import annotations
 import base64
 import html
 import io
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from smokelift.checks import UNDETERMINED, Finding
 from smokelift.output.atomic import atomic_path
-from smokelift.setup.estimate import UNDETERMINED
+from smokelift.report.views import fact, sentence
 
 PAGE_KINDS = (".png", ".html")
 
@@ -46,32 +47,15 @@ class Panel:
     picture: NDArray[np.uint8]
 
 
-@dataclass(frozen=True)
-class Fact:
-    """A line of the table: what it is about, the value that is taken, its origin, and a sentence that may be empty.
-
-    ``origin`` is ``"given"``, ``"by hand"``, ``"measured"``, ``"estimated"`` or `UNDETERMINED`.
-    """
-
-    what: str
-    value: str
-    origin: str
-    how: str = ""
-
-    def as_dict(self) -> dict[str, str]:
-        """Return the fact as JSON holds it."""
-        return asdict(self)
-
-
 @dataclass(frozen=True, eq=False)
 class Page:
-    """A page, from top to bottom."""
+    """A page, from top to bottom; `facts` are the lines of a table."""
 
     title: str
-    warnings: Sequence[str]
+    doubts: Sequence[Finding]
     panels: Sequence[Panel]
-    facts: Sequence[Fact]
-    notes: Sequence[str]
+    facts: Sequence[Finding]
+    notes: Sequence[Finding]
 
 
 def write_page(path: Path, page: Page) -> None:
@@ -90,54 +74,45 @@ def fitted(width: int, height: int) -> tuple[int, int]:
 
 
 def _as_picture(page: Page) -> Image.Image:
-    text, title = ImageFont.load_default(_TEXT), ImageFont.load_default(_TITLE)
-    table = [
-        [_wrapped(cell, text, right - left - _GAP) for cell, left, right in zip(row, _STARTS, _ENDS, strict=True)]
-        for row in ((fact.what, fact.value, fact.origin, fact.how) for fact in page.facts)
-    ]
-    warnings, notes = (
-        [_wrapped(said, text, _WIDTH - 2 * _GAP) for said in sentences] for sentences in (page.warnings, page.notes)
-    )
     rows = [page.panels[first : first + COLUMNS] for first in range(0, len(page.panels), COLUMNS)]
-    heights = [max(panel.picture.shape[0] for panel in row) + _LINE + _GAP for row in rows]
-    lines = sum(max(map(len, cells)) for cells in table) + sum(map(len, notes))
-    start = 2 * _GAP + _TITLE
-    above = start + sum(map(len, warnings)) * _LINE + len(warnings) * _LINE // 3 + _GAP * bool(warnings)
-    below = (lines * _LINE) + (len(table) + len(notes)) * _LINE // 3 + 2 * _GAP
-    whole = Image.new("RGB", (_WIDTH, above + sum(heights) + below), _PAPER)
-    draw = ImageDraw.Draw(whole)
-    draw.text((_GAP, _GAP), page.title, _INK, title)
-    _write(draw, warnings, start, text, _UNKNOWN)
-    top = above
-    for row, height in zip(rows, heights, strict=True):
-        for column, panel in enumerate(row):
-            left = _GAP + column * (TILE[0] + _GAP)
-            draw.text((left, top), panel.title, _FAINT, text)
-            whole.paste(Image.fromarray(panel.picture), (left, top + _LINE))
-        top += height
-    for fact, cells in zip(page.facts, table, strict=True):
-        colours = (_FAINT, _INK, _UNKNOWN if fact.origin == UNDETERMINED else _FAINT, _FAINT)
-        for cell, left, colour in zip(cells, _STARTS, colours, strict=True):
-            draw.text((left, top), "\n".join(cell), colour, text, spacing=_LINE - _TEXT)
-        top += max(map(len, cells)) * _LINE + _LINE // 3
-    _write(draw, notes, top, text, _FAINT)
-    return whole
+    strips = [
+        _written([page.title], [_INK], _TITLE),
+        *(_written([sentence(doubt)], [_UNKNOWN]) for doubt in page.doubts),
+        *map(_side_by_side, rows),
+        *(_table_row(fact(line)) for line in page.facts),
+        *(_written([sentence(note)], [_FAINT]) for note in page.notes),
+    ]
+    space = np.full((_GAP, _WIDTH, 3), _PAPER, np.uint8)
+    return Image.fromarray(np.vstack([space, *strips, space]))
 
 
-def _write(
-    draw: ImageDraw.ImageDraw,
-    sentences: Sequence[Sequence[str]],
-    top: int,
-    font: ImageFont.FreeTypeFont | ImageFont.ImageFont,
-    colour: tuple[int, int, int],
-) -> None:
-    """Sentences in lines, one below the other."""
-    for lines in sentences:
-        draw.text((_GAP, top), "\n".join(lines), colour, font, spacing=_LINE - _TEXT)
-        top += len(lines) * _LINE + _LINE // 3
+def _table_row(line: Mapping[str, str]) -> NDArray[np.uint8]:
+    cells = [line[name] for name in ("what", "value", "origin", "how")]
+    return _written(cells, [_FAINT, _INK, _UNKNOWN if line["origin"] == UNDETERMINED else _FAINT, _FAINT])
 
 
-_ENDS = (*_STARTS[1:], _WIDTH)
+def _side_by_side(panels: Sequence[Panel]) -> NDArray[np.uint8]:
+    """Pictures with their titles above them."""
+    height = max(panel.picture.shape[0] for panel in panels) + _LINE + _GAP
+    strip = Image.new("RGB", (_WIDTH, height), _PAPER)
+    for column, panel in enumerate(panels):
+        left = _GAP + column * (TILE[0] + _GAP)
+        ImageDraw.Draw(strip).text((left, 0), panel.title, _FAINT, ImageFont.load_default(_TEXT))
+        strip.paste(Image.fromarray(panel.picture), (left, _LINE))
+    return np.asarray(strip)
+
+
+def _written(cells: Sequence[str], colours: Sequence[tuple[int, int, int]], size: int = _TEXT) -> NDArray[np.uint8]:
+    """One text over the whole width, or those of a table's columns."""
+    font = ImageFont.load_default(size)
+    starts = _STARTS if len(cells) > 1 else (_GAP,)
+    ends = (*starts[1:], _WIDTH)
+    wrapped = [_wrapped(cell, font, end - start - _GAP) for cell, start, end in zip(cells, starts, ends, strict=True)]
+    height = max(map(len, wrapped)) * (size + _LINE - _TEXT) + _LINE // 3
+    strip = Image.new("RGB", (_WIDTH, height), _PAPER)
+    for lines, colour, left in zip(wrapped, colours, starts, strict=True):
+        ImageDraw.Draw(strip).text((left, 0), "\n".join(lines), colour, font, spacing=_LINE - _TEXT)
+    return np.asarray(strip)
 
 
 def _wrapped(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: float) -> list[str]:
@@ -170,17 +145,18 @@ def _as_html(page: Page) -> str:
         f'<figure><figcaption>{html.escape(panel.title)}</figcaption><img alt="" src="{_data(panel.picture)}"></figure>'
         for panel in page.panels
     )
-    facts = "".join(
-        f"<tr><td>{html.escape(fact.what)}</td><td>{html.escape(fact.value)}</td>"
-        f'<td class="{html.escape(fact.origin)}">{html.escape(fact.origin)}</td>'
-        f'<td class="how">{html.escape(fact.how)}</td></tr>\n'
-        for fact in page.facts
+    lines = [{name: html.escape(words) for name, words in fact(line).items()} for line in page.facts]
+    table = "".join(
+        '<tr><td>{what}</td><td>{value}</td><td class="{origin}">{origin}</td><td class="how">{how}</td></tr>\n'.format(
+            **line
+        )
+        for line in lines
     )
-    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in page.notes)
-    warnings = "".join(f'<p class="warning">{html.escape(warning)}</p>\n' for warning in page.warnings)
+    doubts = "".join(f'<p class="warning">{html.escape(sentence(doubt))}</p>\n' for doubt in page.doubts)
+    notes = "".join(f"<p>{html.escape(sentence(note))}</p>\n" for note in page.notes)
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style>'
-        f"</head><body>\n<h1>{title}</h1>\n{warnings}{figures}\n<table>\n{facts}</table>\n{notes}</body></html>\n"
+        f"</head><body>\n<h1>{title}</h1>\n{doubts}{figures}\n<table>\n{table}</table>\n{notes}</body></html>\n"
     )
 
 

@@ -1,29 +1,13 @@
-"""The sentences of remarks and estimates by their kinds: the only place of their words.
+"""The words of findings by their kinds: the only place of them.
 
-A sentence fills in the figures of its remark, as `str.format` does; for an estimate also ``what``, ``value``,
-``tolerance`` and ``spread``. There are formats of its own: a noun is counted, and "place" says a depth in words. Tuples
-are joined by " x " if they are whole numbers or their format ends with " x", else by commas.
+They fill in the figures of their finding, as `str.format` does; also ``about``, ``value`` and ``spread``. There are
+formats of their own: a noun is counted, and "place" says a depth in words. Tuples are joined by " x " if they are whole
+numbers or their format ends with " x", else by commas.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from string import Formatter
-from typing import Any
-
-from smokelift.checks import Remark, counted
-from smokelift.setup.estimate import Estimate
-
-MODELS: Mapping[object, str] = {
-    "absorption": "absorption only",
-    "unshadowed": "scattering without shadows",
-    "single": "single scattering with shadows",
-    "multiple": "multiple scattering",
-}
-"""Models of scattering in words."""
-
-MIN_DEPTH = 0.005
-"""Smallest distance (m) from the middle of the box that is said: less would look exact."""
 
 SENTENCES: Mapping[str, str] = {
     # how the clips are read
@@ -92,6 +76,9 @@ SENTENCES: Mapping[str, str] = {
         "background."
     ),
     "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is matched to the background.",
+    "steady exposure": "Measured on what does not move, against the background.",
+    "exposure unseen": "The background is too dark or too bright to show it, so what flickers is taken for smoke.",
+    "noise": "{lasting:.1f} of it is shared by neighboring pixels.",
     "background of one frame": (
         "One frame alone does not show what moves: the color around it counts as background, and every other color as "
         "smoke. If that is wrong, hide what is no smoke by a mask, or give a clean plate or a color as background."
@@ -154,6 +141,10 @@ SENTENCES: Mapping[str, str] = {
         "high where the smoke is."
     ),
     "assumed scale": "Box not given: the picture is assumed to be {height:.3g} m high where the smoke is.",
+    "scale": (
+        "The picture is taken to be {height:g} m high where the smoke is. Give its distance, or camera and box, in "
+        "meters."
+    ),
     "box around the smoke": "Domain around the smoke: {size:.2f x} m, {resolution} voxels.",
     "box over the picture": "Domain over all of the picture: {size:.2f x} m, {resolution} voxels.",
     "grown box": "The box grows to {size:.4g x} m, a whole number of cubic voxels along every side.",
@@ -168,24 +159,28 @@ SENTENCES: Mapping[str, str] = {
     "closed sides": "Closed sides of the box: {sides}; the others are open.",
     # where in depth it stands
     "axis depth by box": (
-        "Where the smoke stands in depth is undetermined: it is taken to be {depth:place}, give or take {spread:.2g} "
-        "m. If you know better, give its distance, an inlet or a second view."
+        "Where the smoke stands in depth is undetermined: it is taken to be {depth:place} of the box, give or "
+        "take {spread:.2g} m. If you know better, give its distance, an inlet or a second view."
     ),
     "axis depth by floor contact": (
-        "By its contact with the floor of the box the smoke stands {depth:place}, give or take {spread:.2g} m. If you "
-        "know better, give its distance, an inlet or a second view."
+        "By its contact with the floor of the box the smoke stands {depth:place} of the box, give or take {spread:.2g} "
+        "m. If you know better, give its distance, an inlet or a second view."
     ),
     "axis depth by distance": (
-        "By the distance of its lower end the smoke stands {depth:place}, give or take {spread:.2g} m."
+        "By the distance of its lower end the smoke stands {depth:place} of the box, give or take {spread:.2g} m."
     ),
-    "axis depth by inlets": "By the marked inlets the smoke stands {depth:place}, give or take {spread:.2g} m.",
+    "axis depth by inlets": (
+        "By the marked inlets the smoke stands {depth:place} of the box, give or take {spread:.2g} m."
+    ),
     # the smoke as a medium, fire, and the light
     "assumed medium": (
         "Medium not given: extinction {extinction:.3g} 1/m (density 1 is thick smoke), albedo {albedo:g}, isotropic."
     ),
+    "extinction": "A picture shows it times the density only. Give the medium if you know it.",
+    "albedo": "A picture shows it times the light only. Give the medium if you know it.",
     "smoke colour": (
-        "Smoke color: {value} (linear), at least {degrees:.0f} degrees from that of gray smoke; if the light has this "
-        "color and the smoke is gray, give gray as the smoke's color."
+        "Smoke color: {value:.2f} (linear), at least {degrees:.0f} degrees from that of gray smoke; if the light has "
+        "this color and the smoke is gray, give gray as the smoke's color."
     ),
     "smoke colour unseen": (
         "Smoke color: undetermined, so gray is assumed: no smoke is thick, bright and free of clipped pixels enough to "
@@ -218,30 +213,31 @@ SENTENCES: Mapping[str, str] = {
         "or use frames with less fire."
     ),
     "source radiance": (
-        "Source radiance: {value} (red, green, blue), as what is left of the picture behind the smoke shows. The light "
-        "is as strong as that asks for."
+        "Source radiance: {value:.2g} (red, green, blue), as what is left of the picture behind the smoke shows. The "
+        "light is as strong as that asks for."
     ),
     "undetermined source radiance": (
         "Source radiance: undetermined, because nothing behind the smoke has the detail that shows how much it hides. "
         "Thinner smoke in stronger light looks the same. Give the lights if you know them."
     ),
+    "sun's direction": "Suns from many sides look the same. Give the lights.",
     "scattering": "Scattering: {value}.",
     "compared scattering": (
         "Scattering: {value}; pixels that the fit leaves out differ by {error:.1%} of the smoke's contrast, with "
         "{other} by {other_error:.1%}."
     ),
     "gain of a view": (
-        "It shows the smoke {value} times (red, green, blue) as bright as the input. This is evened out: the pictures "
-        "differ by {error:.1%} of the smoke's contrast instead of {error_as_it_is:.1%}. If the cameras have the same "
-        "exposure, light is missing: give the lights."
+        "It shows the smoke {value:.2f} times (red, green, blue) as bright as the input. This is evened out: the "
+        "pictures differ by {error:.1%} of the smoke's contrast instead of {error_as_it_is:.1%}. If the cameras have "
+        "the same exposure, light is missing: give the lights."
     ),
     # what a run needs besides
     "given": "{what} by hand: {value}.",
     "velocity grid coarsening": (
         "Velocity grid: {voxels:.0f} voxels along the longest side, because the depth of the smoke is uncertain."
     ),
+    "cost": "Right to a factor of 1.5 if nothing else runs; {free:.1f} GiB of memory are free.",
     # where the parts of a result come from
-    "replaced pictures": "Those of {frames} missing or damaged; a neighboring good one stands in.",
     "pictures that are fitted": (
         "The density renders to the pictures of {cameras:camera} in the scene's light and medium; psnr in the figures "
         "of a frame says how closely."
@@ -312,42 +308,45 @@ SENTENCES: Mapping[str, str] = {
         "{motion}. Give a buoyancy if you know better."
     ),
 }
-"""Sentences by the kinds of remarks."""
+"""Sentences by kind."""
 
+_DEPTHS = tuple(f"axis depth by {cue}" for cue in ("box", "floor contact", "distance", "inlets"))
 
-def sentence(remark: Remark) -> str:
-    """Return a remark or an estimate in words."""
-    figures = all_figures(remark)
-    words = _Words().vformat(SENTENCES[remark.kind], (), figures)
-    return f"View {figures['view']}: {words}" if "view" in figures else words
+VALUES: Mapping[str, str] = {
+    "alpha channel": "{behind}",
+    "black background": "black",
+    "background of one colour": "one color, {color:.2g} (linear)",
+    "background assumed": "one color, {color:.2g} (linear)",
+    "background seen": "a picture",
+    "background partly seen": "a picture, {unknown:.0%} of it unknown",
+    "mask": "hides {hidden:.0%} of the first frame",
+    "exposure": "changes by up to {change:.0%}, evened out",
+    "steady exposure": "steady",
+    "exposure unseen": "taken to be steady",
+    "noise": "{level}, {codes:.1f} of 255",
+    "assumed camera": "perspective, stands still",
+    "assumed camera with the file's lens": "perspective, stands still",
+    "scale": "box of {size:.3g x} m",
+    "box around the smoke": "around the smoke of the whole clip",
+    "box over the picture": "over all of the picture",
+    "grown box": "as given, grown to whole voxels",
+    "extinction": "{value:.3g} 1/m at density 1",
+    "albedo": "{value:.3g}",
+    "smoke colour": "{value:.2f}",
+    "smoke colour unseen": "gray",
+    "smoke colour near the light's": "gray",
+    "source radiance": "smoke of radiance {taken:.2g}",
+    "undetermined source radiance": "smoke of radiance {taken:.2g}",
+    **dict.fromkeys(_DEPTHS, "{depth:place} of the box, give or take {spread:.2g} m"),
+    "cost": "about {seconds:.0f} s, {memory:.1f} GiB of memory, up to {disk:.0f} MB on disk",
+}
+"""What a line of a table says that is taken, by kind; of other kinds it is the value itself."""
 
-
-def all_figures(remark: Remark) -> dict[str, Any]:
-    """Return the figures that a sentence fills in."""
-    own = {}
-    if isinstance(remark, Estimate):
-        own = {"value": remark.value, "tolerance": remark.tolerance, "spread": remark.spread}
-        own["what"] = remark.what.capitalize()
-    return {**remark.figures, **own}
-
-
-class _Words(Formatter):
-    """Fills figures in, by the formats of the sentences."""
-
-    def format_field(self, value: Any, format_spec: str) -> str:
-        """Return a figure in words."""
-        if isinstance(value, tuple):
-            lengths = format_spec.endswith(" x") or all(isinstance(one, int) for one in value)
-            return (" x " if lengths else ", ").join(format(one, format_spec.removesuffix(" x")) for one in value)
-        if format_spec == "place":
-            return _place(value)
-        if isinstance(value, int) and len(format_spec) > 1 and format_spec.replace(" ", "").isalpha():
-            return counted(value, format_spec)
-        return format(MODELS.get(value, value), format_spec)
-
-
-def _place(depth: float) -> str:
-    """Where a depth (m) behind the middle of the box is, in words."""
-    if abs(depth) < MIN_DEPTH:
-        return "in the middle of the box"
-    return f"{abs(depth):.2g} m {'behind' if depth > 0 else 'before'} the middle of the box"
+SHORT: Mapping[str, str] = {
+    "background of one colour": "one color",
+    "background assumed": "one color",
+    "background partly seen": "a picture",
+    "scale": "{size:.3g x} m",
+    **dict.fromkeys(_DEPTHS, "{depth:place}"),
+}
+"""Values in fewer words, for a sidebar."""

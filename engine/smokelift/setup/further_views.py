@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks import Doubt, Figures, Remark
+from smokelift.checks import Figures, Finding
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
@@ -23,9 +23,8 @@ from smokelift.footage.image_sequence import is_video
 from smokelift.footage.plate import evened
 from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.backdrop_remarks import backdrop_remarks
+from smokelift.setup.backdrop_findings import backdrop_findings
 from smokelift.setup.coarse import HeldOut, coarse_frames, held_out
-from smokelift.setup.estimate import Estimate
 from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
@@ -56,36 +55,36 @@ Gain = NDArray[np.float32]
 
 def open_views(
     first: ShotView, scene: CompleteScene, numbers: Sequence[int], lit: bool, settings: Settings
-) -> tuple[tuple[ShotView, ...], tuple[Estimate[str], ...], tuple[Remark, ...]]:
-    """Open the further views of a lit scene at the input's exposure; return what was measured and noticed too.
+) -> tuple[tuple[ShotView, ...], list[Finding]]:
+    """Open the further views of a lit scene at the input's exposure; return what was found of them too.
 
     Brightness is compared in frames ``numbers``. It says more where lights are given (``lit``). A clip or a camera that
     does not fit the input's is a ValueError.
     """
-    views, remarks = [], []
-    estimates: list[Estimate[str]] = []
+    views: list[ShotView] = []
+    found: list[Finding] = []
     for number in range(len(scene.views)):
-        view, noticed = _open_view(number, first.clip, scene)
+        view, opened = _open_view(number, first.clip, scene)
+        found += opened
         if settings.selection.measure and scene.scattering != "absorption":
-            view, found = _evened(number + 1, first, view, scene, numbers, lit, settings)
-            estimates += found
+            view, gain = _evened(number + 1, first, view, scene, numbers, lit, settings)
+            found += gain
         views.append(view)
-        remarks += noticed
-    return tuple(views), tuple(estimates), tuple(remarks)
+    return tuple(views), found
 
 
-def disagreement(shot: Shot) -> tuple[Doubt, ...]:
+def disagreement(shot: Shot) -> list[Finding]:
     """A doubt if the views disagree about where the smoke is."""
     shares = []
     for frame in shot.spread(AGREEMENT_SAMPLES):
         views = ViewSet.of(shot.observe(frame), shot.optics).views
         shares.append(agreement([view.mask for view in views], [view.projection for view in views]))
     agreed = float(np.median(shares))
-    return () if agreed >= MIN_AGREED_SHARE else (Doubt("disagreeing views", {"agreed": agreed}),)
+    return [] if agreed >= MIN_AGREED_SHARE else [Finding("disagreeing views", {"agreed": agreed}, doubt=True)]
 
 
-def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
-    """A further view of a scene, from 0, with its background; and remarks on it."""
+def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Finding]]:
+    """A further view of a scene, from 0, with its background; and what was found of it."""
     view = scene.views[number]
     opened = _opened(view.clip, clip, scene)
     if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
@@ -105,17 +104,17 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
-    last = opened.first + len(opened) - 1
-    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
-    remarks = (*opened.remarks(), Remark("further view", which), *backdrop_remarks(found))
-    return shown, [replace(remark, figures={**remark.figures, "view": number + 1}) for remark in remarks]
+    first, last = opened.numbers[0], opened.numbers[-1]
+    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": first, "last": last}
+    said = (*opened.findings(), Finding("further view", which), *backdrop_findings(found))
+    return shown, [replace(each, figures={**each.figures, "view": number + 1}) for each in said]
 
 
 def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
     """The part of a view's clip that shows what the input does."""
-    first = clip.first
+    first = clip.numbers[0]
     if source.frames is not None:
-        first += source.first - (scene.clip.first if scene.clip is not None else clip.first)
+        first += source.first - (scene.clip.first if scene.clip is not None else clip.numbers[0])
     # pictures carry no rate of their own
     fps = clip.fps if source.fps is None and not is_video(source.path) else source.fps
     with Clip.open(replace(source, fps=fps, frames=None, mask=None)) as whole:
@@ -137,11 +136,11 @@ def _evened(
     numbers: Sequence[int],
     lit: bool,
     settings: Settings,
-) -> tuple[ShotView, tuple[Estimate[str], ...]]:
+) -> tuple[ShotView, list[Finding]]:
     """View ``number``, from 1, divided by its gain; as it is if no gain fits clearly better."""
     frames = coarse_frames((front, view), numbers, scene)
     if not frames:
-        return view, ()
+        return view, []
 
     def tried(gain: Gain) -> HeldOut:
         evened = [replace(frame, views=(frame.views[0], frame.views[1].over(gain))) for frame in frames]
@@ -160,12 +159,12 @@ def _evened(
     gain = ratio.astype(np.float32)
     error = tried(gain).error
     if error >= as_it_is - tolerance:
-        return view, ()
-    named = ", ".join(f"{value:.2f}" for value in gain)
-    figures: Figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
+        return view, []
+    red, green, blue = map(float, gain)
+    figures = {"view": number, "error": error, "error_as_it_is": as_it_is, "tolerance": tolerance}
     clip = view.clip.changed(lambda _, picture: picture / gain)
     source = None if view.source is None else view.source / gain
     plates = view.plates.through(lambda part: part / gain if part.ndim == 3 else part)
     view = replace(view, clip=clip, plates=plates, source=source)
-    what = f"gain of view {number}"
-    return view, (Estimate("gain of a view", figures, what=what, value=named, source="measured", tolerance=tolerance),)
+    about, value = f"gain of view {number}", (red, green, blue)
+    return view, [Finding("gain of a view", figures, about=about, value=value, source="measured")]

@@ -6,19 +6,19 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from smokelift.checks import Remark
+from smokelift.checks import Figures, Finding
 from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
-from smokelift.setup.resolution import DetailSpectrum, Shape, choose_grid, smoke_detail
+from smokelift.setup.resolution import DetailSpectrum, Grid, Shape, choose_grid, smoke_detail
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 
 PICTURE_HEIGHT = 2.0
@@ -49,14 +49,14 @@ DETAIL_FRAMES = 3
 class Geometry:
     """The camera of the clip's full pictures, and the box with its final resolution.
 
-    ``resolution`` says why it is that one, ``qualities`` which each quality would take, ``remarks`` what was assumed.
+    ``qualities`` has the grid that each quality would take, ``findings`` what was assumed, and why the resolution is
+    that one.
     """
 
     camera: Camera
     domain: Domain
-    resolution: Estimate[Shape]
     qualities: Mapping[Quality, Grid]
-    remarks: tuple[Remark, ...]
+    findings: tuple[Finding, ...]
 
 
 def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> Geometry:
@@ -86,24 +86,24 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         return _grids(floor, size, limit.voxels(pixels), multiple)
 
     qualities: Mapping[Quality, Grid]
-    remarks: tuple[Remark, ...]
+    found: tuple[Finding, ...]
     asked = box.resolution if isinstance(box, Domain) and settings.resolution is None else settings.resolution
     if isinstance(asked, tuple):
         voxel = float((size / asked).max())
         domain = replace(box, resolution=asked) if isinstance(box, Domain) else _standing_on(floor, voxel, asked)
-        resolution = Estimate("given", what="resolution", value=asked, source="given")
+        resolution = Finding("given", about="resolution", value=asked, source="given")
         qualities = dict.fromkeys(QUALITIES, Grid(asked, None))
     else:
         domain, resolution, qualities = choose_grid(grids, lambda whole: _detail(estimate, camera, whole), settings)
     if box is None:
-        around = "box around the smoke" if samples.smoky else "box over the picture"
-        remarks = (
-            _assumed(known, clip.lens, metres * camera.size[1]),
-            Remark(around, {"size": domain.size, "resolution": domain.resolution}),
-        )
+        figures: Figures = {"size": domain.size, "resolution": domain.resolution}
+        around = Finding("box around the smoke", figures, about="box", source="estimated")
+        if not samples.smoky:
+            around = replace(around, kind="box over the picture", source="assumed")
+        found = _assumed(known, clip.lens, metres * camera.size[1]), around
     else:
-        remarks = _grown(box, domain)
-    return Geometry(camera, domain, resolution, qualities, remarks)
+        found = _grown(box, domain)
+    return Geometry(camera, domain, qualities, (*found, resolution))
 
 
 def _require_place(scene: Scene, known: Camera | None) -> None:
@@ -134,16 +134,17 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _assumed(given: Camera | None, lens: float | None, height: float) -> Remark:
+def _assumed(given: Camera | None, lens: float | None, height: float) -> Finding:
     """What is assumed of a camera, or of the scale alone if the camera is given.
 
     ``lens`` (mm) is the file's, ``height`` (m) that of the picture where the smoke is.
     """
     if given is not None:
-        return Remark("assumed scale", {"height": height})
+        return Finding("assumed scale", {"height": height}, source="assumed")
+    camera = partial(Finding, about="camera", source="assumed")
     if lens is not None:
-        return Remark("assumed camera with the file's lens", {"height": height, "lens": lens})
-    return Remark("assumed camera", {"height": height, "lens": LENS, "film": FILM[0]})
+        return camera("assumed camera with the file's lens", {"height": height, "lens": lens})
+    return camera("assumed camera", {"height": height, "lens": LENS, "film": FILM[0]})
 
 
 def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
@@ -212,11 +213,11 @@ def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[
     return tuple(grids)
 
 
-def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
-    """A remark if a given box had to grow to whole voxels."""
+def _grown(given: Box, domain: Domain) -> tuple[Finding, ...]:
+    """That a given box had to grow to whole voxels, if it had to."""
     if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
         return ()
-    return (Remark("grown box", {"size": domain.size}),)
+    return (Finding("grown box", {"size": domain.size}, about="box", source="given"),)
 
 
 def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:

@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.checks import Doubt, Figures, Remark
+from smokelift.checks import UNDETERMINED, Figure, Figures, Finding
+from smokelift.checks.array_types import Doubles
 from smokelift.extraction import brightest_smoke, tells_source
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.environment_count import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import CoarseFrame, held_out
-from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
@@ -55,11 +55,11 @@ def first_light(
     geometry: Geometry,
     medium: Medium,
     estimate: FirstEstimate,
-) -> tuple[tuple[Light, ...], Scattering, tuple[Estimate[str], ...], tuple[Remark, ...]]:
+) -> tuple[tuple[Light, ...], Scattering, list[Finding]]:
     """Return the lights of a scene, or one from everywhere without shadows, as strong as the clip shows.
 
     An environment gets the number of directions that stand for it. Returned next is the given model of scattering, or
-    the richest that the lights allow. Where light is needed but not given, the source radiance and a remark follow.
+    the richest that the lights allow. Where light is needed but not given, the findings say how bright it is.
     Shadows without a light to cast them are a ValueError.
     """
     if scattering in SHADOWED and not lights:
@@ -68,7 +68,7 @@ def first_light(
         )
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
-        return tuple(_countable(each, geometry, medium) for each in lights), richest, (), ()
+        return tuple(_countable(each, geometry, medium) for each in lights), richest, []
     found = _shown_source(estimate)
     if found is None:
         source = source_radiance(estimate.samples)
@@ -79,7 +79,8 @@ def first_light(
     share = np.array(medium.albedos) / (4 * np.pi)
     red, green, blue = np.divide(source, share, out=np.zeros(3), where=share > 0).tolist()
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
-    return (light,), richest, (_measured(found),), (Remark("assumed light", {"irradiance": light.irradiance}),)
+    assumed = Finding("assumed light", {"irradiance": light.irradiance}, source="assumed")
+    return (light,), richest, [assumed, _brightness(found, source)]
 
 
 def _shown_source(estimate: FirstEstimate) -> Picture | None:
@@ -89,14 +90,15 @@ def _shown_source(estimate: FirstEstimate) -> Picture | None:
     return estimate.source
 
 
-def _measured(source: Picture | None) -> Estimate[str]:
-    """The source radiance (3,) of the smoke as an estimate; undetermined if nothing but its brightness shows it."""
-    what = "source radiance"
-    if source is None:
-        return Estimate("undetermined source radiance", what=what, value=UNDETERMINED, source="assumed")
-    red, green, blue = map(float, source)
-    figures = {"red": red, "green": green, "blue": blue}
-    return Estimate(what, figures, what=what, value=f"{red:.2g}, {green:.2g}, {blue:.2g}", source="measured")
+def _brightness(shown: Picture | None, taken: Doubles) -> Finding:
+    """The source radiance (3,) of the smoke that is shown, and the one that is taken; undetermined if none is shown."""
+    about = "source radiance"
+    figures: dict[str, Figure] = {"taken": tuple(taken.tolist())}
+    if shown is None:
+        return Finding(f"undetermined {about}", figures, about=about, value=UNDETERMINED, source="assumed")
+    red, green, blue = map(float, shown)
+    figures |= {"red": red, "green": green, "blue": blue}
+    return Finding(about, figures, about=about, value=(red, green, blue), source="measured")
 
 
 def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
@@ -106,7 +108,7 @@ def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
     return replace(light, directions=environment_count(light, geometry.camera.at(0), geometry.domain, medium))
 
 
-def light_doubts(scattering: Estimate[str], samples: SmokeSamples, noise: Noise, *, burns: bool) -> tuple[Doubt, ...]:
+def light_doubts(scattering: Finding, samples: SmokeSamples, noise: Noise, *, burns: bool) -> list[Finding]:
     """A doubt if an assumed light leaves much unexplained; ``burns`` if there is fire.
 
     It is said only before one colour that is not black. What moves there is smoke, and its brightness shows its light,
@@ -115,16 +117,16 @@ def light_doubts(scattering: Estimate[str], samples: SmokeSamples, noise: Noise,
     error = scattering.figures.get(f"error_{scattering.value}", 0.0)
     assert isinstance(error, float)
     if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > MAX_QUIET_NOISE:
-        return ()
+        return []
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
     if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
-        return ()
-    return (Doubt("light of fire" if burns else "likely wrong light", {"error": error}),)
+        return []
+    return [Finding("light of fire" if burns else "likely wrong light", {"error": error}, doubt=True)]
 
 
 def find_scattering(
     frames: Sequence[CoarseFrame], finer: Callable[[], CoarseFrame | None], settings: Settings
-) -> tuple[Scattering, Estimate[str]]:
+) -> tuple[Scattering, Finding]:
     """Return the cheapest model of scattering that finds as good a density as the richest, which judges all.
 
     Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Where both fit a
@@ -154,10 +156,8 @@ def find_scattering(
         if errors[model] <= errors[richest] + tolerance:
             chosen = model
             break
-    figures: Figures = {f"error_{name}": value for name, value in errors.items()}
-    found: Estimate[str] = Estimate(
-        "scattering", figures, what="scattering", value=chosen, source="measured", tolerance=tolerance
-    )
+    figures: Figures = {**{f"error_{name}": value for name, value in errors.items()}, "tolerance": tolerance}
+    found = Finding("scattering", figures, about="scattering", value=chosen, source="measured")
     if len(errors) == 1:
         return chosen, found
     # the one that it is compared with is the richest, or the next cheaper one if it is the richest itself

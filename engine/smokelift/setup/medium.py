@@ -9,18 +9,16 @@ cameras balance it, or the background's, which stands in the same light. Figures
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from smokelift.checks import Doubt, Remark
+from smokelift.checks import UNDETERMINED, Finding
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.fire import CLIPPED_VALUE
 from smokelift.footage.images import brightest_channel
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
 from smokelift.scene.checks import Vector
-from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 
 OPTICAL_DEPTH_AT_ONE = 5.0
@@ -48,27 +46,25 @@ WHITE: Vector = (1.0, 1.0, 1.0)
 """Colour of grey smoke."""
 
 
-def find_medium(
-    scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain
-) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
-    """Complete the medium, with its flame's colour if fire burns; return what was measured and assumed too."""
+def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain) -> tuple[Medium, list[Finding]]:
+    """Complete the medium, with its flame's colour if fire burns; return what was found of it too."""
     medium, samples, fire = scene.medium, estimate.samples, estimate.fire
     flame_color = None if medium is None else medium.flame_color
-    estimates: list[Estimate[Any]] = []
-    remarks: list[Remark] = []
+    found: list[Finding] = []
     if medium is None or (flame_color is not None and medium == Medium(flame_color=flame_color)):
         medium = Medium(OPTICAL_DEPTH_AT_ONE / min(domain.size), flame_color=flame_color)
-        remarks.append(Remark("assumed medium", {"extinction": medium.extinction, "albedo": medium.albedo}))
+        figures = {"extinction": medium.extinction, "albedo": medium.albedo}
+        found.append(Finding("assumed medium", figures, about="medium", source="assumed"))
         color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
         medium = replace(medium, color=color)
-        estimates.append(coloured)
-    remarks += several_colours(samples)
+        found.append(coloured)
+    found += several_colours(samples)
     if fire is not None:
         red, green, blue = color = fire.color
         figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
-        estimates.append(Estimate("fire", figures, what="fire", value=f"{fire.share:.3f}", source="measured"))
+        found.append(Finding("fire", figures, about="fire", value=fire.share, source="measured"))
         medium = replace(medium, flame_color=color)
-    return medium, tuple(estimates), tuple(remarks)
+    return medium, found
 
 
 def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, grey: Medium) -> Doubles:
@@ -98,37 +94,32 @@ def source_radiance(samples: SmokeSamples) -> Doubles:
     return np.asarray(np.maximum(farthest + SOURCE_EXCESS * np.linalg.norm(farthest) * axis, 0))
 
 
-def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimate[str]]:
+def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding]:
     """Return the smoke's own colour in a light (3,), and what decided it.
 
     An unknown light is ones. The colour's largest channel is 1; it is white unless the clip shows that it is not grey.
     """
-    undetermined = Estimate(
-        "smoke colour near the light's",
-        what="smoke colour",
-        value=UNDETERMINED,
-        source="assumed",
-        tolerance=COLOURED,
-    )
+    figures = {"tolerance": COLOURED}
+    undetermined = Finding("smoke colour unseen", figures, about="smoke color", value=UNDETERMINED, source="assumed")
     line = _thickest(samples)
     if line is None:
-        return WHITE, replace(undetermined, kind="smoke colour unseen")
+        return WHITE, undetermined
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
     least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_SOURCE_VALUE else white
     if least.min() < COLOURED:
-        return WHITE, replace(undetermined, figures={"degrees": float(least.min())})
+        figures["degrees"] = float(least.min())
+        return WHITE, replace(undetermined, kind="smoke colour near the light's", figures=figures)
     # the palest that explains the clip
     own = sources[white.argmin()] / np.maximum(light, 1e-6)
     red, green, blue = (float(round(v, 3)) for v in own / own.max())
-    named = f"{red:.2f}, {green:.2f}, {blue:.2f}"
-    figures = {"degrees": float(white.min())}
-    found = replace(undetermined, kind="smoke colour", figures=figures, value=named, source="measured")
-    return (red, green, blue), found
+    figures["degrees"] = float(white.min())
+    color = red, green, blue
+    return color, Finding("smoke colour", figures, about="smoke color", value=color, source="measured")
 
 
-def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
+def several_colours(samples: SmokeSamples) -> list[Finding]:
     """Return a doubt if smoke before black has more than one colour, at a time or one after the other.
 
     Smoke of one colour has that colour before black, however thick it is. So what is off the colour that explains most
@@ -137,19 +128,19 @@ def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
     usable = samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE
     shown = samples.colours[usable].astype(np.float64)
     if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
-        return ()
+        return []
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
-        return ()
+        return []
     off = _off_one_colour(shown)
     if off < COLOURED:
-        return ()
+        return []
     ends = np.cumsum(samples.amounts, dtype=np.intp)[:-1]
     frames = [
         part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colours, usable)), strict=True)
     ]
     apart = [_off_one_colour(frame.astype(np.float64)) for frame in frames if len(frame) >= PIXELS]
     kind = "smoke that changes its colour" if apart and np.median(apart) < COLOURED else "smoke of several colours"
-    return (Doubt(kind, {"degrees": off}),)
+    return [Finding(kind, {"degrees": off}, doubt=True)]
 
 
 def _off_one_colour(colours: Doubles) -> float:

@@ -1,6 +1,6 @@
 """A shot in which everything is decided, from a clip and a scene that may leave things open.
 
-What is open is estimated from the clip or defaulted; remarks and estimates say what, and why.
+What is open is estimated from the clip or defaulted; the findings say what, and why.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from functools import partial
 
 import numpy as np
 
-from smokelift.checks import counted, require_kind
+from smokelift.checks import UNDETERMINED, Finding, Source, counted, require_kind
 from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
 from smokelift.render import scene_optics
 from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scene
-from smokelift.setup.backdrop_remarks import first_remarks
+from smokelift.setup.backdrop_findings import first_findings
 from smokelift.setup.coarse import coarse_frame, coarse_frames
-from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
@@ -57,9 +56,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     plates, samples = estimate.plates, estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
-    medium, of_medium, medium_remarks = find_medium(scene, estimate, camera, domain)
+    medium, of_medium = find_medium(scene, estimate, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    lights, richest, brightness, light_remarks = first_light(scene.lights, asked, geometry, medium, estimate)
+    lights, richest, of_light = first_light(scene.lights, asked, geometry, medium, estimate)
     complete = CompleteScene(
         camera=camera,
         domain=domain,
@@ -78,73 +77,69 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
         first = replace(first, source=np.asarray(lit, np.float32))
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
-    of_scattering: tuple[Estimate[str], ...] = ()
+    of_scattering: list[Finding] = []
     if coarse and asked is not None:
-        of_scattering = (Estimate("given", what="scattering", value=asked, source="given"),)
+        of_scattering = [Finding("given", about="scattering", value=asked, source="given")]
     elif coarse:
         finer = partial(coarse_frame, (first,), coarse[0].number, complete, times=2)
         scattering, chosen = find_scattering(coarse, finer, settings)
-        complete, of_scattering = replace(complete, scattering=scattering), (chosen,)
-        if brightness:
-            light_remarks += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
+        complete, of_scattering = replace(complete, scattering=scattering), [chosen]
+        if of_light:
+            of_light += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
     if complete.scattering == "absorption":
-        brightness = ()
-    others, gains, view_remarks = open_views(first, complete, samples.typical, bool(scene.lights), settings)
-    coarsening: tuple[Estimate[int], ...] = ()
+        of_light = [found for found in of_light if found.about != "source radiance"]
+    others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)
+    of_velocity: list[Finding] = []
     if settings.selection.measure:
-        coarsening = (velocity_coarsening(domain, settings),)
-        settings = replace(settings, velocity=replace(settings.velocity, coarsening=coarsening[0].value))
+        coarsening, chosen = velocity_coarsening(domain, settings)
+        of_velocity = [chosen]
+        settings = replace(settings, velocity=replace(settings.velocity, coarsening=coarsening))
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
         views=(first, *others),
         settings=settings,
-        remarks=(
-            *clip.remarks(),
-            *first_remarks(estimate, _given(scene.background, estimate)),
-            *geometry.remarks,
-            *medium_remarks,
-            *light_remarks,
-            *view_remarks,
+        findings=(
+            *clip.findings(),
+            *first_findings(estimate, _given(scene.background, estimate)),
+            *geometry.findings,
+            *of_medium,
+            *of_light,
+            *of_scattering,
+            *of_views,
+            *of_velocity,
         ),
-        estimates=(geometry.resolution, *of_medium, *of_scattering, *brightness, *coarsening, *gains),
         qualities=geometry.qualities,
         smoky=samples.smoky,
         place=None,
         fire=None if estimate.fire is None else replace(first, clip=estimate.fire.light),
     )
     if scene.views:
-        return replace(shot, remarks=(*shot.remarks, *disagreement(shot)))
+        return replace(shot, findings=(*shot.findings, *disagreement(shot)))
     place = clip_axis(shot, settings.distance) if settings.method == "default" else None
-    return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
+    return shot if place is None else replace(shot, place=place, findings=(*shot.findings, found_place(place)))
 
 
-def place_estimate(place: AxisEstimate) -> Estimate[str]:
-    """Return where in depth the smoke stands, as an estimate; undetermined if only the box says it."""
-    undetermined = Estimate(
-        f"axis depth by {place.cue}",
-        {"depth": place.depth},
-        what="axis depth",
-        value=UNDETERMINED,
-        source="assumed",
-        spread=place.deviation,
-    )
+def found_place(place: AxisEstimate) -> Finding:
+    """Return where in depth the smoke stands; undetermined if only the box says it."""
+    found = partial(Finding, f"axis depth by {place.cue}", {"depth": place.depth}, about="axis depth")
     if place.cue == "box":
-        return undetermined
-    return replace(undetermined, value=place.cue, source="given" if place.cue == "distance" else "measured")
+        return found(value=UNDETERMINED, source="assumed", spread=place.deviation)
+    source: Source = "given" if place.cue == "distance" else "measured"
+    return found(value=place.cue, source=source, spread=place.deviation)
 
 
-def velocity_coarsening(domain: Domain, settings: Settings) -> Estimate[int]:
-    """Return how many times the densities' grid is halved for the velocity; a side keeps eight voxels at least."""
-    what = "velocity grid coarsening"
-    if settings.velocity.coarsening is not None:
-        return Estimate("given", what=what, value=settings.velocity.coarsening, source="given")
+def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Finding]:
+    """Return how many times the densities' grid is halved for the velocity, and why; no side falls below 8 voxels."""
+    about = "velocity grid coarsening"
+    if (given := settings.velocity.coarsening) is not None:
+        return given, Finding("given", about=about, value=given, source="given")
     finest = settings.selection.velocity_side
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > finest and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    figures = {"voxels": float(longest)}
-    return Estimate(what, figures, what=what, value=coarsening, source="measured", tolerance=finest)
+    figures = {"voxels": float(longest), "tolerance": finest}
+    return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
 
 
 def _given(background: Background | None, estimate: FirstEstimate) -> bool:

@@ -14,13 +14,12 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from smokelift.checks import Figures
+from smokelift.checks import Figures, Finding
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 from smokelift.scene import Domain
-from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.settings import LOST_DETAIL, QUALITIES, Quality, Settings
 
 Shape = tuple[int, int, int]
@@ -31,6 +30,17 @@ finer than the step of four voxels from one grid to the next."""
 
 NORMAL_MEDIAN = 1.4826
 """Standard deviation of normal noise over the median of its size."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The voxels (x, y, z) that a quality takes for a clip.
+
+    ``lost`` is the part of the smoke's contrast that is finer than they show; None where that was not measured.
+    """
+
+    resolution: Shape
+    lost: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +71,7 @@ class DetailSpectrum:
 
 def choose_grid(
     grids: Callable[[Quality], Sequence[Domain]], detail: Callable[[Domain], DetailSpectrum | None], settings: Settings
-) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
+) -> tuple[Domain, Finding, Mapping[Quality, Grid]]:
     """Choose the coarsest of a quality's grids that loses no more of what the finest shows than tolerated.
 
     ``grids`` returns those that a quality allows, the coarsest first; ``detail`` the smoke's detail in a box, None
@@ -71,7 +81,7 @@ def choose_grid(
     spectrum = detail(own[-1])
     if spectrum is None:
         shape = own[0].resolution
-        unseen = Estimate("resolution without smoke", what="resolution", value=shape, source="assumed")
+        unseen = Finding("resolution without smoke", about="resolution", value=shape, source="assumed")
         return own[0], unseen, dict.fromkeys(QUALITIES, Grid(shape, None))
 
     def coarsest(allowed: Sequence[Domain], tolerance: float) -> Domain:
@@ -86,13 +96,12 @@ def choose_grid(
         "lost_beside_finest": spectrum.lost(longest, max(own[-1].resolution)),
         "pixels": spectrum.pixels,
         "quality": settings.quality,
+        "tolerance": tolerance,
     }
     taken = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
     taken[settings.quality] = domain
     qualities = {name: Grid(grid.resolution, spectrum.lost(max(grid.resolution))) for name, grid in taken.items()}
-    why = Estimate(
-        "resolution", figures, what="resolution", value=domain.resolution, source="measured", tolerance=tolerance
-    )
+    why = Finding("resolution", figures, about="resolution", value=domain.resolution, source="measured")
     return domain, why, qualities
 
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.density import AxisEstimate, Observation
 from smokelift.extraction import Element, extract_element
 from smokelift.footage.clip import Clip
@@ -16,7 +15,7 @@ from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
-from smokelift.setup.estimate import Estimate, Grid
+from smokelift.setup.resolution import Grid
 from smokelift.setup.settings import Quality, Settings
 
 
@@ -92,10 +91,8 @@ class Shot:
         The cameras, the input first.
     settings
         With all that was left open decided.
-    remarks
-        What was assumed or noticed, with the doubts: why the result may be nothing, or wrong.
-    estimates
-        What was decided, with the figures that decided it.
+    findings
+        What was given, measured, assumed and noticed, in the order in which it was found, with the doubts.
     qualities
         The grid that each quality would take of this clip.
     smoky
@@ -111,8 +108,7 @@ class Shot:
     optics: Optics
     views: tuple[ShotView, ...]
     settings: Settings
-    remarks: tuple[Remark, ...]
-    estimates: tuple[Estimate[Any], ...]
+    findings: tuple[Finding, ...]
     qualities: Mapping[Quality, Grid]
     smoky: tuple[int, ...]
     place: AxisEstimate | None

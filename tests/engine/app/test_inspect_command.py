@@ -65,14 +65,14 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     done = events(capsys.readouterr().out)[-1]
     assert done["files"] == [str(page)]
     known = {fact["what"]: fact for fact in done["facts"]}
-    for what in ("exposure", "camera", "scale", "extinction", "albedo", "light strength"):
+    for what in ("exposure", "camera", "scale", "extinction", "albedo", "source radiance"):
         assert known[what]["origin"] == "undetermined"
     for what in ("sun's direction", "sun's color", "ambient share"):
         assert known[what]["origin"] == "undetermined"
     if kind == ".html":
         assert "sun&#x27;s direction" in page.read_text(encoding="utf-8")
     assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
-    assert known["scattering"]["origin"] == known["grid"]["origin"] == known["noise"]["origin"] == "measured"
+    assert known["scattering"]["origin"] == known["resolution"]["origin"] == known["noise"]["origin"] == "measured"
     assert page.stat().st_size > 5000
 
 
@@ -87,7 +87,7 @@ def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -
     assert "around the smoke" not in said + str(done["facts"])
     assert "thickest smoke" not in said + str(done["facts"])
     known = {fact["what"]: fact["origin"] for fact in done["facts"]}
-    assert known["box"] == known["grid"] == "undetermined"
+    assert known["box"] == known["resolution"] == "undetermined"
 
 
 def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from smokelift.app import progress
 from smokelift.app.progress import reporter
-from smokelift.checks import Doubt, Remark
+from smokelift.checks import Finding
 
 
 def figures(seconds: float, hull_share: float = 0.1, psnr: float = 41.23) -> dict[str, Any]:
@@ -102,6 +102,6 @@ def test_the_fit_that_stays_on_the_terminal_is_the_runs(capsys) -> None:
 
 def test_a_note_says_whether_it_is_a_doubt(capsys) -> None:
     say = reporter("json")
-    for kind in (Remark, Doubt):
-        say.note(kind("bars"))
+    for doubt in (False, True):
+        say.note(Finding("bars", doubt=doubt))
     assert [(each["kind"], each["doubt"]) for each in lines(capsys)] == [("bars", False), ("bars", True)]

@@ -71,7 +71,7 @@ def test_smoke_is_as_bright_however_a_program_held_it(tmp_path: Path, kind: str,
             alpha = opacity(n)
             shown = grey * TINT * alpha + (1 - alpha) * clip.backdrop
             np.testing.assert_allclose(clip.frame(n), shown, atol=0.012)
-        assert [note.figures.get("held") for note in clip.notes] == ([] if held == STRAIGHT else [held])
+        assert [note.figures.get("held") for note in clip.findings()] == ([] if held == STRAIGHT else [held])
 
 
 @pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
@@ -101,4 +101,4 @@ def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path: Pa
     with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
         assert clip.backdrop == 0
         np.testing.assert_allclose(clip.frame(2), stored(IN_CODES, 2, 0.715)[..., :3], rtol=1e-5)
-        assert clip.notes == ()
+        assert clip.findings() == ()

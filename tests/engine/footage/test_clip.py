@@ -10,7 +10,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError, StoredPicture
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
@@ -79,7 +79,7 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_frames_are_linear_and_in_order(ramp: Path) -> None:
     with Clip.open(ramp) as clip:
         assert (clip.fps, len(clip), clip.size) == (24.0, 30, (32, 16))
-        assert (clip.path, clip.warning, clip.first) == (ramp, None, 0)
+        assert (clip.path, clip.warning, clip.numbers[0]) == (ramp, None, 0)
         assert near(codes(clip), LEVELS)
         image = clip.frame(12)
         assert image.dtype == np.float32
@@ -204,7 +204,7 @@ def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch
 def test_a_range_of_frames(ramp: Path) -> None:
     source = ClipSource(ramp, fps=60.0, frames=(5, 9))
     with Clip.open(source) as clip:
-        assert (clip.fps, len(clip), clip.first) == (60.0, 5, 5)
+        assert (clip.fps, len(clip), clip.numbers) == (60.0, 5, range(5, 10))
         assert near(codes(clip), LEVELS[5:10])
         for outside in (-1, 5):
             with pytest.raises(ClipError, match=f"there is no frame {outside}; there are 0 to 4"):
@@ -249,7 +249,7 @@ def test_a_truncated_clip_offers_what_is_there(tmp_path: Path, name: str) -> Non
     whole.write_bytes(data[: len(data) * 6 // 10])
     with Clip.open(whole) as clip:
         assert 10 <= len(clip) <= 20
-        assert clip.warning == Remark("truncated clip", {"path": str(clip.path), "frames": len(clip)})
+        assert clip.warning == Finding("truncated clip", {"path": str(clip.path), "frames": len(clip)})
         for n, image in enumerate(clip):
             np.testing.assert_array_equal(image, wanted[n])
     whole.write_bytes(data[:300])
@@ -275,7 +275,8 @@ def test_a_damaged_frame_is_as_one_that_a_camera_dropped(tmp_path: Path, broken:
     with Clip.open(blanked(path, broken)) as clip:
         assert codes(clip) == [LEVELS[n] for n in levels]
         assert clip.damaged == tuple(broken)
-        assert clip.remarks() == (Remark("damaged frames", {"path": str(path), "frames": f"frame {broken[0]} is"}),)
+        (said,) = clip.findings()
+        assert (said.kind, said.figures["frames"]) == ("damaged frames", f"frame {broken[0]} is")
         assert clip.part(4, 5).damaged == ()
         changed = clip.changed(lambda n, picture: picture * (n == broken[0]))
         assert codes_of(changed, broken[0]) == 0
@@ -316,8 +317,9 @@ def test_hlg_pq_and_linear_video(tmp_path: Path, transfer: int, luma: float, lin
     path = wide_codes(tmp_path / "a.mkv", [round(luma), 512, 512], color_trc=transfer, color_primaries=9, colorspace=9)
     with Clip.open(path) as clip:
         np.testing.assert_allclose(clip.frame(0)[8, 8], linear, rtol=0.005)
-        assert Remark("other primaries", {"primaries": "BT.2020"}) in clip.remarks()
-        assert (Remark("high dynamic range", {"transfer": "HLG"}) in clip.notes) == (transfer == 18)
+        said = {found.kind: found.figures for found in clip.findings()}
+        assert said["other primaries"] == {"primaries": "BT.2020"}
+        assert (said.get("high dynamic range") == {"transfer": "HLG"}) == (transfer == 18)
 
 
 @pytest.mark.parametrize("shape", [Fraction(2, 1), Fraction(3, 4)])
@@ -336,7 +338,7 @@ def test_anamorphic_pixels_become_square(tmp_path: Path, shape: Fraction) -> Non
         edge = round(16 * shape)
         assert linear_to_srgb(clip.frame(0)[24, : edge - 3]).min() > 0.75
         assert linear_to_srgb(clip.frame(0)[24, edge + 3 :]).max() < 0.05
-        (note,) = clip.notes
+        (note,) = clip.findings()
         assert (note.kind, note.figures["scaled"]) == ("scaled pictures", (clip.size[0], 48))
 
 
@@ -352,7 +354,7 @@ def test_interlaced_video_is_of_one_moment(tmp_path: Path) -> None:
         out.mux(stream.encode(av.VideoFrame.from_ndarray(picture)))
         out.mux(stream.encode())
     with Clip.open(path) as clip:
-        assert clip.notes == (Remark("interlaced clip"),)
+        assert [found.kind for found in clip.findings()] == ["interlaced clip"]
         found = linear_to_srgb(clip.frame(0)[:63, 32]) * 255
         lines = np.interp(np.arange(63), np.arange(0, 64, 2), picture[::2, 0, 0])
         np.testing.assert_allclose(found, lines[:, None].repeat(3, 1), atol=2.5)
@@ -412,7 +414,7 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
     with Clip.open(tmp_path / "frame_####.png", fps=24) as clip:
         assert codes(clip) == [10, 20, 20, 40, 40]
         assert [file.name for file in clip.files] == [f"frame_000{n}.png" for n in (1, 2, 4, 5)]
-        assert clip.remarks()[0].figures["frames"] == "frames 2 and 4 are"
+        assert clip.findings()[0].figures["frames"] == "frames 2 and 4 are"
     (tmp_path / "frame_0005.png").unlink()
     pictures(tmp_path, [400])
     with pytest.raises(ClipError, match=r"frame_0003\.png: this picture is missing, as .* most .* frame_0400\.png"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from films import codes_apart
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import StoredPicture
@@ -25,7 +25,7 @@ class Filmed:
     backdrop: float | None = None
     fps = 24.0
     files: tuple[Path, ...] = ()
-    notes: tuple[Remark, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     def __init__(self, codes: np.ndarray) -> None:
         self.codes, self.count = codes, len(codes)

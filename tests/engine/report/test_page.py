@@ -7,18 +7,19 @@ import re
 import numpy as np
 from PIL import Image
 
-from smokelift.report.page import COLUMNS, Fact, Page, Panel, write_page
+from smokelift.checks import Finding
+from smokelift.report.page import COLUMNS, Page, Panel, write_page
 
 RED = np.zeros((50, 80, 3), np.uint8) + np.uint8([200, 10, 10])
 PAGE = Page(
     "clip <1>.mp4",
-    ["All may be < nothing."],
+    [Finding("closed sides", {"sides": "< nothing"}, doubt=True)],
     [Panel(f"panel {n}", RED) for n in range(COLUMNS + 1)],
     [
-        Fact("light", "from everywhere", "undetermined", "Give [[lights]] & all is well. " * 20),
-        Fact("grid", "8 x 8", "given"),
+        Finding("closed sides", {"sides": "x & all is well. " * 40}, about="light", value="all", source="assumed"),
+        Finding("given", about="resolution", value=(8, 8), source="given"),
     ],
-    ["A last word."],
+    [Finding("open box")],
 )
 
 
@@ -27,7 +28,7 @@ def test_a_page_as_html_needs_no_other_file(tmp_path) -> None:
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "clip &lt;1&gt;.mp4" in text
     assert '<td class="undetermined">' in text
-    assert text.index('<p class="warning">All may be &lt; nothing.') < text.index("<img")
+    assert text.index('<p class="warning">Closed sides of the box: &lt; nothing') < text.index("<img")
     assert "&amp; all is well" in text
     pictures = re.findall(r'src="([^"]*)"', text)
     assert len(pictures) == len(PAGE.panels)

@@ -16,8 +16,8 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     scene = replace(plume.write(tmp_path, plume.densities, dim), lights=())
     with Clip.open(scene.clip) as clip:
         without, with_fire = (prepare_shot(each, scene, draft) for each in (clip, clip.changed(burning)))
-    assert not any(choice.what == "fire" for choice in without.estimates)
-    (found,) = [choice for choice in with_fire.estimates if choice.what == "fire"]
+    assert not any(choice.about == "fire" for choice in without.findings)
+    (found,) = [choice for choice in with_fire.findings if choice.about == "fire"]
     assert found.kind == "fire"
     assert found.figures["share"] > 0 and found.figures["green"] == pytest.approx(0.4, abs=0.05)
     assert without.fire is None and without.scene.medium.flame_color is None
@@ -44,12 +44,12 @@ def test_what_may_be_fire_is_said_and_is_fire_where_its_color_is_given(plume, dr
             prepare_shot(each, how, draft)
             for each, how in ((clip.changed(glowing), scene), (clip.changed(glowing), given), (clip, given))
         )
-    assert alone.fire is None and "possible fire" in [remark.kind for remark in alone.remarks]
-    assert certain.fire is not None and "possible fire" not in [remark.kind for remark in certain.remarks]
+    assert alone.fire is None and "possible fire" in [remark.kind for remark in alone.findings]
+    assert certain.fire is not None and "possible fire" not in [remark.kind for remark in certain.findings]
     assert certain.observe_fire(2).image.max() > 0.5
     assert certain.scene.medium.flame_color == (1.0, 0.4, 0.1)
     assert certain.scene.medium.extinction == alone.scene.medium.extinction, "the rest of the medium is not given"
-    assert none.fire is None and "possible fire" not in [remark.kind for remark in none.remarks]
+    assert none.fire is None and "possible fire" not in [remark.kind for remark in none.findings]
 
 
 def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
@@ -59,6 +59,6 @@ def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip.changed(burning), scene, draft)
     assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
-    (found,) = [choice for choice in shot.estimates if choice.what == "fire"]
+    (found,) = [choice for choice in shot.findings if choice.about == "fire"]
     assert found.kind == "fire"
     assert [found.figures[name] for name in ("red", "green", "blue")] == [1.0, 0.5, 0.2]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from smokelift import render
-from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.scene import Background, ClipSource, Scene, View, completed, look_at_matrix, orbit
@@ -20,13 +19,12 @@ def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
     """Its frame 0 is of the input's moment, its picture and plate are cut to the box, and a note says so."""
     shot = shot_of(two_views, draft)
     _, view = shot.views
-    assert (view.clip.first, len(view.clip)) == (1, 5)
+    assert (view.clip.numbers[0], len(view.clip)) == (1, 5)
     front, seen = shot.observe(2)
     assert front.camera == shot.views[0].working.camera
     assert seen.image.shape == seen.plate.image.shape == (*seen.camera.size[::-1], 3)
     np.testing.assert_array_equal(seen.image, view.working.cut(view.clip.frame(2)))
-    (remark,) = shot.remarks
-    assert remark.kind == "further view"
+    (remark,) = (found for found in shot.findings if found.kind == "further view")
     assert remark.figures == {
         "view": 1, "name": "frame_####.png", "degrees": pytest.approx(90), "first": 1, "last": 5,
     }  # fmt: skip
@@ -38,7 +36,7 @@ def test_a_further_view_follows_the_clip_that_is_used(two_views, draft, asked, f
     for scene in (two_views, two_views.with_frames(1, 3)):
         with Clip.open(two_views.clip, frames=asked) as clip:
             _, view = prepare_shot(clip, scene, draft).views
-        assert (view.clip.first, len(view.clip)) == (first, asked[1] - asked[0] + 1)
+        assert (view.clip.numbers[0], len(view.clip)) == (first, asked[1] - asked[0] + 1)
 
 
 def behind(shot: Shot, view: int, frame: int = 0) -> float:
@@ -57,7 +55,7 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
     pictured = shot_of(replace(two_views, background=wall), as_filmed)
     assert behind(pictured, 0) == pytest.approx(0.5, abs=1e-2)
     assert behind(pictured, 1) < 0.2
-    assert Remark("black background", {"view": 1}) in pictured.remarks
+    assert ("black background", {"view": 1}) in [(found.kind, found.figures) for found in pictured.findings]
     for n in range(6):
         write_image(tmp_path / f"wall_{n}.exr", np.full((56, 40, 3), n / 10, np.float32))
     changing = replace(view, background=Background(image=tmp_path / "wall_#.exr"))
@@ -72,7 +70,7 @@ def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
         view = replace(view, camera=replace(view.camera, matrix=lower))
     else:
         view = replace(view, background=Background(color=(0.5, 0.5, 0.5)))
-    remarks = shot_of(replace(two_views, views=(view,)), draft).remarks
+    remarks = shot_of(replace(two_views, views=(view,)), draft).findings
     assert [remark.figures["agreed"] < 0.8 for remark in remarks if remark.kind == "disagreeing views"] == [True]
 
 
@@ -138,15 +136,15 @@ def filmed(plume, tmp_path_factory):
 
 def gains(shot):
     """What was found, by view."""
-    return [choice for choice in shot.estimates if choice.what.startswith("gain of view")]
+    return [choice for choice in shot.findings if choice.about.startswith("gain of view")]
 
 
 @pytest.mark.parametrize("gain", [(0.6, 0.6, 0.6), (1.4, 1.0, 0.8)], ids=["exposure", "white balance"])
 def test_another_exposure_is_found_and_undone(filmed, draft, gain) -> None:
     shot = shot_of(filmed(gain), draft)
     (found,) = gains(shot)
-    assert found.what == "gain of view 1"
-    np.testing.assert_allclose([float(value) for value in found.value.split(", ")], gain, rtol=0.1)
+    assert found.about == "gain of view 1"
+    np.testing.assert_allclose(found.value, gain, rtol=0.1)
     assert found.figures["error"] < found.figures["error_as_it_is"]
     plate = shot.views[1].plates.at(0).image
     np.testing.assert_allclose(plate.mean((0, 1)), BEHIND, rtol=0.1)
@@ -163,5 +161,5 @@ def test_unknown_light_explains_more(filmed, draft) -> None:
     """A ratio that counts in known light may be the light's where that is taken to come from everywhere."""
     scene = filmed((1.28,) * 3)
     (found,) = gains(shot_of(scene, draft))
-    assert float(found.value.split(",")[0]) == pytest.approx(1.28, rel=0.06)
+    assert found.value[0] == pytest.approx(1.28, rel=0.06)
     assert gains(shot_of(replace(scene, lights=()), draft)) == []

@@ -7,14 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from smokelift.checks import Doubt
+from smokelift.checks import Finding
 from smokelift.footage.clip import Clip
 from smokelift.footage.noise import lasting_noise
 from smokelift.output.images import write_image
 from smokelift.scene import Background, DirectionalLight, EnvironmentLight, Medium, Scene, SceneError
 from smokelift.setup import illumination
 from smokelift.setup.coarse import HeldOut
-from smokelift.setup.estimate import Estimate
 from smokelift.setup.illumination import light_doubts
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -85,16 +84,14 @@ def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft
 def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(error, behind, noise, said) -> None:
     shown = np.linspace(0.1, 0.5, 300).reshape(100, 3) if behind is None else np.tile(behind, (100, 1))
     samples = SimpleNamespace(behind=shown, smoky=(0,))
-    choice = Estimate(
-        "scattering", {"error_absorption": error}, what="scattering", value="absorption", source="measured"
-    )
+    choice = Finding("scattering", {"error_absorption": error}, about="scattering", value="absorption")
     for burns, kind in ((False, "likely wrong light"), (True, "light of fire")):
         doubts = light_doubts(choice, samples, lasting_noise(noise / 255), burns=burns)
-        assert doubts == (Doubt(kind, {"error": error}),) * said
+        assert doubts == [Finding(kind, {"error": error}, doubt=True)] * said
 
 
-def chosen(shot: Shot, what: str) -> Estimate:
-    (choice,) = (choice for choice in shot.estimates if choice.what == what)
+def chosen(shot: Shot, about: str) -> Finding:
+    (choice,) = (choice for choice in shot.findings if choice.about == about)
     return choice
 
 
@@ -134,7 +131,7 @@ def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
     shot = shot_of(silhouette, draft)
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "absorption"
-    assert choice.figures["error_absorption"] <= choice.figures["error_unshadowed"] + choice.tolerance
+    assert choice.figures["error_absorption"] <= choice.figures["error_unshadowed"] + choice.figures["tolerance"]
     assert (choice.kind, choice.figures["other"]) == ("compared scattering", "unshadowed")
 
 
@@ -142,7 +139,7 @@ def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
     shot = shot_of(plume.scene, draft)
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "single"
-    assert choice.figures["error_unshadowed"] > choice.figures["error_single"] + 2 * choice.tolerance
+    assert choice.figures["error_unshadowed"] > choice.figures["error_single"] + 2 * choice.figures["tolerance"]
     assert choice.figures["error_absorption"] > 0.9
 
 
@@ -150,7 +147,7 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
     shot = shot_of(white, draft)
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "multiple"
-    assert choice.figures["error_multiple"] < choice.figures["error_single"] - choice.tolerance
+    assert choice.figures["error_multiple"] < choice.figures["error_single"] - choice.figures["tolerance"]
     assert (choice.kind, choice.figures["other"]) == ("compared scattering", "single")
     forward = replace(plume.scene, medium=replace(plume.scene.medium, anisotropy=0.3))
     assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").figures
@@ -212,7 +209,10 @@ def test_shadows_need_a_light(silhouette, draft) -> None:
 def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
     assert shot.scene.scattering == "single"
-    assert [choice.what for choice in shot.estimates] == ["resolution", "velocity grid coarsening"]
+    assert [choice.about for choice in shot.findings if choice.value is not None] == [
+        "resolution",
+        "velocity grid coarsening",
+    ]
 
 
 # environments

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.setup.estimate import UNDETERMINED
+from smokelift.checks import UNDETERMINED
 from smokelift.setup.first_estimate import SmokeSamples
 from smokelift.setup.medium import several_colours, smoke_colour, source_radiance
 
@@ -138,4 +138,4 @@ def test_smoke_of_one_colour_is_not_said_to_have_several(one, other, behind):
     both = two_kinds(one, other, behind)
     if behind is BLACK and other is WHITE:
         both.colours[500:] = 1.0
-    assert several_colours(both) == ()
+    assert several_colours(both) == []

@@ -8,7 +8,7 @@ import pytest
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from smokelift.checks import Remark
+from smokelift.checks import UNDETERMINED, Finding
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
@@ -25,9 +25,8 @@ from smokelift.scene import (
     look_at_matrix,
 )
 from smokelift.scene.projection import project_points
-from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.geometry import MIN_SIDE_VOXELS
-from smokelift.setup.prepare import place_estimate, prepare_shot, velocity_coarsening
+from smokelift.setup.prepare import found_place, prepare_shot, velocity_coarsening
 from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
@@ -64,25 +63,25 @@ def test_the_focal_length_that_the_file_gives_is_taken(passing, draft) -> None:
         shot = prepare_shot(clip, bare(passing), replace(draft, resolution=(12, 12, 16)))
     width, height = clip.size
     assert shot.scene.camera.fx == pytest.approx(26 * np.hypot(width, height) / np.hypot(36, 24))
-    assert [remark.figures["lens"] for remark in shot.remarks if "lens" in remark.figures] == [26]
+    assert [remark.figures["lens"] for remark in shot.findings if "lens" in remark.figures] == [26]
 
 
 def test_a_complete_scene_stays_as_it_is(plume, draft) -> None:
     shot = shot_of(plume.scene, draft)
-    assert shot.remarks == ()
+    assert [found.kind for found in shot.findings if found.value is None] == []
     assert shot.scene == completed(plume.scene)
     assert shot.optics.scattering == "single"
 
 
 def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
-    assert [remark.kind for remark in estimated.remarks] == [
+    assert [remark.kind for remark in estimated.findings if remark.value is None] == [
         "black background", "assumed camera", "box around the smoke", "assumed medium", "assumed light",
     ]  # fmt: skip
 
 
 def test_the_light_that_nothing_tells_is_called_undetermined(estimated) -> None:
     """Before black, in an estimate that is said and kept."""
-    (source,) = [estimate for estimate in estimated.estimates if estimate.what == "source radiance"]
+    (source,) = [estimate for estimate in estimated.findings if estimate.about == "source radiance"]
     assert source.value == UNDETERMINED
 
 
@@ -116,7 +115,7 @@ def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) ->
     shot = shot_of(replace(plume.scene, camera=given, domain=None), draft)
     level = shot_of(replace(plume.scene, camera=None, domain=None), draft)
     assert shot.scene.camera == given.resized(*shot.clip.size)
-    assert Remark("assumed scale", {"height": 2.0}) in shot.remarks
+    assert Finding("assumed scale", {"height": 2.0}, source="assumed") in shot.findings
     low, high = (np.array(corner) for corner in (shot.scene.domain.min, shot.scene.domain.max))
     centre = (low + high) / 2
     camera = given.resized(*shot.clip.size)
@@ -170,7 +169,7 @@ def test_one_colour_behind_a_moving_camera_is_found(tracked, draft) -> None:
     shot = shot_of(replace(tracked, background=None), draft)
     assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
     assert shot.found_background is None
-    assert "black background" in [remark.kind for remark in shot.remarks]
+    assert "black background" in [remark.kind for remark in shot.findings]
 
 
 def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None:
@@ -218,7 +217,7 @@ def test_a_camera_that_travels_before_texture_is_refused(draft, tmp_path) -> Non
 
 
 def test_a_clip_from_the_hand_is_registered_and_that_is_said(draft, tmp_path) -> None:
-    (said,) = [remark for remark in shot_of(moving_clip(tmp_path, 0.0), draft).remarks if "registered" in remark.kind]
+    (said,) = [remark for remark in shot_of(moving_clip(tmp_path, 0.0), draft).findings if "registered" in remark.kind]
     assert said.kind == "frames registered"
     assert 3 < said.figures["pixels"] < 12
     assert 0 <= said.figures["frame"] < 8
@@ -228,11 +227,11 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
     shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
     choices = [velocity_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), draft) for shape in shapes]
-    assert [choice.value for choice in choices] == [0, 1, 2, 3, 4, 1]
-    assert [choice.figures["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
+    assert [coarsening for coarsening, _ in choices] == [choice.value for _, choice in choices] == [0, 1, 2, 3, 4, 1]
+    assert [choice.figures["voxels"] for _, choice in choices] == [30, 24, 24, 24, 18, 75]
     by_hand = replace(draft, velocity=replace(draft.velocity, coarsening=0))
-    choice = velocity_coarsening(plume.scene.domain, by_hand)
-    assert (choice.value, choice.source) == (0, "given")
+    coarsening, choice = velocity_coarsening(plume.scene.domain, by_hand)
+    assert (coarsening, choice.value, choice.source) == (0, 0, "given")
 
 
 def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
@@ -255,7 +254,7 @@ def test_a_camera_is_alone_where_no_other_sees_the_smoke_and_it_stands_still(plu
     ],
 )
 def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, depth: float, kind: str) -> None:
-    estimate = place_estimate(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
+    estimate = found_place(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
     assert (estimate.kind, estimate.figures, estimate.spread) == (kind, {"depth": depth}, 0.123)
     assert (estimate.value == "undetermined") == (estimate.source == "assumed") == (cue == "box")
     assert (estimate.source == "given") == (cue == "distance")
@@ -264,7 +263,7 @@ def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, depth: float, kind: str)
 def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
     blind = replace(plume.scene, inlets=())
     found = shot_of(blind, draft)
-    assert found.place is not None and found.estimates[-1] == place_estimate(found.place)
+    assert found.place is not None and found.findings[-1] == found_place(found.place)
     marked = shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), draft)
     assert marked.place is not None and marked.place.cue == "inlets"
     along = view_frame(blind.camera)[1]
@@ -273,10 +272,10 @@ def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
     known = shot_of(blind, given)
     assert known.place is not None and known.place.cue == "distance"
     assert known.place.depth == pytest.approx(0.1, abs=0.05)
-    assert known.estimates[-1].source == "given"
+    assert known.findings[-1].source == "given"
     blank = shot_of(blind, Settings.preset(draft.quality, method="paper"))
     assert blank.place is None
-    assert "axis depth" not in [choice.what for choice in blank.estimates]
+    assert "axis depth" not in [choice.about for choice in blank.findings]
     with pytest.raises(ValueError, match="The inlets say where the smoke stands; leave the distance out"):
         shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), given)
 

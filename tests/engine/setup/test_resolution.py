@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from smokelift.checks import Finding
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, EIGHT_BIT_STEP, lasting_noise
@@ -67,9 +68,9 @@ def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
     assert sides[0] > sides[1] >= sides[2]
     assert sides[2] <= 36
     for shot in (sharp, soft, blurred):
-        (choice,) = (choice for choice in shot.estimates if choice.what == "resolution")
+        (choice,) = (choice for choice in shot.findings if choice.about == "resolution")
         assert choice.value == shot.scene.domain.resolution
-        assert choice.figures["lost_beside_finest"] <= choice.tolerance
+        assert choice.figures["lost_beside_finest"] <= choice.figures["tolerance"]
         assert (choice.kind, choice.source) == ("resolution", "measured")
         assert (shot.scene.domain.min, shot.scene.domain.max) == ((-1, -1, 0), (1, 1, 3))
         x, y, z = shot.scene.domain.resolution
@@ -96,7 +97,7 @@ def test_a_given_resolution_wins(filmed) -> None:
     assert shot_of(scene, Settings.preset("draft")).scene.domain == scene.domain
     by_hand = shot_of(scene, Settings.preset("draft", resolution=(20, 20, 30)))
     assert by_hand.scene.domain.resolution == (20, 20, 30)
-    assert by_hand.estimates[0].source == "given"
+    assert Finding("given", about="resolution", value=(20, 20, 30), source="given") in by_hand.findings
 
 
 @pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
@@ -106,10 +107,10 @@ def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> No
     shot = shot_of(scene, Settings.preset("draft"))
     domain = shot.scene.domain
     assert LIMITS["draft"].most - 8 <= max(domain.resolution) <= LIMITS["draft"].most
-    assert shot.estimates[0].source == "measured"
+    assert [found.source for found in shot.findings if found.about == "resolution"] == ["measured"]
     over = np.subtract(domain.max, box.max)
     assert np.all((over > -1e-6) & (over < domain.voxel_size)) and domain.min[2] == 0
-    assert (np.abs(over).max() > 1e-6) == ("grown box" in [remark.kind for remark in shot.remarks])
+    assert (np.abs(over).max() > 1e-6) == ("grown box" in [remark.kind for remark in shot.findings])
 
 
 def test_a_box_without_a_resolution_holds_whatever_is_given_by_hand(filmed) -> None:
@@ -127,7 +128,7 @@ def test_final_has_a_voxel_a_pixel(filmed, box) -> None:
         scene = filmed(blur, grain=0.3)
         scene = scene if box else Scene(clip=scene.clip, background=scene.background)
         shot = shot_of(scene, Settings.preset("final", resolution="auto"))
-        (choice,) = (choice for choice in shot.estimates if choice.what == "resolution")
+        (choice,) = (choice for choice in shot.findings if choice.about == "resolution")
         pixels = choice.figures["pixels"]
         across = voxel_width(shot.scene.camera, shot.scene.domain) * max(choice.value)
         assert pixels == pytest.approx(across, rel=1e-3)

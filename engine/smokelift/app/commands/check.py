@@ -8,7 +8,7 @@ from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.checks import counted
 from smokelift.output.sequence import Sequence
-from smokelift.report.shortcomings import count_empty, shortcomings
+from smokelift.report.result import count_empty, shortcomings
 
 HELP = "check that a sequence is complete and undamaged"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from smokelift.app.options import add_directed_options, finite_number, named_path, require_new
 from smokelift.app.progress import Reporter, say_sequence
-from smokelift.checks import Doubt
+from smokelift.checks import Finding
 from smokelift.direct import (
     CONTRADICTED,
     DISSOLVED,
@@ -160,10 +160,10 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
         if not contradicted and (buoyancy := figures.get(CONTRADICTED, 0.0)):
             contradicted = True
             motion = "rises" if buoyancy < 0 else "sinks"
-            say.note(Doubt("contradicted buoyancy", {"buoyancy": buoyancy, "motion": motion}))
+            say.note(Finding("contradicted buoyancy", {"buoyancy": buoyancy, "motion": motion}, doubt=True))
         if not said and figures.get(DISSOLVED, 0.0) > NOTICED:
             said = True
-            say.note(Doubt("dissolving smoke", {"frame": number, "room": room}))
+            say.note(Finding("dissolving smoke", {"frame": number, "room": room}, doubt=True))
 
 
 def _continuation(options: argparse.Namespace) -> Continuation:

@@ -53,8 +53,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     scene, source = scene_of(options)
     with Clip.open(source) as clip:
         extraction = extract(clip, scene)
-        for remark in clip.remarks():
-            say.note(remark)
+        for finding in clip.findings():
+            say.note(finding)
         say.start(len(extraction), 0)
         files, before = [], time.monotonic()
         for number, file in enumerate(extraction.write(options.out), 1):

@@ -11,16 +11,16 @@ from typing import Any
 
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
-from smokelift.checks import counted
+from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
 from smokelift.report.cost import Spent, estimate_cost, peak_memory
 from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
-from smokelift.report.page import PAGE_KINDS, Fact, write_page
-from smokelift.report.provenance import made_up, record
-from smokelift.report.shortcomings import foreseen
+from smokelift.report.page import PAGE_KINDS, write_page
+from smokelift.report.result import foreseen, made_up
+from smokelift.report.views import choices, fact, origin, sentence, value
 from smokelift.report.workload import Workload
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
@@ -65,16 +65,16 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
         domain = shot.scene.domain
-        remarks = (*shot.remarks, *foreseen(shot), *boundaries(shot.scene), *shot.estimates, *made_up(shot))
-        for remark in remarks:
-            say.note(remark)
+        findings = [*shot.findings, *foreseen(shot), *boundaries(shot.scene), *made_up(shot)]
+        for finding in findings:
+            say.note(finding)
         work = Workload.of(shot, settings)
         prepared = Spent(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
         cost = estimate_cost(domain.resolution, work, prepared)
         known = facts(shot, scene, cost)
         files = list(options.page)
         if options.page:
-            page = inspection_page(shot, scene, known, remarks)
+            page = inspection_page(shot, scene, known, findings)
             for path in options.page:
                 write_page(path, page)
         if options.write is not None:
@@ -82,14 +82,12 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
-        f"{counted(frames, 'frame')} of {voxels} voxels: about {cost.seconds:.0f} s if nothing else runs, "
-        f"{cost.memory / 2**30:.1f} GiB of memory ({cost.memory_free / 2**30:.1f} are free), up to "
-        f"{cost.disk / 1e6:.0f} MB on disk.{written}",
+        f"{counted(frames, 'frame')} of {voxels} voxels: {value(known[-1])}. {sentence(known[-1])}{written}",
         {
             "frames": frames,
             "scene": scene_to_dict(shot.scene),
-            "choices": [record(estimate) for estimate in shot.estimates],
-            "facts": [fact.as_dict() for fact in known],
+            "choices": choices(shot.findings),
+            "facts": [fact(line) for line in known],
             "files": [str(path) for path in files],
             "qualities": _qualities(shot, work, prepared),
             **asdict(cost),
@@ -105,7 +103,7 @@ def _qualities(shot: Shot, work: Workload, prepared: Spent) -> dict[str, dict[st
     }
 
 
-def _write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, ...]:
+def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path, ...]:
     """Write all that was found into a scene file, with the facts as comments; return the files.
 
     An estimated background of one colour becomes a colour of the file. Any other is left to be found again, because a
@@ -115,7 +113,7 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, .
     scene, given = Scene(**vars(shot.scene)), shot.scene.background
     plate = shot.found_background if given.estimated else None
     picture = path.with_name(f"{path.stem}_background.exr")
-    said = [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"]
+    said = [f"{line.about}: {value(line)} ({origin(line)})" for line in known if line.about != "cost"]
     colour = None if plate is None else plate[0, 0]
     one_colour = colour is not None and bool((plate == colour).all())
     files = (path,) if plate is None or one_colour else (path, picture)

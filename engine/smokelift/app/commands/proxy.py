@@ -7,7 +7,7 @@ import time
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS, TIMES, write_proxies
 from smokelift.output.sequence import Sequence
 
@@ -30,4 +30,4 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         say.frame(number, {"origin": "made coarser", "seconds_density": now - before, "seconds_velocity": 0.0})
         before = now
     frames = len(sequence.frames)
-    say.finish(Remark("proxy", {"frames": frames, "directory": str(sequence.directory)}), {"frames": frames})
+    say.finish(Finding("proxy", {"frames": frames, "directory": str(sequence.directory)}), {"frames": frames})

@@ -12,7 +12,7 @@ from PIL import Image
 
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter, median_psnr, seconds_before
-from smokelift.checks import Figures, Remark
+from smokelift.checks import Figures, Finding
 from smokelift.footage.clip import Clip
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
@@ -22,12 +22,11 @@ from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.report.cost import frames_seconds, require_memory
-from smokelift.report.provenance import made_up
-from smokelift.report.sentences import sentence
-from smokelift.report.shortcomings import count_empty, shortcomings
+from smokelift.report.result import count_empty, made_up, shortcomings
+from smokelift.report.views import sentence
 from smokelift.report.workload import Workload
 from smokelift.scene import Domain
-from smokelift.setup.backdrop_remarks import what_helps
+from smokelift.setup.backdrop_findings import what_helps
 from smokelift.setup.shot import Shot
 
 HELP = "turn a clip or scene file into a VDB sequence"
@@ -67,8 +66,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = reconstruction.shot
         resolution, work = shot.scene.domain.resolution, Workload.of(shot, settings)
         require_memory(resolution, work, given=isinstance(scene.domain, Domain))
-        for remark in (*shot.remarks, *shot.estimates, *made_up(shot)):
-            say.note(remark)
+        for finding in (*shot.findings, *made_up(shot)):
+            say.note(finding)
         finished, new = _finished(options), set[int]()
         say.start(shot.length, finished, frames_seconds(resolution, work) * (1 - finished / shot.length))
         report = _report(shot, options.thumbnail, say, new)
@@ -92,7 +91,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     seconds = time.monotonic() - began + seconds_before(sequence, new)
     fit = median_psnr(figures)
     result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
-    done = Remark("written", result) if fit is None else Remark("reconstructed", {**result, "psnr": fit})
+    done = Finding("written", result) if fit is None else Finding("reconstructed", {**result, "psnr": fit})
     say.finish(done, {**result, "psnr": fit})
 
 

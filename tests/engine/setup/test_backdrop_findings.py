@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.checks import Doubt, Remark
+from smokelift.checks import Finding
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import blurred, linear_to_srgb, srgb_to_linear
@@ -15,7 +15,7 @@ from smokelift.footage.plate import Plate
 from smokelift.footage.strokes import Strokes
 from smokelift.output.images import write_image
 from smokelift.scene import Background
-from smokelift.setup.backdrop_remarks import backdrop_remarks, doubts, first_remarks
+from smokelift.setup.backdrop_findings import backdrop_findings, doubts, first_findings
 from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
 from tests.engine.footage.films import coded, film, puff, wall
 
@@ -61,7 +61,7 @@ def test_smoke_that_may_be_in_the_plate_is_said(grey, unknown_rows, said) -> Non
     unknown = np.zeros_like(COVERED)
     unknown[:unknown_rows] = True
     found = doubts(grey, replace(SEEN, unknown=unknown), given=False)
-    assert found == (Doubt("smoke in the background", {"share": 0.75}),) * said
+    assert found == [Finding("smoke in the background", {"share": 0.75}, doubt=True)] * said
 
 
 def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
@@ -73,10 +73,10 @@ def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
         smoke = np.where(across < 6, random.uniform(0.4, 0.9), np.roll(puff(2 * n + 1), -16, axis=1)) * (n != 5)
         write_image(tmp_path / f"frame_{n:02d}.png", tiles * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(2, 11)) as clip:
-        said = first_remarks(first_estimate(clip, None, None), given=False)
-    assert Remark("clearest frame", {"frame": 5}) in said
+        said = first_findings(first_estimate(clip, None, None), given=False)
+    assert Finding("clearest frame", {"frame": 5}) in said
     with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(6, 11)) as clip:
-        said = first_remarks(first_estimate(clip, None, None), given=False)
+        said = first_findings(first_estimate(clip, None, None), given=False)
     assert "clearest frame" not in [remark.kind for remark in said]
 
 
@@ -86,8 +86,8 @@ def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(grey) -> None:
     smoke, nothing = np.zeros((2, 24, 32), np.bool_)
     smoke[:12] = True
     found = replace(grey, strokes=Strokes(smoke, nothing, ~smoke))
-    assert backdrop_remarks(found)[-1] == Remark("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
-    assert doubts(found, replace(SEEN, unknown=unknown), given=False) == ()
+    assert backdrop_findings(found)[-1] == Finding("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
+    assert doubts(found, replace(SEEN, unknown=unknown), given=False) == []
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
@@ -103,7 +103,7 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
         same = np.where(across < 6, colour * thinner + flatter * (1 - thinner), tiles)
         np.testing.assert_allclose(shown, same)
         write_image(tmp_path / f"frame_{n:02d}.png", shown)
-    (remark,) = backdrop_remarks(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
+    (remark,) = backdrop_findings(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
     assert remark.kind == "background partly seen"
 
 
@@ -118,7 +118,7 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -
 
 
 def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
-    remarks = backdrop_remarks(find_backdrop(before(0.3, tmp_path), None, None))
+    remarks = backdrop_findings(find_backdrop(before(0.3, tmp_path), None, None))
     assert [remark.kind for remark in remarks] == ["black background", "background with objects"]
 
 
@@ -131,7 +131,7 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
         write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
         (doubt,) = doubts(find_backdrop(clip, None, None), SEEN, given=False)
-    assert doubt == Doubt("cut", {"before": 6, "after": 7, "first": 2, "last": 12})
+    assert doubt == Finding("cut", {"before": 6, "after": 7, "first": 2, "last": 12}, doubt=True)
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
         assert kinds(find_backdrop(clip, None, None)) == []
 
@@ -151,7 +151,7 @@ def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> N
         assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
         assert (masks[0] != masks[1]).mean() < 0.01
         assert kinds(found) == ["background of one frame"]
-    assert backdrop_remarks(found)[0].kind == ("background of one colour" if colour else "black background")
+    assert backdrop_findings(found)[0].kind == ("background of one colour" if colour else "black background")
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
@@ -163,7 +163,7 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
     with Clip.open(tmp_path / "frame_#.png") as clip:
         found = doubts(find_backdrop(clip, None, None), SEEN, given=False)
     assert [doubt for doubt in found if doubt.kind == "background of few frames"] == (
-        [Doubt("background of few frames", {"frames": count})] * doubted
+        [Finding("background of few frames", {"frames": count}, doubt=True)] * doubted
     )
 
 
@@ -201,7 +201,7 @@ def test_black_that_no_part_of_the_picture_shows_is_assumed_and_not_found(tmp_pa
         picture[shown] = np.clip(wide[:, 12 * n :][:, :56], 0.02, 0.95)[shown]
         write_image(tmp_path / f"fog_{n:02d}.png", picture[..., None].repeat(3, -1))
     with Clip.open(tmp_path / "fog_##.png", fps=24) as clip:
-        said = [remark.kind for remark in first_remarks(first_estimate(clip, None, None), given=False)]
+        said = [remark.kind for remark in first_findings(first_estimate(clip, None, None), given=False)]
     assert said == ["background assumed", "bars" if bars else "background never seen"]
 
 
@@ -217,13 +217,13 @@ def test_a_mask_that_hides_all_smoke_is_said(tmp_path, plate, inverted, smoke) -
     clip = film(tmp_path, plate, opacity, 0.6)
     write_image(tmp_path / "mask.png", np.broadcast_to((left != inverted)[None, :, None], (72, 56, 3)).astype(float))
     with Clip.open(clip.path, fps=24, mask=tmp_path / "mask.png") as masked:
-        said = [remark.kind for remark in first_remarks(first_estimate(masked, None, None), given=False)]
+        said = [remark.kind for remark in first_findings(first_estimate(masked, None, None), given=False)]
     wanted = "smoke behind the mask" if smoke else "no smoke before an estimated background"
     assert said[1:] == (["no smoke examined", wanted] if inverted else [])
 
 
 def test_how_many_frames_were_examined_is_said(grey) -> None:
-    assert doubts(grey, sample_smoke(grey.clip, grey.plates), given=False) == (
-        Doubt("no smoke examined", {"frames": 4}),
-        Doubt("no smoke before an estimated background"),
-    )
+    assert doubts(grey, sample_smoke(grey.clip, grey.plates), given=False) == [
+        Finding("no smoke examined", {"frames": 4}, doubt=True),
+        Finding("no smoke before an estimated background", doubt=True),
+    ]

@@ -1,0 +1,154 @@
+"""What is found of the background of a clip: how it was found, and why the result may be wrong."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from smokelift.checks import Finding
+from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average
+from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, sample_smoke, unknown_part
+
+BLACK = 0.001
+"""Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
+
+MOSTLY = 0.5
+"""Share that is a majority: of the smoke's pixels, those whose background is unknown; of what bars enclose, the smoke
+of a frame."""
+
+BETWEEN_BARS = 0.95
+"""Share of what two bars enclose, covered at some time, from which it is the picture and no smoke: smoke that crosses a
+picture has no two straight edges. A generated clip with bars has .98; fog and mist have .70 and .75 over all of their
+rows (docs/clips.md). Most of it has to be covered in a frame too, since a passing puff fills a strip in time."""
+
+MIN_SAME_FRAMES = 4
+"""Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
+
+COARSE_QUANTISER = 42.0
+"""Quantiser from which faint smoke is taken for background, if that has more than one colour. Before a brick wall crf
+32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/background.md)."""
+
+
+def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
+    """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
+    found, samples, hot = estimate.found, estimate.samples, estimate.hot
+    said = backdrop_findings(found, not given and _between_bars(samples))
+    if found.source == "alpha" and given:
+        said.append(Finding("background unused"))
+    said += doubts(found, samples, given)
+    if found.source == "picture" and samples.clearest is not None and samples.unknown.any():
+        said.append(Finding("clearest frame", {"frame": found.clip.numbers[samples.clearest]}))
+    if samples.exposure:
+        said.append(Finding("exposure", {"change": samples.exposure}, about="exposure", source="measured"))
+    if estimate.fire is None and hot.may_burn:
+        said.append(Finding("possible fire", {"share": hot.share, "bright": hot.bright}, doubt=True))
+    return said
+
+
+def backdrop_findings(found: Backdrop, bars: bool = False) -> list[Finding]:
+    """Return how a background was found, and what stands before it if it has one color, not that of ``bars``."""
+    said = _behind_smoke(found, bars)
+    if found.motion is not None:
+        figures: dict[str, float] = {"pixels": found.motion.reach(*found.clip.size)}
+        if found.motion.reference is None:
+            said.append(Finding("frames registered to the plate", figures))
+        else:
+            said.append(Finding("frames registered", {**figures, "frame": found.motion.reference}))
+    if found.strokes is not None:
+        strokes = {"smoke": found.strokes.smoke, "other": found.strokes.other, "behind": found.strokes.behind}
+        said.append(Finding("strokes", {name: float(painted.mean()) for name, painted in strokes.items()}))
+    return said
+
+
+def _behind_smoke(found: Backdrop, bars: bool) -> list[Finding]:
+    """What is behind the smoke; nothing if it is given."""
+    clip, plates = found.clip, found.plates
+    background = partial(Finding, about="background", source="estimated")
+    if found.source == "alpha":
+        return [background("alpha channel", {"behind": "white" if clip.backdrop else "black"})]
+    if found.source == "given":
+        return []
+    if found.source == "picture":
+        unknown = float(unknown_part(plates, clip, 0).mean())
+        return [
+            background("background partly seen", {"unknown": unknown}) if unknown else background("background seen")
+        ]
+    image = plates.at(0).image
+    colour = image[0, 0]
+    if not (image == colour).all():
+        colour = np.median(image.reshape(-1, 3), axis=0)
+    red, green, blue = map(float, colour)
+    figures = {"color": (red, green, blue)}
+    if bars or found.source == "black for want of a picture":
+        return [background("background assumed", figures, source="assumed")]
+    other = float((image != colour).any(-1).mean())
+    objects = [Finding("background with objects", {"share": other})] if other else []
+    if max(red, green, blue) < BLACK:
+        return [background("black background"), *objects]
+    return [background("background of one colour", figures), *objects]
+
+
+def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]:
+    """Return why the result may be empty or wrong; ``given`` if the scene says the background."""
+    clip, doubt = found.clip, partial(Finding, doubt=True)
+    said = []
+    if not samples.smoky:
+        said.append(doubt("no smoke examined", {"frames": len(clip.spread(SAMPLE_FRAMES))}))
+    if found.cut is not None:
+        before, after = found.cut
+        first, last = clip.numbers[0], clip.numbers[-1]
+        said.append(doubt("cut", {"before": before, "after": after, "first": first, "last": last}))
+    elif not samples.smoky:
+        said.append(what_helps(clip, given))
+    if found.source == "colour around one frame":
+        said.append(doubt("background of one frame"))
+    if found.source == "black for want of a picture":
+        said.append(doubt("background never seen"))
+    if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
+        said.append(doubt("background of few frames", {"frames": found.frames}))
+    if found.quantiser is not None and found.quantiser >= COARSE_QUANTISER:
+        said.append(doubt("strong compression", {"quantiser": found.quantiser}))
+    unknown = samples.unknown
+    if found.strokes is not None:  # what is painted as smoke is none of the background
+        unknown = unknown & (area_average(found.strokes.smoke, *unknown.shape[::-1]) < MOSTLY)
+    in_plate = unknown.sum() / max((unknown | samples.covered).sum(), 1)
+    if in_plate >= MOSTLY:
+        said.append(doubt("smoke in the background", {"share": float(in_plate)}))
+    if not given and _between_bars(samples):
+        said.append(doubt("bars"))
+    return said
+
+
+def what_helps(clip: Clip, given: bool) -> Finding:
+    """Return what may help where no smoke is found; ``given`` as in `doubts`."""
+    if clip.mask is not None and clip.mask.files and _shows_smoke(clip.as_filmed()):
+        return Finding("smoke behind the mask", doubt=True)
+    if given:
+        return Finding("no smoke before the given background", doubt=True)
+    if len(clip) == 1 and clip.backdrop is None:
+        return Finding("no smoke in one frame", doubt=True)
+    return Finding("no smoke before an estimated background", doubt=True)
+
+
+def _shows_smoke(clip: Clip) -> bool:
+    """Whether smoke is found in a clip of which nothing is given; not if its camera moves."""
+    try:
+        found = find_backdrop(clip, None, None)
+    except ValueError:
+        return False
+    return bool(sample_smoke(found.clip, found.plates).smoky)
+
+
+def _between_bars(samples: SmokeSamples) -> bool:
+    """Whether bars beside the picture are all that is background."""
+    at_a_time = len(samples.colours) / max(len(samples.gains), 1)
+    for covered in (samples.covered, samples.covered.T):
+        rows = np.flatnonzero(covered.any(1))
+        if len(rows) and rows[0] > 0 and rows[-1] < len(covered) - 1:
+            picture = covered[rows[0] : rows[-1] + 1]
+            if picture.mean() >= BETWEEN_BARS and at_a_time > MOSTLY * picture.size:
+                return True
+    return False

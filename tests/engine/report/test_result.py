@@ -1,0 +1,133 @@
+"""What is said of a result's origin follows from what was given and chosen, and against it from its figures."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from smokelift.checks import Finding
+from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
+from smokelift.report.result import foreseen, made_up, provenance, shortcomings
+from smokelift.report.views import choices, part, sentence
+from smokelift.scene import orbit
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from tests.engine.setup.shots import shot_of
+
+
+@pytest.fixture(scope="module")
+def shot(plume, draft) -> Shot:
+    """One camera, everything known."""
+    return shot_of(plume.scene, draft)
+
+
+def parts(shot: Shot) -> dict[str, Finding]:
+    """By what they are of."""
+    return {found.about: found for found in provenance(shot)}
+
+
+def test_only_what_the_pictures_show_is_measured(shot) -> None:
+    """The rays' optical depths are, the distribution along them is not, and the velocity follows from both."""
+    assert [(found.about, found.source) for found in provenance(shot)] == [
+        ("optical depth of every ray", "measured"),
+        ("velocity", "estimated"),
+        ("distribution along the rays", "assumed"),
+        ("fine structure along the rays", "made up"),
+    ]
+
+
+def test_made_up_detail_names_its_settings(shot) -> None:
+    other = replace(shot, settings=replace(shot.settings, detail=0.5, seed=3))
+    assert part(parts(other)["fine structure along the rays"])["settings"] == {"detail": 0.5, "seed": 3}
+    assert made_up(other) == [parts(other)["fine structure along the rays"]]
+
+
+def test_damaged_frames_have_one_number_wherever_they_are_named(shot, tmp_path) -> None:
+    """That of the clip's file from 0, as the range of its frames has it."""
+    for n in range(7):
+        write_image(tmp_path / f"frame_{n}.png", np.full((4, 4, 3), 0.5))
+    (tmp_path / "frame_3.png").write_bytes(b"nothing")
+    (tmp_path / "frame_5.png").unlink()
+    with Clip.open(tmp_path / "frame_#.png", fps=24, frames=(1, 6)) as clip:
+        other = replace(shot, views=(replace(shot.views[0], clip=clip),))
+        said = [found for found in clip.findings() if found.kind == "damaged frames"]
+        assert said == [parts(other)["some pictures"]]
+        assert said[0].figures["frames"] == "frames 3 and 5 are"
+
+
+@pytest.mark.parametrize("settings", [replace(Settings.preset(), detail=0.0), Settings.preset(method="paper")])
+def test_without_detail_nothing_is_made_up(shot, settings) -> None:
+    smooth = replace(shot, settings=replace(settings, seed=3))
+    assert "made up" not in {found.source for found in provenance(smooth)}
+    assert made_up(smooth) == []
+
+
+def test_nothing_is_made_up_where_cameras_stand_all_around(shot) -> None:
+    front = shot.views[0]
+    near = front.working.camera
+    around = [
+        replace(front, working=replace(front.working, camera=orbit(near, shot.optics.domain, degrees)))
+        for degrees in range(0, 180, 20)
+    ]
+    assert shot.settings.detail == 1
+    assert made_up(replace(shot, views=tuple(around))) == []
+    assert len(made_up(replace(shot, views=tuple(around[:4])))) == 1
+
+
+def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
+    def assumed(shot: Shot) -> str:
+        return parts(shot)["distribution along the rays"].kind
+
+    assert assumed(shot) == "depth by the smoke's width in one view"
+    paper = replace(shot, settings=Settings.preset(method="paper"))
+    assert assumed(paper) == "depth by the view from the side in one view"
+    two = replace(shot, views=shot.views * 2)
+    assert assumed(two) == "depth by the smoke's width in several views"
+    assert parts(two)["optical depth of every ray"].figures == {"cameras": 2}
+
+
+def test_json_holds_it(shot) -> None:
+    plain = [part(found) for found in provenance(shot)]
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+    assert [each["how"] for each in plain] == [sentence(found) for found in provenance(shot)]
+    plain = choices(shot.findings)
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+    for each in plain:
+        assert set(each) == {"what", "chosen", "kind", "reason", "measured", "tolerance", "by_hand"}
+        assert each["by_hand"] or each["measured"]
+
+
+@pytest.mark.parametrize(
+    ("left", "kinds"), [(0.2, []), (0.4, ["not all is smoke"]), (0.8, ["hardly any smoke fitted"])]
+)
+def test_a_fit_that_explains_little_is_said(left: float, kinds: list[str]) -> None:
+    errors = ({"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {})
+    said = shortcomings([{"hull_share": 0.1, **figures} for figures in errors])
+    assert said == [Finding(kind, {"error": left}, doubt=True) for kind in kinds]
+
+
+@pytest.mark.parametrize(("left", "said"), [(0.2, False), (0.3, True)])
+def test_what_may_be_no_smoke_is_foreseen(left: float, said: bool) -> None:
+    """By what the set-up's fit leaves, unless it made none, fire shines or the light is at fault."""
+    found = Finding("compared scattering", {"error": left}, about="scattering", value="single", source="measured")
+    shot = SimpleNamespace(fire=None, findings=(Finding("open box"), found))
+    assert foreseen(shot) == ([Finding("not all may be smoke", {"error": left}, doubt=True)] if said else [])
+    wrong = Finding("likely wrong light", {"error": left}, doubt=True)
+    for other in ({"fire": object()}, {"findings": ()}, {"findings": (found, wrong)}):
+        assert foreseen(SimpleNamespace(**{**vars(shot), **other})) == []
+
+
+def test_what_a_fire_leaves_is_said_to_be_fires() -> None:
+    """A bonfire lights its smoke: neither the light of the clip nor its background is what lacks."""
+    for left in (0.4, 0.8):
+        (said,) = shortcomings([{"hull_share": 0.1, "relative_error": left}], burns=True)
+        assert said == Finding("fire beside what is fitted", {"error": left}, doubt=True)
+    assert not shortcomings([{"hull_share": 0.1, "relative_error": 0.2}], burns=True)
+
+
+def test_empty_frames_are_counted() -> None:
+    said = shortcomings([{"hull_share": 0.0}, {"hull_share": None}, {}, {"hull_share": 0.2}])
+    assert said == [Finding("empty frames", {"empty": 3, "frames": 4}, doubt=True)]
