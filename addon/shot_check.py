@@ -38,27 +38,20 @@ WORDS = {
     "light": "Light",
     "sun's direction": "Light",
     "smoke color": "Smoke Color",
-    "place in depth": "Depth",
+    "axis depth": "Depth",
 }
 """What the engine knows of a shot and the panel shows, in the panel's words; the page of the report has the rest."""
 
 
 def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
-    """What was found or assumed, in a line each that fits the sidebar: what the engine says up to its first comma.
+    """What was found or assumed, in a line each that fits the sidebar.
 
     Parameters
     ----------
     facts
-        The engine's, each with ``what`` it is about and its ``value``.
+        The engine's, each with ``what`` it is about and its ``short`` value.
     """
-    shown = [(WORDS[fact["what"]], fact["value"].partition(",")[0]) for fact in facts if fact["what"] in WORDS]
-    short = (("box of ", ""), (" of the box", ""))
-    lines = []
-    for word, value in shown:
-        for long, brief in short:
-            value = value.replace(long, brief)
-        lines.append(f"{word}: {value}")
-    return lines
+    return [f"{WORDS[fact['what']]}: {fact['short']}" for fact in facts if fact["what"] in WORDS]
 
 
 def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
