@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from smokelift.checks import shown
-from smokelift.scene.files import advice_on_backslashes, read_text
-from smokelift.scene.toml_lines import Place, find_lines, line_of
+from smokelift.scene.toml_files import Place, line_of, parse_toml, read_text
 
 OPTIONS = (
     *("quality", "method", "resolution", "scattering", "frames", "mask"),
@@ -59,15 +57,11 @@ def read_shots(path: Path, check: Callable[[Sequence[str]], None]) -> tuple[Batc
 
     It raises ValueError with the file, the line and what was expected, and OSError if the file cannot be read.
     """
-    text = read_text(path)
-    try:
-        data = tomllib.loads(text)
-    except (RecursionError, ValueError) as error:
-        raise ValueError(f"{path.name}: is not valid TOML: {error}{advice_on_backslashes(text)}") from error
+    data, lines = parse_toml(read_text(path), path.name)
     try:
         return tuple(_shots(path.absolute().parent, data, check))
     except _ListError as error:
-        raise ValueError(f"{path.name}{line_of(error.place, find_lines(text))}: {error}") from error
+        raise ValueError(f"{path.name}{line_of(error.place, lines)}: {error}") from error
 
 
 def _shots(base: Path, data: Mapping[str, Any], check: Callable[[Sequence[str]], None]) -> Iterator[BatchShot]:

@@ -20,7 +20,7 @@ from smokelift.output.atomic import atomic_path
 from smokelift.output.layout import INDEX, MAX_START_NUMBER
 from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
-from smokelift.scene.files import read_text
+from smokelift.scene.toml_files import read_text
 
 FORMAT = 1
 """Version of the file's structure; any other is refused."""

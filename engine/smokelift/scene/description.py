@@ -22,9 +22,7 @@ from smokelift.checks import listed, require_kind, shown
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, file_path, integer, set_fields
 from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
-from smokelift.scene.environment_light import EnvironmentLight
-from smokelift.scene.finite_lights import PointLight
-from smokelift.scene.lights import Light
+from smokelift.scene.lights import EnvironmentLight, Light, PointLight
 from smokelift.scene.medium import Medium, Scattering, checked_scattering
 from smokelift.scene.projection import sees
 from smokelift.scene.reading import from_tables, read_file

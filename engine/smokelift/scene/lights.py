@@ -1,11 +1,164 @@
-"""The kinds of light. A new one has a module of its own, with its class, and an entry in `LIGHT_TYPES`."""
+"""The kinds of light. A new one has a class here and an entry in `LIGHT_TYPES`."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
 
-from smokelift.scene.environment_light import EnvironmentLight
-from smokelift.scene.finite_lights import DirectionalLight, PointLight, SampledLight
+from smokelift.checks import shown
+from smokelift.scene.checks import (
+    SceneError,
+    Vector,
+    colour,
+    file_path,
+    integer,
+    number,
+    set_fields,
+    unexpected,
+    vector,
+)
+from smokelift.scene.domain import Box, Domain
+
+MAX_DISTANCE_VOXELS = 1e6
+"""Voxels between a point light and the box, at most: its rays are parallel long before."""
+
+MAX_DIRECTIONS = 4096
+"""Parallel lights that stand for one environment, at most: every picture sweeps the voxels once for each."""
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Parallel light, as the sun's.
+
+    Attributes
+    ----------
+    direction
+        Of travel: from the light towards the smoke. Its length does not count.
+    irradiance
+        Red, green and blue in W/m^2 on a surface across it.
+    """
+
+    direction: Vector
+    irradiance: Vector
+
+    def __post_init__(self) -> None:
+        """Check the values and make the direction a unit vector."""
+        direction = vector(self.direction, "direction")
+        length = math.hypot(*direction)
+        if length == 0.0:
+            raise SceneError("direction must not be [0, 0, 0]", key="direction")
+        # What is a unit vector already stays as it is: a saved scene must come back the same.
+        if abs(length - 1.0) > 1e-12:
+            x, y, z = direction
+            direction = (x / length, y / length, z / length)
+        set_fields(self, direction=direction, irradiance=colour(self.irradiance, "irradiance"))
+
+    def samples(self) -> tuple[FiniteLight, ...]:
+        """Return the light itself; see `SampledLight`."""
+        return (self,)
+
+    def scaled(self, factor: float) -> DirectionalLight:
+        """Return the light ``factor`` times as strong."""
+        red, green, blue = self.irradiance
+        return replace(self, irradiance=(factor * red, factor * green, factor * blue))
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """Light from a point.
+
+    Attributes
+    ----------
+    position
+        In meters, outside the box.
+    intensity
+        Red, green and blue in W/sr.
+    """
+
+    position: Vector
+    intensity: Vector
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        set_fields(self, position=vector(self.position, "position"), intensity=colour(self.intensity, "intensity"))
+
+    def samples(self) -> tuple[FiniteLight, ...]:
+        """Return the light itself; see `SampledLight`."""
+        return (self,)
+
+    def scaled(self, factor: float) -> PointLight:
+        """Return the light ``factor`` times as strong."""
+        red, green, blue = self.intensity
+        return replace(self, intensity=(factor * red, factor * green, factor * blue))
+
+    def require_place(self, domain: Box) -> None:
+        """Refuse a place from which no light can be swept through a box: inside it, or too far away."""
+        at = f"position {shown(list(self.position))} is"
+        if domain.contains(self.position):
+            raise SceneError(f"{at} inside the domain; it must be outside", key="position")
+        if (
+            isinstance(domain, Domain)
+            and math.dist(self.position, domain.centre) > MAX_DISTANCE_VOXELS * domain.voxel_size
+        ):
+            raise SceneError(f"{at} more than a million voxels away; give a directional light instead", key="position")
+
+
+FiniteLight = DirectionalLight | PointLight
+"""What one sweep through the voxels can do."""
+
+
+@runtime_checkable
+class SampledLight(Protocol):
+    """A light for which finitely many simple ones stand, whatever the camera and the smoke."""
+
+    def samples(self) -> tuple[FiniteLight, ...]:
+        """Return the simple lights."""
+        ...
+
+    def scaled(self, factor: float) -> SampledLight:
+        """Return the light ``factor`` times as strong."""
+        ...
+
+
+@dataclass(frozen=True)
+class EnvironmentLight:
+    """Light from all around, as an equirectangular picture gives it.
+
+    Attributes
+    ----------
+    image
+        The picture, .exr or .hdr.
+    rotation_degrees
+        By which it is turned about Z.
+    strength
+        Factor of its radiance.
+    directions
+        Parallel lights that approximate it; None takes as many as the smoke needs.
+    """
+
+    image: Path
+    rotation_degrees: float = 0.0
+    strength: float = 1.0
+    directions: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        image = file_path(self.image, "image")
+        if image.suffix.lower() not in (".exr", ".hdr"):
+            raise unexpected(str(image), "image", "an .exr or .hdr file")
+        strength = number(self.strength, "strength", "a number not below 0", lambda v: v >= 0.0)
+        rotation = number(self.rotation_degrees, "rotation_degrees")
+        set_fields(self, image=image, rotation_degrees=rotation, strength=strength)
+        if self.directions is not None:
+            expected = f"a whole number from 1 to {MAX_DIRECTIONS}"
+            set_fields(self, directions=integer(self.directions, "directions", expected, 1, MAX_DIRECTIONS))
+
+    def scaled(self, factor: float) -> EnvironmentLight:
+        """Return the light ``factor`` times as strong."""
+        return replace(self, strength=factor * self.strength)
+
 
 Light = SampledLight | EnvironmentLight
 """An environment is no `SampledLight`: how many lights it needs depends on the camera and the medium."""

@@ -14,7 +14,6 @@ each of them optional. Their keys are the fields of the classes of the same name
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
@@ -24,10 +23,9 @@ from smokelift.checks import one_of, shown
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
 from smokelift.scene.checks import SceneError, file_path, positive, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet
-from smokelift.scene.files import advice_on_backslashes, read_text
 from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
-from smokelift.scene.toml_lines import Place, find_lines, line_of
+from smokelift.scene.toml_files import Place, line_of, parse_toml, read_text
 from smokelift.scene.view import Background, ClipSource, View
 
 Table = Mapping[str, Any]
@@ -50,16 +48,10 @@ def read_file(path: Path, build: Callable[..., Described]) -> Described:
         With the file, the line, the key, what was expected and what was found.
     """
     try:
-        text = read_text(path)
-    except OSError as error:
+        data, lines = parse_toml(read_text(path), path.name)
+    except (OSError, ValueError) as error:
         raise SceneError(str(error)) from error
-    try:
-        data = tomllib.loads(text)
-    except RecursionError as error:
-        raise SceneError(f"{path.name}: is not a scene: lists or tables are nested too deeply") from error
-    except ValueError as error:  # an integer of 5000 digits is no error of TOML's
-        raise SceneError(f"{path.name}: is not valid TOML: {error}{advice_on_backslashes(text)}") from error
-    return _Reader(path.name, path.absolute().parent, find_lines(text)).scene(data, build)
+    return _Reader(path.name, path.absolute().parent, lines).scene(data, build)
 
 
 def from_tables(data: Table, build: Callable[..., Described], name: str, base: Path | None) -> Described:

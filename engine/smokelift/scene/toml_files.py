@@ -1,18 +1,54 @@
-"""The lines of a TOML file on which its tables and keys stand; the standard reader gives values without them."""
+"""Text files that a user names, and the lines of a TOML file on which its tables and keys stand."""
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 Place = tuple[str | int, ...]
 """Names of nested tables and a key, with the index of a table in a list of them: ``("lights", 1, "direction")``."""
+
+LARGEST_TEXT = 64 * 2**20
+"""Bytes of a text file, at most: the matrices of a camera that moves through 200,000 frames."""
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w\-.\"' ]+?)\s*\]")
 _KEY = re.compile(r"\s*([\w\-.\"' ]+?)\s*=")
 
 
-def find_lines(text: str) -> dict[Place, int]:
+def read_text(path: Path) -> str:
+    """Read a text file in UTF-8.
+
+    It raises OSError with the path, if it cannot be read, is no regular file, is too large or holds no text.
+    """
+    if not path.is_file() and path.exists():
+        raise OSError(f"{path}: cannot be read: it is a folder, a pipe or a device, not a file")
+    try:
+        if path.stat().st_size > LARGEST_TEXT:
+            raise OSError(f"{path}: cannot be read: it holds more than {LARGEST_TEXT >> 20} MiB; give a smaller file")
+        return path.read_text(encoding="utf-8-sig")  # some editors on Windows begin a file with a byte order mark
+    except UnicodeDecodeError as error:
+        raise OSError(f"{path}: is not a text file in UTF-8; save it as one") from error
+    except OSError as error:
+        if error.strerror is None:
+            raise
+        raise type(error)(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def parse_toml(text: str, name: str) -> tuple[dict[str, Any], dict[Place, int]]:
+    """Return the tables of a TOML file of a name, and the line of each; ValueError if it is none."""
+    try:
+        return tomllib.loads(text), _find_lines(text)
+    except RecursionError as error:
+        raise ValueError(f"{name}: is not valid TOML: lists or tables are nested too deeply") from error
+    except ValueError as error:  # an integer of 5000 digits is no error of TOML's
+        advice = "; write a path with / or between single quotes" if "\\" in text else ""
+        raise ValueError(f"{name}: is not valid TOML: {error}{advice}") from error
+
+
+def _find_lines(text: str) -> dict[Place, int]:
     """Return the line (from 1) of every table and key in valid TOML.
 
     A key of the second [[lights]] table is found under ``("lights", 1, "direction")``. Keys inside inline
