@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 
 from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
+from smokelift.app.options import whole_number
 from smokelift.app.progress import OutputError, reporter
 from smokelift.checks import printable
 from smokelift.footage.images import READABLE
@@ -157,23 +158,17 @@ def command_parser() -> argparse.ArgumentParser:
         help="how progress is shown; text (default): a bar; json: one JSON object a line",
     )
     common.add_argument(
-        "--threads", type=_threads, default=0, metavar="N", help="use N processor threads at most; 0 (default): all"
+        "--threads",
+        type=whole_number(0, MAX_THREADS),
+        default=0,
+        metavar="N",
+        help="use N processor threads at most; 0 (default): all",
     )
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, parents=[common], help=module.HELP)
         module.add_options(command)
         command.set_defaults(run=module.run)
     return parser
-
-
-def _threads(text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = -1
-    if not 0 <= count <= MAX_THREADS:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to {MAX_THREADS}")
-    return count
 
 
 if __name__ == "__main__":

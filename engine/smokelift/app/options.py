@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -115,6 +116,18 @@ def require_new(options: argparse.Namespace) -> None:
         raise ValueError(f"{options.out}: is the sequence itself; choose another directory for --out.")
     check_directory(options.out, resume=options.resume)
     written_kinds(options.npz)
+
+
+def whole_number(least: int, most: int) -> Callable[[str], int]:
+    """Return what makes a whole number in a range of a word."""
+
+    def read(text: str) -> int:
+        number = int(text) if text.isascii() and text.isdigit() else -1
+        if not least <= number <= most:
+            raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from {least} to {most}")
+        return number
+
+    return read
 
 
 def finite_number(text: str) -> float:

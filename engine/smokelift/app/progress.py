@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal, Protocol, Self, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -22,6 +22,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.report.views import message, sentence
 
 Style = Literal["text", "json"]
+Made = TypeVar("Made")
 
 PACE_FRAMES = 10
 """Frames by whose pace the rest is forecast, the newest. The forecast before the first counts as one of them until that
@@ -115,6 +116,18 @@ def say_sequence(
     seconds = round(time.monotonic() - began + earlier, 1)
     result: Figures = {"directory": str(directory), "frames": total, "seconds": seconds}
     say.finish(Finding(kind, {**result, **figures}), result)
+
+
+def say_made(say: Reporter, made: Iterable[tuple[int, Made]], total: int, origin: str) -> list[Made]:
+    """Say a frame, by its number, with the time that it took, for each thing that is made of one; return the things."""
+    say.start(total, 0)
+    things, before = [], time.monotonic()
+    for number, thing in made:
+        now = time.monotonic()
+        say.frame(number, {"origin": origin, "seconds_density": now - before, "seconds_velocity": 0.0})
+        things.append(thing)
+        before = now
+    return things
 
 
 def work_seconds(figures: Mapping[str, Any]) -> float:

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import psutil
 
 from smokelift.app.commands import reconstruct
-from smokelift.app.options import named_path
+from smokelift.app.options import named_path, whole_number
 from smokelift.app.progress import Reporter
 from smokelift.batch.local import run_here
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
@@ -25,6 +25,9 @@ from smokelift.report.cost import memory_free
 MEMORY_SHARE = 0.9
 """Part of the free memory that shots may take together: forecasts are right to a tenth or two."""
 
+MAX_WORKERS = 99_999
+"""Largest number of shots at a time: more than any cluster takes."""
+
 HELP = "reconstruct a list of shots, as many at a time as memory allows"
 
 
@@ -33,7 +36,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("list", type=named_path, help="list of shots, such as shots.toml")
     parser.add_argument("--plan", action="store_true", help="say only what is left and how long it will take")
     parser.add_argument(
-        "--workers", type=_count, metavar="N", help="run N shots at a time at most (default: one a processor core)"
+        "--workers",
+        type=whole_number(1, MAX_WORKERS),
+        metavar="N",
+        help="run N shots at a time at most (default: one a processor core)",
     )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, as tcp://host:8786 (needs the extra [cluster])"
@@ -181,10 +187,3 @@ def _check_arguments(arguments: Sequence[str]) -> None:
     parser.add_argument("--device", choices=("auto", "cpu", "gpu"))
     reconstruct.add_options(parser)
     parser.parse_args(arguments)
-
-
-def _count(text: str) -> int:
-    count = int(text) if text.isascii() and text.isdigit() else 0
-    if not 0 < count < 100_000:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 1")
-    return count

@@ -7,7 +7,7 @@ import time
 from typing import get_args
 
 from smokelift.app.options import named_path
-from smokelift.app.progress import Reporter
+from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import counted
 from smokelift.output.export import (
     ExportSettings,
@@ -65,12 +65,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         return
     say.note(f"{text}.")
     require_space(options.out, size)
-    say.start(len(sequence.frames), 0)
-    written, before = 0, time.monotonic()
-    for number, there in export_sequence(sequence, options.out, settings):
-        written, now = written + there, time.monotonic()
-        say.frame(number, {"origin": "exported", "seconds_density": now - before, "seconds_velocity": 0.0})
-        before = now
+    exported = export_sequence(sequence, options.out, settings)
+    written = sum(say_made(say, exported, len(sequence.frames), "exported"))
     say.finish(
         f"{frames} in {options.out}, {written / 1e6:.1f} MB.",
         {

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from smokelift.app.options import add_clip_options, named_path, require_folder, scene_of
-from smokelift.app.progress import Reporter
+from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
@@ -55,13 +54,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         extraction = extract(clip, scene)
         for finding in clip.findings():
             say.note(finding)
-        say.start(len(extraction), 0)
-        files, before = [], time.monotonic()
-        for number, file in enumerate(extraction.write(options.out), 1):
-            files.append(str(file))
-            now = time.monotonic()
-            say.frame(number, {"origin": "extracted", "seconds_density": now - before, "seconds_velocity": 0.0})
-            before = now
+        elements = enumerate(extraction.write(options.out), 1)
+        files = list(map(str, say_made(say, elements, len(extraction), "extracted")))
         if options.plate is not None:
             write_image(options.plate, extraction.plate)
         if options.preview is not None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import time
 
 from smokelift.app.options import named_path
-from smokelift.app.progress import Reporter
+from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import Finding
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS, TIMES, write_proxies
 from smokelift.output.sequence import Sequence
@@ -23,11 +22,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Write a copy of every frame."""
     sequence = Sequence.open(options.directory)
-    say.start(len(sequence.frames), 0)
-    before = time.monotonic()
-    for number in write_proxies(sequence):
-        now = time.monotonic()
-        say.frame(number, {"origin": "made coarser", "seconds_density": now - before, "seconds_velocity": 0.0})
-        before = now
     frames = len(sequence.frames)
+    say_made(say, ((number, number) for number in write_proxies(sequence)), frames, "made coarser")
     say.finish(Finding("proxy", {"frames": frames, "directory": str(sequence.directory)}), {"frames": frames})

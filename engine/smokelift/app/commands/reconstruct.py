@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
+from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of, whole_number
 from smokelift.app.progress import Reporter, median_psnr, seconds_before
 from smokelift.checks import Figures, Finding
 from smokelift.footage.clip import Clip
@@ -45,7 +45,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--start-number",
-        type=_start_number,
+        type=whole_number(0, MAX_START_NUMBER),
         default=1,
         metavar="N",
         help="number in the name of the first file, 1001 for example (default: 1); frames themselves count from 1",
@@ -93,12 +93,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
     done = Finding("written", result) if fit is None else Finding("reconstructed", {**result, "psnr": fit})
     say.finish(done, {**result, "psnr": fit})
-
-
-def _start_number(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and int(text) <= MAX_START_NUMBER):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to {MAX_START_NUMBER}")
-    return int(text)
 
 
 def _finished(options: argparse.Namespace) -> int:
