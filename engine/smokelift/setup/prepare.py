@@ -76,39 +76,32 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         lit = scene_optics(complete).unshadowed_source()
         lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
         first = replace(first, source=np.asarray(lit, np.float32))
+    of_clip = first_findings(estimate, _given(scene.background, estimate))
+    findings = [*clip.findings(), *of_clip, *geometry.findings, *of_medium, *of_light]
     coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
-    of_scattering: list[Finding] = []
     if coarse and asked is not None:
-        of_scattering = [Finding("given", about="scattering", value=asked, source="given")]
+        findings.append(Finding("given", about="scattering", value=asked, source="given"))
     elif coarse:
         finer = partial(coarse_frame, (first,), coarse[0].number, complete, times=2)
         scattering, chosen = find_scattering(coarse, finer, settings)
-        complete, of_scattering = replace(complete, scattering=scattering), [chosen]
+        complete = replace(complete, scattering=scattering)
+        findings.append(chosen)
         if of_light:
-            of_light += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
+            findings += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
     if complete.scattering == "absorption":
-        of_light = [found for found in of_light if found.about != "source radiance"]
+        findings = [found for found in findings if found.about != "source radiance"]
     others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)
-    of_velocity: list[Finding] = []
+    findings += of_views
     if settings.selection.measure:
         coarsening, chosen = velocity_coarsening(domain, settings)
-        of_velocity = [chosen]
+        findings.append(chosen)
         settings = replace(settings, velocity=replace(settings.velocity, coarsening=coarsening))
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
         views=(first, *others),
         settings=settings,
-        findings=(
-            *clip.findings(),
-            *first_findings(estimate, _given(scene.background, estimate)),
-            *geometry.findings,
-            *of_medium,
-            *of_light,
-            *of_scattering,
-            *of_views,
-            *of_velocity,
-        ),
+        findings=tuple(findings),
         qualities=geometry.qualities,
         smoky=samples.smoky,
         place=None,
