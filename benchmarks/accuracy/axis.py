@@ -1,6 +1,6 @@
 """Errors of the depth at which smoke is placed, as the box reaches below it: a Markdown table.
 
-By the floor contact, and where the depth of its lower end is given: upright at that depth, and by the posterior.
+By the floor contact, and where the depth of its lower end is given: upright at that depth, and as it is estimated.
 
     python -m benchmarks.accuracy.axis plume-1/truth.npz two-1/truth.npz crossing-1/truth.npz ...
 
@@ -23,7 +23,7 @@ import numpy.typing as npt
 from benchmarks.tables import markdown
 from smokelift.checks.array_types import Doubles
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.axis_posterior import estimate_axis
+from smokelift.density.axis_cues import estimate_axis
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium

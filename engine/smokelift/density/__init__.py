@@ -8,7 +8,7 @@ patches that the clip shows from the front. The fit has the last word.
 """
 
 from smokelift.density.axis import AxisEstimate
-from smokelift.density.axis_posterior import clip_axis
+from smokelift.density.axis_cues import clip_axis
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, Detail, RoundDepth
 from smokelift.density.detailed_depth import DetailedDepth
 from smokelift.density.fit import (

@@ -90,7 +90,7 @@ Cue = Literal["box", "floor contact", "inlets", "distance"]
 class AxisEstimate:
     """An axis, the cue that shows it, and how well it is known.
 
-    `axis` is the posterior mean, `depth` the mean depth (m behind the domain's centre) of smoke that stands on it, and
+    `axis` is the likeliest, `depth` the mean depth (m behind the domain's centre) of smoke that stands on it, and
     `deviation` the standard deviation (m) of that depth's error.
     """
 

@@ -1,11 +1,11 @@
-"""Where in depth the smoke stands: a posterior over the depth of its base, to which each cue adds a log-likelihood.
+"""Where in depth the smoke of one camera stands, by what shows it.
 
 One picture of smoke looks the same whether the smoke is near and small or far and large. Three cues show its place:
 
-- the box, which is put around its smoke: the mean depth is normal about its middle;
+- the box, which is put around its smoke: the mean depth is about its middle;
 - the base, where a column begins: a given distance or a marked inlet says its depth, else its contact with the floor;
-- the way up: a column is upright or leans. One that comes back to the middle across the picture does so in depth. One
-  that drifts across the picture drifts as far in depth, but nobody knows where to: there the box alone speaks.
+- the way up: a column that drifts across the picture drifts as far in depth, but nobody knows where to: there the box
+  alone speaks.
 
 Several cameras need none of them: `depth_prior` reads the axis from what they have in common.
 docs/experiments/density-axis.md has the worth of each cue. It chose the constants of this page that cite no other.
@@ -34,10 +34,6 @@ MAX_VOXELS = 512
 """Largest number of voxels along a side of the box; finer grids show the place no better
 (docs/experiments/density-axis.md)."""
 
-CANDIDATES = 121
-"""Number of depths that are compared, from the front of the box to its back: 60 to a reach (half the box's depth). So
-`UPRIGHT_DEVIATION`, the narrowest of all, is three steps."""
-
 BOX_DEVIATION = 0.165
 """Standard deviation, in reaches, of the smoke's depth about the middle of its box
 (docs/experiments/density-axis.md)."""
@@ -46,30 +42,21 @@ BOX_COUNT = 2.0
 """Number of boxes that `BOX_DEVIATION` counts as. The box at hand counts as one more, by how far off its middle the
 smoke is across the picture (docs/experiments/density-axis.md)."""
 
-MAX_KNOWN_DEVIATION = 0.95
-"""Largest standard deviation of a depth that a floor contact determines, over that by the box alone. A contact that
-leaves about as much spread as the box shows nothing."""
-
 MIN_CONTACT_SHARE = 0.6
 """Smallest share of the frames that show a floor contact where there is one."""
 
-FLOOR_PROBABILITY = 0.6
-"""Probability that smoke which seems to touch the floor does."""
+CONTACT_TRUST = 0.7
+"""Share of a floor contact's depth that is believed, at most: smoke that begins above the floor shows one as well."""
 
-CONTACT_DEVIATION = 0.08
-"""Standard deviation, in reaches, of the depth that a floor contact shows."""
+FAR_BEHIND = 1.5
+"""Distance behind the middle, in `BOX_DEVIATION`, from which a contact is more likely smoke that begins above the
+floor: the standard deviation of the Gaussian by which the share that is believed falls."""
 
-BASE_HEIGHT = 0.3
-"""Mean height above the floor, in reaches, of smoke that only seems to touch it (exponential)."""
+MIN_CONTACT_TRUST = 0.2
+"""Smallest share that is believed of a contact which shows the place: less leaves about what the box does."""
 
-LEANING_PROBABILITY = 0.2
-"""Probability that a column leans, before anything is seen of it."""
-
-UPRIGHT_DEVIATION = 0.05
-"""Standard deviation, in reaches, of the distance of an upright column's mean from its base."""
-
-LEANING_DEVIATION = 0.5
-"""Standard deviation, in reaches, of that distance for a column that leans, across the picture and in depth."""
+LEANING = 0.2
+"""Share of the box's variance that stays of a column whose base is known: it may lean."""
 
 WIDENING = 0.15
 """Growth of a column's radius per metre of height: it takes in air (docs/experiments/density-axis.md)."""
@@ -126,42 +113,33 @@ def estimate_axis(
     enters at the inlets; without any a floor contact is searched for. ``base`` is the depth (m) at which the one column
     is known to stand; neither counts then.
     """
-    screens = [screen for amount in amounts if (screen := upright_screen(amount, camera, domain)).values.any()]
+    pictures = [shown for amount in amounts if (shown := upright_screen(amount, camera, domain)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
     cue: Cue = "box" if base is None else "distance"
-    if not screens:
+    if not pictures:
         return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, BOX_DEVIATION * reach)
-    mean = replace(screens[0], values=np.mean([screen.values for screen in screens], 0))
+    mean = replace(pictures[0], values=np.mean([picture.values for picture in pictures], 0))
     total = mean.values.sum(1)
     smoky = total > 0.02 * total.max()
     middle = np.interp(mean.heights, mean.heights[smoky], mean.rows().mean[smoky])
-    aside = np.average(middle**2, weights=total)
-    deviation = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + aside) / (BOX_COUNT + 1))
-    depths = np.linspace(-reach, reach, CANDIDATES)
+    offset = np.average(middle**2, weights=total)
+    box = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + offset) / (BOX_COUNT + 1))
     if base is not None:
-        lowest, widths = int(np.argmax(smoky)), np.zeros_like(middle)
-        columns = [
-            _Column(
-                _normal(depths - base, depths[1] - depths[0]),
-                mean.heights[lowest],
-                middle,
-                widths,
-                middle - middle[lowest],
-            )
-        ]
+        lowest = int(np.argmax(smoky))
+        columns = [_Column(base, mean.heights[lowest], middle, np.zeros_like(middle), middle - middle[lowest])]
     elif inlets:
-        cue, columns = "inlets", _inlet_columns(inlets, mean, middle, depths, camera, domain)
+        cue, columns = "inlets", _inlet_columns(inlets, mean, middle, camera, domain)
     else:
-        columns = _floor_column(screens, len(amounts), middle, depths, camera, domain)
+        columns = _floor_column(pictures, len(amounts), middle, camera, domain)
     if not columns:
-        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(deviation))
-    # several columns lean towards one another
-    leans = LEANING_PROBABILITY if len(columns) == 1 else 0.0
-    known = [_posterior(column, depths, total, deviation, leans) for column in columns]
-    error = np.sqrt(np.average(np.mean([variance for _, variance in known], 0), weights=total))
-    axis = _axis(columns, [depth for depth, _ in known], mean)
+        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(box))
+    # what drifts across the picture drifts in depth as well
+    shares = [box**2 / (box**2 + column.drifts**2) for column in columns]
+    trusts = [(1 - LEANING) * column.trust * share for column, share in zip(columns, shares, strict=True)]
+    error = box * np.sqrt(1 - np.average(np.mean(trusts, 0), weights=total))
+    axis = _axis(columns, [column.base * share for column, share in zip(columns, shares, strict=True)], mean)
     depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
-    if cue == "box" and error < MAX_KNOWN_DEVIATION * deviation:
+    if cue == "box" and columns[0].trust >= MIN_CONTACT_TRUST:
         cue = "floor contact"
     return AxisEstimate(axis, cue, depth, float(error))
 
@@ -172,52 +150,26 @@ class _Column:
 
     Attributes
     ----------
-    base : (k,)
-        Log-likelihood of each depth of its base.
+    base
+        Depth (m) of its base.
     begins
         Height (m above the domain's centre) of its base.
     middles, widths, drifts : (n,)
         By height: lateral place (m) of its axis, its lateral standard deviation, distance of its axis from its base.
+    trust
+        Share that is believed of what shows the base.
     """
 
-    base: Doubles
+    base: float
     begins: float
     middles: Doubles
     widths: Doubles
     drifts: Doubles
-
-
-def _posterior(column: _Column, depths: Doubles, total: Doubles, box: float, leans: float) -> tuple[Doubles, Doubles]:
-    """Mean and variance (n,) of a column's depth by height, from candidates (k,) for the depth of its base.
-
-    The depth of its mean has a standard deviation ``box`` (m) about the middle. It leans with a probability ``leans``.
-    ``total`` (n,) is the smoke by height.
-    """
-    raised = np.cumsum(total) / total.sum()  # half in the column's mean
-    aside = float(np.average(column.drifts, weights=total))
-    upright, leaning = UPRIGHT_DEVIATION * depths[-1], LEANING_DEVIATION * depths[-1]
-    wide = np.hypot(box, leaning)
-    # of an upright column and of one that leans (2, k): where its base is, and how it leans across the picture
-    likelihood = column.base + _normal(depths, np.array([[box], [wide]]))
-    likelihood += _normal(aside, np.array([[upright], [leaning]]))
-    share = np.exp(likelihood - likelihood.max()) * np.array([[1 - leans], [leans]])
-    share /= share.sum()
-    # what leans comes back to where the box expects its mean, and further above it
-    back = np.stack([np.zeros_like(raised), 2 * raised * (leaning / wide) ** 2])
-    depth, square = (np.einsum("hk,k,hn->n", share, depths**power, (1 - back) ** power) for power in (1, 2))
-    variance = square - depth**2 + (share.sum(1) @ back * box) ** 2
-    # what drifts across the picture drifts in depth as well
-    trusted = box**2 / (box**2 + column.drifts**2)
-    return depth * trusted, variance * trusted**2 + box**2 * (1 - trusted)
-
-
-def _normal(value: Doubles | float, deviation: Doubles | float) -> Doubles:
-    """Logarithm of a normal density about zero, but for a constant."""
-    return np.asarray(-np.square(value / deviation) / 2 - np.log(deviation))
+    trust: float = 1.0
 
 
 def _floor_column(
-    screens: Sequence[Screen], frames: int, middle: Doubles, depths: Doubles, camera: Camera, domain: Domain
+    pictures: Sequence[Screen], frames: int, middle: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
     """The column that stands on the floor; none where too few of the frames show a contact.
 
@@ -229,23 +181,18 @@ def _floor_column(
     above = eye[2] - domain.min[2]
     if camera.type != "perspective" or abs(height[2]) < 1 or distance <= 0 or above <= 0:
         return []
-    found = [contact for screen in screens if (contact := _floor_contact(screen, distance, above, camera, domain))]
+    found = [contact for picture in pictures if (contact := _floor_contact(picture, distance, above, camera, domain))]
     if len(found) < MIN_CONTACT_SHARE * frames:
         return []
     contact, width, begins = np.median(found, 0)
-    reach, heights = depths[-1], screens[0].heights
-    # the line of sight rises towards the camera
-    nearer, rate = contact - depths, above / (distance + contact) / (BASE_HEIGHT * reach)
-    deviation = CONTACT_DEVIATION * reach
-    on_floor = np.exp(_normal(nearer, deviation)) / np.sqrt(2 * np.pi)
-    above_floor = np.where(nearer > 0, rate * np.exp(-rate * np.abs(nearer)), 0)
-    base = np.log(FLOOR_PROBABILITY * on_floor + (1 - FLOOR_PROBABILITY) * above_floor + 1e-300)
-    drifts = middle - np.interp(begins + width / 4, heights, middle)
-    return [_Column(base, begins, middle, np.zeros_like(middle), drifts)]
+    far = FAR_BEHIND * BOX_DEVIATION * reach_along(domain, along)
+    trust = CONTACT_TRUST * np.exp(-((max(contact, 0) / far) ** 2) / 2)
+    drifts = middle - np.interp(begins + width / 4, pictures[0].heights, middle)
+    return [_Column(trust * contact, begins, middle, np.zeros_like(middle), drifts, trust)]
 
 
 def _floor_contact(
-    screen: Screen, distance: float, above: float, camera: Camera, domain: Domain
+    picture: Screen, distance: float, above: float, camera: Camera, domain: Domain
 ) -> tuple[float, float, float] | None:
     """Depth and lateral width (m) of the floor contact in one frame, and the height (m) of its lower end; if any.
 
@@ -256,7 +203,7 @@ def _floor_contact(
     pixel = distance**2 / (above * camera.fy)
     if pixel > reach / 2:
         return None
-    rows = screen.rows()
+    rows = picture.rows()
     heights, total = rows.heights, rows.total
     smoky = total > 0.05 * np.percentile(total[total > 0], 75)
     begins = heights[np.argmax(smoky)]
@@ -272,7 +219,7 @@ def _floor_contact(
 
 
 def _inlet_columns(
-    inlets: Sequence[Inlet], mean: Screen, middle: Doubles, depths: Doubles, camera: Camera, domain: Domain
+    inlets: Sequence[Inlet], mean: Screen, middle: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
     """The columns above inlets, followed upwards in the mean picture where there are several.
 
@@ -295,8 +242,7 @@ def _inlet_columns(
             now[begun] = (INERTIA * now[begun] + part @ mean.laterals) / (INERTIA + part.sum(1))
         middles[:, row] = now
     drifts = middles - (places @ lateral)[:, None]
-    bases = _normal(depths - (places @ along)[:, None], depths[1] - depths[0])
-    return [_Column(*column) for column in zip(bases, begins, middles, widths, drifts, strict=True)]
+    return [_Column(*column) for column in zip(places @ along, begins, middles, widths, drifts, strict=True)]
 
 
 def _likelihood(places: Doubles, middles: Doubles, widths: Doubles) -> Doubles:
