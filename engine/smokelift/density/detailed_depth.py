@@ -40,13 +40,10 @@ SMOOTH_ITERATIONS = 4
 SMOOTH_TOLERANCE = 0.02
 """Share of the objective that each has to gain for another to follow, as in the fit."""
 
-AMOUNTS = 0.5
-"""Standard deviation of a blur, in those of the smoke's width: the blurred density is the same with noise as without.
-Noise makes lobes, and leaves the smoke of each where it is (docs/experiments/every-view.md)."""
-
-GUIDED_AMOUNTS = 0.75
-"""Standard deviation, in the same unit, of the blur over which carried smoke gets the smooth answer's amounts. What is
-finer is the simulation's, on any grid (docs/experiments/guided-simulation.md)."""
+LOW_PASS = 0.75
+"""Standard deviation of a blur, in those of the smoke's width. Noisy and carried smoke, blurred, is the smooth answer,
+blurred: lobes are made up, on any grid, and the smoke of each stays where it is
+(docs/experiments/guided-simulation.md, docs/experiments/made-up-detail.md)."""
 
 LARGEST_GAIN = 5.0
 """Bound of the factor that gives noisy smoke the smooth answer's amounts."""
@@ -79,9 +76,6 @@ within the outline that the smooth answer has from there."""
 
 OUTLINE_BLUR = 3.0
 """Standard deviation (voxels) of that blur."""
-
-ENDS = 3.0
-"""Voxels at both ends of the axis over which detail fades in: they hold what the domain cuts off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +122,7 @@ class DetailedDepth:
         np.exp(values, out=values)
         values *= where.take(smooth)
         where.put(values, noisy)
-        amounts, now = (level.blurred(each, AMOUNTS * texture.width) for each in (smooth, noisy))
+        amounts, now = (level.blurred(each, LOW_PASS * texture.width) for each in (smooth, noisy))
         amounts += TINY
         now += TINY
         amounts /= now
@@ -184,7 +178,7 @@ class EveryView:
 
     def amounts(self, density: Volume) -> NDArray[np.float32]:
         """The density (n,) blurred over lobes of smoke; see `Detail`."""
-        return self.level.blurred(density, GUIDED_AMOUNTS * self.texture.width)
+        return self.level.blurred(density, LOW_PASS * self.texture.width)
 
     def _rounds(
         self,
@@ -245,14 +239,8 @@ class EveryView:
         amounts, have = (ndimage.gaussian_filter1d(picture.sum(0), 1) for picture in (known, wanted))
         wanted *= np.clip(amounts / np.maximum(have, 1e-9), *ROW_RANGE)
         faint = 1e-3 * wanted.max()
-        rows = (np.arange(wanted.shape[1]) + 0.5) * scale
-        fade = np.clip(np.minimum(rows, table.shape[1] - rows) * self.level.coarseness / ENDS, 0, 1)
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
-        # what a row of the smoke lacks it lacks from all azimuths: that is not detail
-        has = ndimage.gaussian_filter1d(shown.sum(0), 1)
-        lacks = np.log(np.clip((amounts + 1e-9) / (has + 1e-9), *STEP_RANGE)) * (shown > faint)
-        step = lacks + isotropic(step - lacks)
-        step = (relaxation * fade * step).astype(np.float32)
+        step = np.float32(relaxation) * isotropic(step)
         step = np.ascontiguousarray(enlarged(step, scale, whole.shape))
         table.scale(now.values, step, degrees, corner, now.spans)
 
