@@ -17,7 +17,7 @@ from smokelift.density import (
     RoundDepth,
     ViewSet,
 )
-from smokelift.density.screen import view_frame
+from smokelift.density.upright_plane import view_frame
 from smokelift.pipeline import Method
 from smokelift.render import Volume
 from smokelift.scene import Domain

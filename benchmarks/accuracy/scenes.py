@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift import Camera, Clip, Scene
-from smokelift.density.screen import view_frame
+from smokelift.density.upright_plane import view_frame
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import Picture, area_average
 from smokelift.render import Image

@@ -3,14 +3,13 @@
 Observation -> ObservedView (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior)
 -> FittedDensity (fit)
 
-The default estimate (detailed_depth) is round, smooth smoke with detail: from every side it shows the distribution of
+The default estimate (synthesis) is round, smooth smoke with detail: from every side it shows the distribution of
 patches that the clip shows from the front. The fit has the last word.
 """
 
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.axis_cues import clip_axis
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, Detail, RoundDepth
-from smokelift.density.detailed_depth import DetailedDepth
 from smokelift.density.fit import (
     DensityFit,
     DensitySettings,
@@ -20,6 +19,7 @@ from smokelift.density.fit import (
     reconstruct_density,
 )
 from smokelift.density.observation import Observation, ObservedClip, ObservedView, ViewSet
+from smokelift.density.synthesis import DetailedDepth
 from smokelift.density.temporal_prior import (
     BlendCarried,
     GuidedSimulation,

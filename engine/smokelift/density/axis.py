@@ -9,13 +9,13 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
-from smokelift.density.screen import reach_along, view_frame
+from smokelift.density.upright_plane import reach_along, view_frame
 from smokelift.scene import Camera, Domain
 
 
 @dataclass(frozen=True, eq=False)
 class SmokeAxis:
-    """How far behind the domain's centre the middle of the smoke is, on the upright screen through the centre.
+    """How far behind the domain's centre the middle of the smoke is, on the upright plane through the centre.
 
     Attributes
     ----------

@@ -22,13 +22,16 @@ from numpy.typing import NDArray
 from smokelift.checks.array_types import Doubles
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis, depth_at
 from smokelift.density.observation import ObservedClip, ObservedView
-from smokelift.density.screen import Screen, reach_along, seen_at, upright_screen, view_frame
+from smokelift.density.upright_plane import PlanePicture, on_upright_plane, reach_along, seen_at, view_frame
 from smokelift.footage.matte import matte
 from smokelift.scene import Camera, Domain, Inlet
 from smokelift.scene.projection import ray_through_pixels
 
 FRAMES = 16
 """Number of frames of a clip from which the axis is estimated."""
+
+ROWS = 2
+"""Rows of the upright plane to a voxel: a contact begins within few."""
 
 MAX_VOXELS = 512
 """Largest number of voxels along a side of the box; finer grids show the place no better
@@ -113,7 +116,7 @@ def estimate_axis(
     enters at the inlets; without any a floor contact is searched for. ``base`` is the depth (m) at which the one column
     is known to stand; neither counts then.
     """
-    pictures = [shown for amount in amounts if (shown := upright_screen(amount, camera, domain)).values.any()]
+    pictures = [shown for amount in amounts if (shown := on_upright_plane(amount, camera, domain, ROWS)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
     cue: Cue = "box" if base is None else "distance"
     if not pictures:
@@ -169,7 +172,7 @@ class _Column:
 
 
 def _floor_column(
-    pictures: Sequence[Screen], frames: int, middle: Doubles, camera: Camera, domain: Domain
+    pictures: Sequence[PlanePicture], frames: int, middle: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
     """The column that stands on the floor; none where too few of the frames show a contact.
 
@@ -192,7 +195,7 @@ def _floor_column(
 
 
 def _floor_contact(
-    picture: Screen, distance: float, above: float, camera: Camera, domain: Domain
+    picture: PlanePicture, distance: float, above: float, camera: Camera, domain: Domain
 ) -> tuple[float, float, float] | None:
     """Depth and lateral width (m) of the floor contact in one frame, and the height (m) of its lower end; if any.
 
@@ -219,7 +222,7 @@ def _floor_contact(
 
 
 def _inlet_columns(
-    inlets: Sequence[Inlet], mean: Screen, middle: Doubles, camera: Camera, domain: Domain
+    inlets: Sequence[Inlet], mean: PlanePicture, middle: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
     """The columns above inlets, followed upwards in the mean picture where there are several.
 
@@ -250,7 +253,7 @@ def _likelihood(places: Doubles, middles: Doubles, widths: Doubles) -> Doubles:
     return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
 
 
-def _axis(columns: Sequence[_Column], known: Sequence[Doubles], mean: Screen) -> SmokeAxis:
+def _axis(columns: Sequence[_Column], known: Sequence[Doubles], mean: PlanePicture) -> SmokeAxis:
     """The axis of columns whose depths (n,) are known; their mean where several may hold the smoke."""
     if len(columns) == 1:
         return SmokeAxis.by_height(mean.heights, known[0])

@@ -1,7 +1,7 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
 `RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `DetailedDepth`, gives it
-detail (`detailed_depth`). It spreads the smoke of one picture about an axis that comes from the whole clip: first as
+detail (`synthesis`). It spreads the smoke of one picture about an axis that comes from the whole clip: first as
 much as explains the picture without shadows, then as much as explains it in the shadows that this casts. With several
 pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical depth of the
 view that shows most there. This density need not look like any picture: the multiplicative fit scales it ray by ray and
@@ -18,18 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.coarser_grid import (
+from smokelift.density.hull import Places, centres_of, project_voxels
+from smokelift.density.levels import (
     MIN_COARSENED_VOXELS,
     any_of_two,
     every_second,
     spread_to_two,
     with_neighbours,
 )
-from smokelift.density.hull import Places, centres_of, project_voxels
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
-from smokelift.density.screen import view_frame
+from smokelift.density.upright_plane import view_frame
 from smokelift.render import Volume
 from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
@@ -54,7 +54,7 @@ class Detail(Protocol):
         ``fresh`` says that nothing of the density is carried on from the frame before.
         """
 
-    def amounts(self, density: Volume) -> NDArray[np.float32]:
+    def low_pass(self, density: Volume) -> NDArray[np.float32]:
         """What the smooth answer decides of a density: its blur over lobes, (n,) at the voxels that may hold smoke."""
 
 

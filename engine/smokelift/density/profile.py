@@ -30,7 +30,7 @@ from scipy.special import gamma, gammainc
 import smokelift._core as _core
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places, voxel_axes
-from smokelift.density.screen import upright_rows, view_frame
+from smokelift.density.upright_plane import on_upright_plane, view_frame
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
@@ -79,7 +79,7 @@ def lateral_spread(
     ``amount`` (rows, columns) is the optical depth, or proportional to it. Heights are above the domain's centre, along
     `view_frame`'s height. Where there is no smoke the neighbours fill the spread; it is smoothed over two voxels.
     """
-    rows = upright_rows(amount, camera, domain, per_voxel=1)
+    rows = on_upright_plane(amount, camera, domain, 1).rows()
     # normalised convolution: heights count by the smoke that they hold
     most = rows.total.max(initial=0.0)
     weight = ndimage.gaussian_filter1d(rows.total, 2.0) + 1e-6 * max(most, 1e-30)
@@ -102,8 +102,8 @@ def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     for part in ndimage.find_objects(mask.astype(np.uint8)):  # the box around it, as no ball reaches out of the outline
         radius, balls = 1.5, half[part]
         while (centres := inside[part] >= radius).any():
-            aside = ndimage.distance_transform_edt(~centres)
-            np.maximum(balls, np.sqrt(np.maximum(radius**2 - aside**2, 0)), out=balls)
+            distance = ndimage.distance_transform_edt(~centres)
+            np.maximum(balls, np.sqrt(np.maximum(radius**2 - distance**2, 0)), out=balls)
             radius *= 1.1
     return half
 

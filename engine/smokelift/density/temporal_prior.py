@@ -19,11 +19,9 @@ from typing import Protocol
 import numpy as np
 
 from smokelift.density.depth_prior import DepthEstimate
+from smokelift.density.levels import TINY
 from smokelift.density.observation import ViewSet
 from smokelift.render import Volume
-
-TINY = np.finfo(np.float32).tiny
-"""Smallest normal number, for divisions and logarithms."""
 
 LARGEST_GAIN = 3.0
 """Bound of the factor that makes carried smoke denser. Where that is too little the prior's smoke is added: there smoke
@@ -95,10 +93,10 @@ class BlendCarried:
 
 @dataclass(frozen=True)
 class GuidedSimulation:
-    """The detail of the carried density, in the amounts of the depth prior's smooth answer.
+    """The detail of the carried density, with the low pass of the depth prior's smooth answer.
 
-    With B the blur over lobes (`Detail.amounts`), the smooth answer rho_s, that of the frame before carried rho_s', the
-    prior's density rho_p, the carried one rho_c and a faint density f:
+    With B the blur over lobes (`Detail.low_pass`), the smooth answer rho_s, that of the frame before carried rho_s',
+    the prior's density rho_p, the carried one rho_c and a faint density f:
 
         start = kept rho_c b / B(rho_c) + (1 - kept b / B(rho_s)) rho_p,
         b = min(B(rho_s), LARGEST_GAIN B(rho_c)) min(1, (LARGEST_GAIN rho_s' rho_s + f^2) / (rho_s^2 + f^2))
@@ -114,14 +112,14 @@ class GuidedSimulation:
     kept: float = 0.97
 
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke) -> Start:
-        """The carried density in the smooth answer's amounts; see `TemporalPrior`.
+        """The carried density with the smooth answer's low pass; see `TemporalPrior`.
 
         Its figure ``share`` is that of the smoke which is taken over.
         """
         if depth.detail is None or not views.hull.any():
             return BlendCarried(self.share).start(views, depth, carried)
         where, detail = views.where, depth.detail
-        wanted, have = (detail.amounts(values) for values in (detail.smooth, carried.density))
+        wanted, have = (detail.low_pass(values) for values in (detail.smooth, carried.density))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         if carried.smooth is not None:
             came, smooth = (where.take(values) for values in (carried.smooth, detail.smooth))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import smokelift._core as _core
 from smokelift.checks.array_types import Doubles
-from smokelift.density.screen import seen_at, view_frame
+from smokelift.density.upright_plane import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
 
 Volume = NDArray[np.float32]

@@ -20,7 +20,7 @@ import numpy.typing as npt
 import psutil
 import scipy.fft
 
-from smokelift.density.coarser_grid import MIN_COARSENED_VOXELS
+from smokelift.density.levels import MIN_COARSENED_VOXELS
 from smokelift.report.workload import Workload
 
 Resolution = tuple[int, int, int]

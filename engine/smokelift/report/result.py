@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import Finding
-from smokelift.density.detailed_depth import unseen_sides
+from smokelift.density.synthesis import unseen_sides
 from smokelift.density.turntable import Turntable
 from smokelift.setup.shot import Shot
 

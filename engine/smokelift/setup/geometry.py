@@ -12,7 +12,7 @@ import numpy as np
 
 from smokelift.checks import Figures, Finding
 from smokelift.checks.array_types import Doubles
-from smokelift.density.screen import view_frame
+from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix

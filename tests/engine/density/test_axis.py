@@ -148,9 +148,9 @@ def test_columns_beside_one_another_have_depths_of_their_own() -> None:
 def test_what_nothing_shows_is_as_uncertain_as_the_box_is_badly_centred() -> None:
     """Across the picture the smoke's distance from the middle is seen, and in depth it may be as large."""
     floating = column(0.3, low=1.0)
-    aside, central = (estimate_axis(seen(np.roll(floating, by, 0)), FRONT, BOX) for by in (6, -3))
-    assert (aside.cue, aside.depth) == ("box", 0)
-    assert 0.134 < central.deviation < 0.14 < aside.deviation < 0.6
+    offset, central = (estimate_axis(seen(np.roll(floating, by, 0)), FRONT, BOX) for by in (6, -3))
+    assert (offset.cue, offset.depth) == ("box", 0)
+    assert 0.134 < central.deviation < 0.14 < offset.deviation < 0.6
     nothing, given = estimate_axis([], FRONT, BOX), estimate_axis([], FRONT, BOX, base=0.3)
     assert (nothing.cue, nothing.depth, nothing.deviation) == ("box", 0, 0.165)
     assert (given.cue, given.depth, given.deviation) == ("distance", 0.3, 0.165)

@@ -1,4 +1,4 @@
-"""How much of the carried density a frame starts from: a share, or its detail in the smooth answer's amounts."""
+"""How much of the carried density a frame starts from: a share, or its detail with the smooth answer's low pass."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -94,7 +94,7 @@ class Lobes:
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         return density
 
-    def amounts(self, density: Volume) -> np.ndarray:
+    def low_pass(self, density: Volume) -> np.ndarray:
         return blurred(density)[self.views.hull]
 
 
@@ -110,7 +110,7 @@ def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume, smooth: 
     return GuidedSimulation(SHARE, kept=1.0).start(moment.views, prior_start, Smoke(carried, smooth))
 
 
-def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, prior_start) -> None:
+def test_a_simulation_is_guided_to_the_smooth_answers_low_pass(moment, prior_start) -> None:
     """Coarsely the start is the smooth answer, finely it is what was carried, however much that was."""
     hull = moment.views.hull
     starts = [guided(moment, prior_start, np.float32(factor) * moment.true).density for factor in (1.0, 8.0)]

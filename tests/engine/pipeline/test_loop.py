@@ -14,7 +14,7 @@ from smokelift.baselines.density import FixedRateDescent
 from smokelift.density import GradientFit, RoundDepth, Smoke, Start, ViewSet
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels
-from smokelift.density.screen import view_frame
+from smokelift.density.upright_plane import view_frame
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.checks import UNDETERMINED, Finding
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
-from smokelift.density.screen import view_frame
+from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.scene import (

@@ -2,7 +2,7 @@
 
 The smooth answer of `RoundDepth` is the mean of all smokes that show one picture: from the side, a spindle without
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
-distribution of their patches (`exemplar`). Noise breaks the spindle's symmetry (`stretched_noise`). Then, from coarse
+distribution of their patches (`texture`). Noise breaks the spindle's symmetry (`detail_noise`). Then, from coarse
 to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
 their rays to follow. The rows of every picture keep the amounts of the smooth answer. After each round the cameras'
 pictures have their turn. Smoke carried on from the frame before has the clip's statistics already: one round is enough.
@@ -16,19 +16,17 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.clip_texture import ClipTexture
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
-from smokelift.density.exemplar import Exemplar, enlarged, reduced
-from smokelift.density.isotropic import isotropic
-from smokelift.density.moment_levels import MomentLevel
+from smokelift.density.detail_noise import StretchedNoise
+from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
-from smokelift.density.stretched_noise import StretchedNoise
-from smokelift.density.temporal_prior import TINY
+from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, reduced
 from smokelift.density.turntable import Spans, Turntable, filled_spans
 from smokelift.render import Volume
 from smokelift.scene import Camera
@@ -46,7 +44,7 @@ blurred: lobes are made up, on any grid, and the smoke of each stays where it is
 (docs/experiments/guided-simulation.md, docs/experiments/made-up-detail.md)."""
 
 LARGEST_GAIN = 5.0
-"""Bound of the factor that gives noisy smoke the smooth answer's amounts."""
+"""Bound of the factor that gives noisy smoke the smooth answer's low pass."""
 
 FRESH_ROUNDS = 4
 """Rounds on each scale for smoke that carries nothing on."""
@@ -63,6 +61,10 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 FRESH_STEP, CARRIED_STEP = 0.6, 0.5
 """Shares of a step towards a picture that are made, for fresh smoke and for carried smoke: more of the second flickers
 (docs/experiments/every-view.md)."""
+
+GAIN = (np.pi / 2) ** 0.5
+"""Root of one over the mean sine of all angles, so that a picture whose detail has no direction keeps its energy when
+its layers are taken out (docs/experiments/every-view.md)."""
 
 STEP_RANGE = (0.3, 3.0)
 """Largest change of a ray's smoke in one step."""
@@ -99,7 +101,7 @@ class DetailedDepth:
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """The smooth answer with noise, and the detail that gives it the clip's texture."""
         estimate = self.smooth.estimate(views)
-        level = MomentLevel(estimate.views, estimate.inside)
+        level = Level(estimate.views, estimate.inside)
         if self.texture is None or not level.views.hull.any():
             return estimate
         if not unseen_sides(self.texture.turntable, [view.camera for view in views.views]):
@@ -111,8 +113,8 @@ class DetailedDepth:
             detail=EveryView(self.texture, level, smooth, self.detail),
         )
 
-    def _noisy(self, smooth: Volume, level: MomentLevel, texture: ClipTexture) -> Volume:
-        """The smooth answer with noise that travels with the smoke; its coarse amounts stay."""
+    def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
+        """The smooth answer with noise that travels with the smoke; its low pass stays."""
         moved = texture.turntable.height * texture.drift * level.views.frame
         strengths = tuple(self.detail * each for each in texture.roughness)
         noise = StretchedNoise(moved, texture.width, strengths, self.seed)
@@ -122,16 +124,16 @@ class DetailedDepth:
         np.exp(values, out=values)
         values *= where.take(smooth)
         where.put(values, noisy)
-        amounts, now = (level.blurred(each, LOW_PASS * texture.width) for each in (smooth, noisy))
-        amounts += TINY
+        gain, now = (level.blurred(each, LOW_PASS * texture.width) for each in (smooth, noisy))
+        gain += TINY
         now += TINY
-        amounts /= now
-        values *= np.minimum(amounts, np.float32(LARGEST_GAIN), out=amounts)
+        gain /= now
+        values *= np.minimum(gain, np.float32(LARGEST_GAIN), out=gain)
         where.put(values, noisy)
         return noisy
 
 
-def _smooth_answer(level: MomentLevel, density: Volume) -> Volume:
+def _smooth_answer(level: Level, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show, found on the coarsest grid."""
     coarser = level.coarser
     if coarser is None:
@@ -159,7 +161,7 @@ class EveryView:
     """
 
     texture: ClipTexture
-    level: MomentLevel
+    level: Level
     smooth: Volume
     strength: float
 
@@ -176,7 +178,7 @@ class EveryView:
         """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
         return self._rounds(density, cameras, self.texture.exemplars, self.azimuths(), fresh)
 
-    def amounts(self, density: Volume) -> NDArray[np.float32]:
+    def low_pass(self, density: Volume) -> NDArray[np.float32]:
         """The density (n,) blurred over lobes of smoke; see `Detail`."""
         return self.level.blurred(density, LOW_PASS * self.texture.width)
 
@@ -240,7 +242,7 @@ class EveryView:
         wanted *= np.clip(amounts / np.maximum(have, 1e-9), *ROW_RANGE)
         faint = 1e-3 * wanted.max()
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
-        step = np.float32(relaxation) * isotropic(step)
+        step = np.float32(relaxation) * isotropic_filter(step)
         step = np.ascontiguousarray(enlarged(step, scale, whole.shape))
         table.scale(now.values, step, degrees, corner, now.spans)
 
@@ -254,6 +256,24 @@ class EveryView:
             degrees = 180 * (GOLDEN * turn % 1)
             if _unseen(degrees, cameras):
                 yield turn, degrees
+
+
+def isotropic_filter(picture: Picture) -> Picture:
+    """Filter what is laid along the rays of one azimuth, so that the sum over many has no level layers.
+
+    What changes smoke alike along level rays has no detail along them: its Fourier transform lies in the plane through
+    the vertical that faces these rays. The planes of all azimuths share the vertical. So the energy of independent
+    changes adds up as 1 / k at a wave number k across the vertical, and smoke is drawn up in level layers
+    (backprojection without its ramp filter: Kak and Slaney, "Principles of Computerized Tomographic Imaging", 1988,
+    ch. 3). Here every wave of a picture (columns, voxels along the axis) is weighed by the root of the sine of its
+    angle with the vertical. That undoes the layers and keeps how much of each size there is. What is constant across
+    counts as half a wave in twice the columns.
+    """
+    waves = scipy.fft.dctn(picture)
+    across, along = (np.arange(count, dtype=np.float32) / count for count in picture.shape)
+    across[0] = 0.5 / picture.shape[0]
+    waves *= np.float32(GAIN) * np.sqrt(across[:, None] / np.hypot(across[:, None], along))
+    return np.asarray(scipy.fft.idctn(waves, overwrite_x=True), np.float32)
 
 
 def unseen_sides(turntable: Turntable, cameras: Sequence[Camera]) -> bool:

@@ -1,4 +1,4 @@
-"""The upright screen through the domain's centre: one picture's rows as heights in the world."""
+"""The upright plane through the domain's centre: one picture's rows as heights in the world."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Upright:
-    """A picture on the upright screen through the domain's centre, row by row.
+class PlaneRows:
+    """A picture on the upright plane through the domain's centre, row by row.
 
     The rows are at `heights` (n,), in metres above the centre. `total` (n,) is the amount in each, times metres, `mean`
     and `spread` (n,) its mean lateral position and standard deviation (m): 0 where there is nothing.
@@ -47,8 +47,8 @@ class Upright:
 
 
 @dataclass(frozen=True, eq=False)
-class Screen:
-    """A picture on the upright screen through the domain's centre.
+class PlanePicture:
+    """A picture on the upright plane through the domain's centre.
 
     Its `values` (n, m) are at `heights` (n,) above the centre and `laterals` (m,) from it, in metres. A column is
     `width` metres wide.
@@ -59,33 +59,28 @@ class Screen:
     values: NDArray[np.float64]
     width: float
 
-    def rows(self, part: slice = slice(None)) -> Upright:
+    def rows(self, part: slice = slice(None)) -> PlaneRows:
         """Sums along the rows, over some of the columns."""
         across, values = self.laterals[part], self.values[:, part]
         total = values.sum(1)
         safe = np.where(total > 0, total, 1.0)
         mean = (values * across).sum(1) / safe
         variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
-        return Upright(self.heights, total * self.width, mean, np.sqrt(variance))
+        return PlaneRows(self.heights, total * self.width, mean, np.sqrt(variance))
 
 
-def upright_rows(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Upright:
-    """Sum up a picture (rows, columns) along the rows of the upright screen, ``per_voxel`` rows to a voxel."""
-    return upright_screen(amount, camera, domain, per_voxel=per_voxel).rows()
-
-
-def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Screen:
-    """Put a picture (rows, columns) on the upright screen, ``per_voxel`` rows to a voxel and one column."""
+def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
+    """Put a picture (rows, columns) on the upright plane, ``per_voxel`` rows to a voxel and one column."""
     lateral, depth, height = view_frame(camera)
     centre = np.array(domain.centre)
     h = domain.voxel_size
     sideways = reach_along(domain, lateral)
     across = np.arange(-sideways + h / 2, sideways, h)
-    # what stands before the screen shows beyond the domain's ends there
+    # what stands before the plane shows beyond the domain's ends there
     ends = reach_along(domain, height) + reach_along(domain, depth) / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
     points = centre + across[None, :, None] * lateral + up[:, None, None] * height
-    return Screen(up, across, seen_at(points, amount, camera), h)
+    return PlanePicture(up, across, seen_at(points, amount, camera), h)
 
 
 def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:

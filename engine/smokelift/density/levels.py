@@ -1,4 +1,4 @@
-"""A moment on grids that are each half as fine, and changes found there applied to the finer grid.
+"""A moment's pyramid: grids that are each half as fine, and changes found there applied to the finer grid.
 
 Detail of several voxels needs no single voxels: a grid half as fine takes an eighth of the work and the memory. What
 changes there changes the finer density by the same factor, linear between the voxels' middles. So the finer density
@@ -15,13 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.density.coarser_grid import MIN_COARSENED_VOXELS, any_of_two
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import ViewSet
-from smokelift.density.temporal_prior import TINY
 from smokelift.footage.images import area_average
 from smokelift.render import Volume
 from smokelift.scene.domain import box_around
+
+MIN_COARSENED_VOXELS = 1_000_000
+"""Voxels that may hold smoke above which a grid has a coarser one (docs/experiments/clip-pixels.md)."""
+
+TINY = np.finfo(np.float32).tiny
+"""Smallest normal number, for divisions and logarithms."""
 
 BLUR_REACH = 3.0
 """Reach of a blur in its standard deviations: 0.3 % of a Gaussian lie beyond."""
@@ -32,8 +36,8 @@ their middles, have a variance of 11/12 of a finer voxel. So a blur there is 5 %
 
 
 @dataclass(frozen=True, eq=False)
-class MomentLevel:
-    """A moment on one grid, whose voxels are each `coarseness` voxels of the finest grid wide.
+class Level:
+    """A pyramid level: a moment on one grid, whose voxels are each `coarseness` voxels of the finest grid wide.
 
     `inside` has a picture (rows, columns) for each view: the share of every ray's smoke that lies inside the domain.
     """
@@ -43,7 +47,7 @@ class MomentLevel:
     coarseness: int = 1
 
     @cached_property
-    def coarser(self) -> MomentLevel | None:
+    def coarser(self) -> Level | None:
         """The level of a grid half as fine; None where the smoke has few voxels."""
         views = self.views
         if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
@@ -51,18 +55,18 @@ class MomentLevel:
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))
         seen = tuple(view.coarser(optics) for view in views.views)
         inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
-        return MomentLevel(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
+        return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
     def terms(self) -> list[Term]:
         """Terms of the cameras' pictures; see `camera_terms`."""
         return camera_terms(self.views, self.inside)
 
-    def finer(self, values: Volume, of: MomentLevel) -> NDArray[np.float32]:
+    def finer(self, values: Volume, of: Level) -> NDArray[np.float32]:
         """Values of this grid at the voxels (n,) that may hold smoke on the next finer one, linear between middles."""
         fine, box = self._boxes(of)
         return _core.prolong_values(values[box], of.views.hull[fine])
 
-    def changed(self, density: Volume, of: MomentLevel, change: Callable[[Volume], Volume]) -> Volume:
+    def changed(self, density: Volume, of: Level, change: Callable[[Volume], Volume]) -> Volume:
         """A density of the next finer grid, changed as `change` changes its means on this grid."""
         fine, box = self._boxes(of)
         means = self.means(density, of)
@@ -71,7 +75,7 @@ class MomentLevel:
         _core.scale_alike(density[fine], of.views.hull[fine], means[box], after[box], float(TINY), result[fine])
         return result
 
-    def means(self, density: Volume, of: MomentLevel) -> Volume:
+    def means(self, density: Volume, of: Level) -> Volume:
         """Means of a density of the next finer grid on this one."""
         fine, box = self._boxes(of)
         means = np.zeros(self.views.hull.shape, np.float32)
@@ -91,7 +95,7 @@ class MomentLevel:
         """The box around the smoke."""
         return box_around(self.views.hull, 0)
 
-    def _boxes(self, of: MomentLevel) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    def _boxes(self, of: Level) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """The box around the smoke on the finer grid and on this one."""
         shape = of.views.hull.shape
         fine = tuple(
@@ -108,3 +112,38 @@ def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDA
     means = np.zeros(coarse.shape, np.float32)
     means[coarse] = _blurred(_core.means_of_two(values), coarse, deviation / 2)
     return _core.prolong_values(means, marked)
+
+
+def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether any of two voxels along every axis is marked."""
+    for axis in range(3):
+        lead = (slice(None),) * axis
+        second = voxels[(*lead, slice(1, None, 2))]
+        voxels = voxels[(*lead, slice(0, None, 2))].copy()
+        voxels[(*lead, slice(0, second.shape[axis]))] |= second
+    return voxels
+
+
+def spread_to_two(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Mark the voxels of a grid (shape) that the marked ones of a grid half as fine are made of."""
+    x, y, z = (slice(0, count) for count in shape)
+    return voxels.repeat(2, 0).repeat(2, 1).repeat(2, 2)[x, y, z]
+
+
+def every_second(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Mark the first voxel of a grid (shape) in each that is marked on a grid half as fine."""
+    result = np.zeros(shape, np.bool_)
+    result[::2, ::2, ::2] = voxels
+    return result
+
+
+def with_neighbours(voxels: NDArray[np.bool_], *, corners: bool = False) -> NDArray[np.bool_]:
+    """Mark the six voxels beside each marked one too, with corners all 26: a fast `ndimage.binary_dilation`."""
+    result = voxels.copy()
+    for axis in range(3):
+        lead = (slice(None),) * axis
+        low, high = (*lead, slice(None, -1)), (*lead, slice(1, None))
+        before = result.copy() if corners else voxels
+        result[high] |= before[low]
+        result[low] |= before[high]
+    return result

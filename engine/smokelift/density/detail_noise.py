@@ -7,18 +7,16 @@ threads, where plain noise has round grains (Perlin, "An image synthesizer", 198
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.density.exemplar import Picture, reduced
-from smokelift.density.moment_levels import MomentLevel
+from smokelift.density.levels import Level
 
 MAX_NODE_DISTANCE = 2.0
 """Distance between nodes of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large."""
@@ -38,50 +36,6 @@ LATTICE = 32
 NODES = np.float32((2 / 3) ** 1.5)
 """Standard deviation of linear interpolation in three dimensions between nodes of unit variance."""
 
-BODY = 0.1
-"""Share of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not count."""
-
-NEIGHBOURS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
-"""Blurs of the octaves whose energy a band holds, over the band's own: others add less than a hundredth."""
-
-FINE_ENOUGH = 1.5
-"""Smallest standard deviation (pixels) of the blurs that measure detail: larger pictures are reduced first."""
-
-
-def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
-    """Standard deviation of the logarithm of some smoke's density by octave, the coarsest first.
-
-    The pictures are optical depths, a pixel a voxel; the smoke is ``width`` voxels wide (standard deviation across its
-    axis). A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart, is
-    divided by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
-    """
-    octaves = max(1, 1 + int(np.log2(MAX_NODE_DISTANCE * width / MIN_NODE_DISTANCE)))
-    blurs = [MAX_NODE_DISTANCE * width / 2**octave / np.sqrt(6) for octave in range(octaves)]
-    return tuple(float(np.sqrt(np.log1p(_energy(pictures, blur) / _unit_energy(blur, width)))) for blur in blurs)
-
-
-def _energy(pictures: Sequence[Picture], blur: float) -> float:
-    """Mean square of the detail between a blur (deviation, pixels) and half of it, over the blurred smoke's."""
-    scale = 1
-    while blur / (2 * scale) >= FINE_ENOUGH:
-        scale *= 2
-    square = amount = 0.0
-    for picture in pictures:
-        small = reduced(picture, scale)
-        fine, coarse = (ndimage.gaussian_filter(small, each / scale) for each in (blur / 2, blur))
-        body = coarse > BODY * coarse.max()
-        square += float(np.sum((fine - coarse)[body] ** 2 / coarse[body], dtype=np.float64))
-        amount += float(np.sum(coarse[body], dtype=np.float64))
-    return square / amount
-
-
-def _unit_energy(blur: float, width: float) -> float:
-    """`_energy` of octaves of unit strength: each is blurred white noise, of which a ray averages independent parts."""
-    own = np.array([each * blur for each in NEIGHBOURS])
-    square = own**2
-    bands = 1 / (square + blur**2 / 4) - 2 / (square + blur**2 * 5 / 8) + 1 / (square + blur**2)
-    return float(np.sum(square * bands * own / np.hypot(own, width)))
-
 
 @dataclass(frozen=True, eq=False)
 class StretchedNoise:
@@ -96,12 +50,12 @@ class StretchedNoise:
     strengths: tuple[float, ...]
     seed: int
 
-    def at(self, level: MomentLevel) -> NDArray[np.float32]:
+    def at(self, level: Level) -> NDArray[np.float32]:
         """Noise (n,) at the voxels that may hold smoke."""
         # an octave's noise, and three more for the motion that draws out the next
         return self._sum(level, iter(_lattices(self.seed, 4 * len(self.strengths) - 3))).noise
 
-    def _sum(self, level: MomentLevel, lattices: Iterator[_Lattice]) -> _Octaves:
+    def _sum(self, level: Level, lattices: Iterator[_Lattice]) -> _Octaves:
         """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
         places = _core.marked(hull).astype(np.float32)
@@ -139,7 +93,7 @@ class _Octaves(NamedTuple):
     number: int
 
 
-def _finer(values: NDArray[np.float32], coarser: MomentLevel, level: MomentLevel) -> NDArray[np.float32]:
+def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:
     """Values at the voxels of one grid that may hold smoke, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
     coarser.views.where.put(values, field)

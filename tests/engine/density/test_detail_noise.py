@@ -5,7 +5,8 @@ import pytest
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.density.stretched_noise import STRETCH, StretchedNoise, roughness
+from smokelift.density.detail_noise import STRETCH, StretchedNoise
+from smokelift.density.texture import roughness
 
 WIDTH = 8.0
 NONE = (0.0, 0.0, 0.0)
@@ -80,7 +81,7 @@ def test_fine_octaves_are_drawn_out() -> None:
         return float(np.median(most / least))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("smokelift.density.stretched_noise.STRETCH", 0.0)
+        patch.setattr("smokelift.density.detail_noise.STRETCH", 0.0)
         plain = drawn_out(noise.at(level(shape)))
     assert STRETCH > 0
     assert drawn_out(noise.at(level(shape))) > 1.5 * plain
