@@ -30,6 +30,7 @@ from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.upright_plane import view_frame
+from smokelift.density.wander import Scatter, Wander
 from smokelift.render import Volume
 from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
@@ -94,11 +95,12 @@ class DepthPrior(Protocol):
 class RoundDepth:
     """Smoke that is as deep as it is wide; see the module.
 
-    The smoke of one view stands on `axis`, by default on the clip's, else in the middle of the domain. Several views
-    show where it stands.
+    The smoke of one view stands on `axis`, by default on the clip's, else in the middle of the domain, and may `wander`
+    about it. Several views show where it stands.
     """
 
     axis: SmokeAxis | None = None
+    wander: Wander | None = None
 
     def of_clip(self, clip: ObservedClip) -> RoundDepth:
         """Take the axis that the clip's smoke was found to have, unless one is given."""
@@ -106,31 +108,34 @@ class RoundDepth:
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """Spread the pictures' smoke by the profiles; one picture before darkness is explained in its own shadows."""
+        scatter = None
         if len(views.views) == 1:
             (view,) = views.views
+            if self.wander is not None:
+                scatter = self.wander.scatter(view.camera, views.optics.domain, views.frame)
             shadowed = views.optics.scattering in SHADOWED and views.hull.any()
             if shadowed and view.before_darkness(views.optics.unshadowed_source()):
-                views = replace(views, views=(self._in_its_shadows(view, views),))
-        profiles = self._profiles(views)
+                views = replace(views, views=(self._in_its_shadows(view, views, scatter),))
+        profiles = self._profiles(views, scatter)
         expected = replace(views, hull=_expected(views, profiles))
         return DepthEstimate(_density(expected, profiles), tuple(p.share_inside() for p in profiles), expected)
 
-    def _in_its_shadows(self, view: ObservedView, views: ViewSet) -> ObservedView:
+    def _in_its_shadows(self, view: ObservedView, views: ViewSet, scatter: Scatter | None) -> ObservedView:
         """The only view, with the optical depth that explains it in the shadows of the smoke that it shows."""
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))  # shadows need no single voxels
         coarse = replace(view, projection=project_voxels(view.camera, optics.domain))
         seen = ViewSet((coarse,), any_of_two(views.hull), optics, views.frame)
-        density = _density(seen, self._profiles(seen))
+        density = _density(seen, self._profiles(seen, scatter))
         renderer = optics.renderer(view.camera, view.background, density > 0)
         image = renderer.image(density)
         return replace(view, optical_depth=shadowed_optical_depth(view, image, renderer.transmittance, optics))
 
-    def _profiles(self, views: ViewSet) -> list[DepthProfile]:
+    def _profiles(self, views: ViewSet, scatter: Scatter | None) -> list[DepthProfile]:
         """How each view's smoke is spread in depth."""
         one = self.axis or SmokeAxis.upright()
         axes = [one] if len(views.views) == 1 else [_common_axis(view, views) for view in views.views]
         return [
-            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis)
+            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis, scatter)
             for view, axis in zip(views.views, axes, strict=True)
         ]
 

@@ -31,6 +31,7 @@ import smokelift._core as _core
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places, voxel_axes
 from smokelift.density.upright_plane import on_upright_plane, view_frame
+from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
@@ -168,18 +169,36 @@ class _Rays(NamedTuple):
 class DepthProfile:
     """The profile that a picture suggests.
 
-    ``amount`` (rows, columns) is the optical depth, or proportional to it. The rays' middles stand on the axis.
+    ``amount`` (rows, columns) is the optical depth, or proportional to it. The rays' middles stand on the axis, or
+    scatter about it. With scatter the profile is narrower, so that the smoke is as deep as without.
     """
 
-    def __init__(self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis) -> None:
+    def __init__(
+        self,
+        amount: NDArray[np.float32],
+        camera: Camera,
+        domain: Domain,
+        axis: SmokeAxis,
+        scatter: Scatter | None = None,
+    ) -> None:
         self._domain, self._depth = domain, view_frame(camera)[1]
         self._rays = rays = _Rays.of(camera, domain)
         middle = np.zeros(amount.shape)
         for _ in range(STEPS_TO_AXIS):
             middle = axis.at(*rays.at(middle))
-        self._width = SCALE * _deviation(*rays.at(middle), amount, camera, domain, axis)
+        deviation = _deviation(*rays.at(middle), amount, camera, domain, axis)
+        narrowing, offset = 1.0, np.zeros(amount.shape)
+        if scatter is not None:
+            # a lobe moves as one, so what is as deep as its surroundings on the mean tells how far
+            blur = scatter.width / _pixel_size(camera, domain)
+            weight = amount + 1e-6 * amount.max(initial=1e-30)
+            deep = ndimage.gaussian_filter(weight * deviation, blur) / ndimage.gaussian_filter(weight, blur)
+            narrowing, offset = float(np.sqrt(1 - scatter.deviation**2)), deep * scatter.offset
+        self._width = narrowing * SCALE * deviation
         room = np.minimum(ROOM * self._width, (rays.far - rays.near) / 2)
-        self._middle = np.where(rays.missed, middle, np.clip(middle, rays.near + room, rays.far - room))
+        self._middle = np.where(
+            rays.missed, middle + offset, np.clip(middle + offset, rays.near + room, rays.far - room)
+        )
 
     def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""

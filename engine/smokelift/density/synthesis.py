@@ -28,6 +28,7 @@ from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, reduced
 from smokelift.density.turntable import Spans, Turntable, filled_spans
+from smokelift.density.wander import Wander
 from smokelift.render import Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import box_around
@@ -96,7 +97,12 @@ class DetailedDepth:
     def of_clip(self, clip: ObservedClip) -> DetailedDepth:
         """Measure a clip's texture, unless there is no detail to make."""
         texture = ClipTexture.of(clip) if self.detail > 0 else None
-        return replace(self, smooth=self.smooth.of_clip(clip), texture=texture)
+        smooth = self.smooth.of_clip(clip)
+        if texture is not None:
+            velocity = texture.drift * texture.turntable.height
+            roughness = tuple(self.detail * each for each in texture.roughness)
+            smooth = replace(smooth, wander=Wander(velocity, texture.width, roughness, self.seed))
+        return replace(self, smooth=smooth, texture=texture)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """The smooth answer with noise, and the detail that gives it the clip's texture."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points
+from smokelift.scene.checks import Vector
+from smokelift.scene.projection import project_points, ray_through_pixels
 
 
 def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -25,6 +27,16 @@ def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
     depth = -matrix[:3, 2] + (matrix[:3, 2] @ height) * height
     depth /= np.linalg.norm(depth)
     return np.cross(depth, height), depth, height
+
+
+@lru_cache(maxsize=4)
+def crossings(camera: Camera, centre: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Heights and laterals (rows, columns), in meters, at which pixels' rays cross the upright plane at a point."""
+    lateral, depth, height = view_frame(camera)
+    origin, direction = ray_through_pixels(camera)
+    start = origin - np.array(centre)
+    place = start - (start @ depth)[..., None] / (direction @ depth)[..., None] * direction
+    return place @ height, place @ lateral
 
 
 def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:

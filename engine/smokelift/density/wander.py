@@ -1,0 +1,102 @@
+"""Smoke that wanders in depth: where the middle of each ray's smoke stands beside the axis.
+
+The axis of one picture's smoke is a mean. From the side, smoke about it looks turned on a lathe. In true smoke the
+rays' middles scatter about it by a part of the smoke's depth (docs/experiments/wander.md). The lobes that scatter them
+roughen the pictures too. So each octave of the scatter is as strong as the clip's detail on its scale, and laminar
+smoke stays straight. The scatter travels with the smoke.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from smokelift.checks.array_types import Doubles
+from smokelift.density.upright_plane import crossings, view_frame
+from smokelift.scene import Camera, Domain
+
+DEVIATION = 0.5
+"""Standard deviation of the rays' middles over the smoke's in depth, where all octaves are of unit strength
+(docs/experiments/wander.md)."""
+
+NODES = (1.6, 0.8)
+"""Distances between nodes of the octaves, in standard deviations of the smoke's width: lobes, and half of them
+(docs/experiments/wander.md)."""
+
+LARGEST_DEVIATION = 0.9
+"""Bound of the standard deviation of the rays' middles over the smoke's: the rest is each ray's own depth."""
+
+LARGEST = 2.0
+"""Bound of the scatter, in its standard deviations: smoke stays where the domain is likely to hold it."""
+
+LATTICE = 32
+"""Nodes along each side of a lattice, which repeats."""
+
+NODE_DEVIATION = (151 / 315) ** 1.5
+"""Standard deviation of cubic B-splines in three dimensions with coefficients of unit variance: along each dimension
+the squares of those that reach a place add up to 151 / 315 on the mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Where the middles of the rays' smoke stand at one moment.
+
+    `offset` (rows, columns) is how far they stand behind the axis, over the smoke's standard deviation in depth;
+    `deviation` is the standard deviation of that. `width` is the smoke's standard deviation (m) across its axis: a lobe
+    moves as one.
+    """
+
+    offset: NDArray[np.float32]
+    deviation: float
+    width: float
+
+
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """How the smoke of one camera's clip wanders.
+
+    `velocity` (3,) is in voxels a frame, `width` the standard deviation of the smoke across its axis in voxels.
+    `roughness` is the standard deviation of the logarithm of its density by octave, the coarsest first: see
+    `stretched_noise`.
+    """
+
+    velocity: Doubles
+    width: float
+    roughness: tuple[float, ...]
+    seed: int
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the rays' middles, over that of the smoke in depth."""
+        return float(np.linalg.norm(self._deviations))
+
+    def scatter(self, camera: Camera, domain: Domain, frame: int) -> Scatter:
+        """How the rays of a camera's pixels scatter in a frame."""
+        lateral, _, height = view_frame(camera)
+        up, right = (each[..., None] / domain.voxel_size for each in crossings(camera, domain.centre))
+        offset = self.offset(up * height + right * lateral, frame)
+        return Scatter(np.asarray(offset, np.float32), self.deviation, self.width * domain.voxel_size)
+
+    def offset(self, places: Doubles, frame: int) -> Doubles:
+        """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
+
+        ``places`` (rows, columns, 3) are where the pixels' rays cross an upright plane through the domain's centre, in
+        voxels from there.
+        """
+        random = np.random.default_rng(self.seed)
+        at = np.moveaxis(places - frame * self.velocity, -1, 0)
+        offset = np.zeros(at.shape[1:])
+        for deviation, nodes in zip(self._deviations, NODES, strict=False):
+            lattice = random.standard_normal((LATTICE,) * 3) / NODE_DEVIATION
+            nodes_at = at / (nodes * self.width) + random.uniform(0, LATTICE, (3, 1, 1))
+            offset += deviation * ndimage.map_coordinates(lattice, nodes_at, order=3, mode="grid-wrap", prefilter=False)
+        return np.asarray(np.clip(offset, -LARGEST * self.deviation, LARGEST * self.deviation))
+
+    @property
+    def _deviations(self) -> Doubles:
+        """`deviation` by octave."""
+        shares = DEVIATION * np.array(self.roughness[: len(NODES)])
+        return shares * (LARGEST_DEVIATION / max(float(np.linalg.norm(shares)), LARGEST_DEVIATION))
