@@ -23,7 +23,7 @@ from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import numbered_pictures
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
-from smokelift.output.layout import INDEX, frame_path, proxy_path
+from smokelift.output.files import INDEX, frame_path, proxy_path
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings

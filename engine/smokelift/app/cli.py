@@ -21,7 +21,7 @@ from smokelift.app.options import whole_number
 from smokelift.app.progress import OutputError, reporter
 from smokelift.checks import printable
 from smokelift.footage.images import READABLE
-from smokelift.output.atomic import DISK_FULL
+from smokelift.output.files import DISK_FULL
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, read_index
 from smokelift.checks import counted
-from smokelift.output.atomic import atomic_path
+from smokelift.output.files import atomic_path
 
 _STYLE = """
 body { background: #1a1a1c; color: #e8e8e8; font: 15px sans-serif; margin: 1.5em }

@@ -13,8 +13,7 @@ import numpy as np
 from smokelift.checks import counted
 from smokelift.checks.array_types import Mask
 from smokelift.direct.moment import Moment
-from smokelift.output.checksum import checksum
-from smokelift.output.layout import INDEX
+from smokelift.output.files import INDEX, checksum
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera

@@ -12,8 +12,7 @@ from PIL import Image as Pillow
 from PIL import ImageDraw
 
 from smokelift.evaluation.orbit import Orbit
-from smokelift.output.images import eight_bit
-from smokelift.output.sheet import GAP, Tile, write_sheet
+from smokelift.output.images import GAP, Tile, eight_bit, write_sheet
 from smokelift.render import Volume
 
 DEGREES = tuple(range(0, 180, 18))

@@ -4,9 +4,9 @@ What is left out or rounded does not show in a picture of 8 bits:
 
 - Smoke that is so thin that a box full of it hides less than `THIN` of what is behind is left out.
 - Quantised densities are multiples of a power of two; rounding errors along a ray are independent, so over n voxels of
-  h metres they change the optical depth by extinction * h * sqrt(n / 12) steps (root mean square), which is kept below
+  h meters they change the optical depth by extinction * h * sqrt(n / 12) steps (root mean square), which is kept below
   `SHADE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
-- Quantised velocities move smoke by at most half of `VELOCITY_STEP` voxels a frame.
+- Quantised velocities move smoke by at most half of `VELOCITY_STEP` voxels per frame.
 
 Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
 """
@@ -26,13 +26,12 @@ from typing import Any, Literal
 import numpy as np
 
 from smokelift.output.archive import FLAME
-from smokelift.output.atomic import atomic_path
-from smokelift.output.host import HOSTS, HostName
+from smokelift.output.files import INDEX, atomic_path, frame_path, proxy_path
+from smokelift.output.host import HOSTS, Host, HostName
 from smokelift.output.index import SequenceError
-from smokelift.output.layout import INDEX, frame_path, proxy_path
 from smokelift.output.proxy_files import write_proxy
 from smokelift.output.sequence import Sequence
-from smokelift.output.usd import UsdVolume, usd_text
+from smokelift.output.usd import UsdVolume, light_properties, usd_text
 from smokelift.output.vdb import vdb_module, write_vdb
 from smokelift.scene import Domain, Medium
 from smokelift.transport import Array
@@ -46,13 +45,16 @@ ASSET = "smoke.blend"
 """What the Blender extension adds; it stays when an export is replaced."""
 
 THIN = 1e-3
-"""Share of the light that smoke may hide and yet be left out."""
+"""Fraction of the light that smoke may hide and yet be left out."""
 
 SHADE = 1 / 510
 """Half a step of a picture of 8 bits."""
 
 VELOCITY_STEP = 1 / 16
-"""Step of a quantised velocity in voxels a frame."""
+"""Step of a quantised velocity in voxels per frame."""
+
+UNITS = {"length_unit": "m", "velocity_unit": "m/s", "extinction_unit": "1/m"}
+"""Metadata of every grid."""
 
 SAMPLED_FRAMES = 5
 """Frames that are written to estimate the size of all."""
@@ -127,13 +129,13 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
     try:
         out.mkdir(parents=True, exist_ok=True)
         _clear(out)
-        peak = _peak(sequence, sequence.frames, settings)
-        note = {**_note(sequence, settings, peak), "complete": False}
+        export = _Export(sequence, settings, _peak(sequence, sequence.frames, settings))
+        note = {**export.note(), "complete": False}
         _write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
         for number in sequence.frames:
-            yield number, _write_frame(sequence, number, out, settings, peak)
-        if not HOSTS[settings.host].left_handed:  # USD has no such axes
-            _write_text(out / USD, _usd(sequence, settings, peak))
+            yield number, export.write_frame(number, out)
+        if not export.host.left_handed:  # USD has no such axes
+            _write_text(out / USD, export.usd())
         _write_text(out / NOTE, json.dumps({**note, "complete": True}, indent=1) + "\n")
     except OSError as error:
         raise SequenceError(f"{out}: cannot be written: {error}") from error
@@ -160,9 +162,9 @@ def export_size(sequence: Sequence, settings: ExportSettings) -> int:
     """Estimate the bytes of an export, from frames that are evenly spaced over the sequence."""
     places = np.unique(np.linspace(0, len(sequence.frames) - 1, SAMPLED_FRAMES).round().astype(int))
     numbers = [sequence.frames[place] for place in places]
-    peak = _peak(sequence, numbers, settings)
+    export = _Export(sequence, settings, _peak(sequence, numbers, settings))
     with tempfile.TemporaryDirectory() as folder:
-        sizes = [_write_frame(sequence, number, Path(folder), settings, peak) for number in numbers]
+        sizes = [export.write_frame(number, Path(folder)) for number in numbers]
     return round(float(np.interp(np.arange(len(sequence.frames)), places, sizes).sum()))
 
 
@@ -183,45 +185,96 @@ def _peak(sequence: Sequence, numbers: Iterable[int], settings: ExportSettings) 
     return max(float(sequence.density(number).max()) for number in numbers) or 1.0
 
 
-def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSettings, peak: float) -> int:
-    """Write the files of a frame; returns their bytes."""
-    domain, extinction, host = sequence.scene.domain, sequence.scene.medium.extinction, HOSTS[settings.host]
-    thinned = _thinned(sequence.density(number), domain, extinction)
-    velocity = sequence.velocity_at_centres(number) if settings.velocity else None
-    paths = [frame_path(out, sequence.file_number(number), "vdb")]
-    rho = thinned
-    if settings.precision == "quantised":
-        rho = _rounded(rho, density_step(domain, extinction))
-        velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, sequence.fps))
-    if host.eight_bits:
-        rho = _rounded(thinned / np.float32(peak), 1 / 255)
-    flame = None
-    if FLAME in _grids(sequence, settings):
-        found = sequence.flame(number)
-        flame = np.zeros_like(rho) if found is None else found
-        if settings.precision == "quantised":
-            flame = _rounded(flame, density_step(domain, 1.0))  # radiance adds up along a ray as optical depth does
-    write_vdb(
-        paths[0],
-        host.turned(rho),
-        None if velocity is None else host.turned(velocity),
-        host.box(domain),
-        sequence.settings,
-        None if flame is None else host.turned(flame),
-        velocity_name=host.velocity,
-        facts=host.facts(sequence.fps, _medium(sequence, peak)),
-        whole_box=host.whole_box,
-    )
-    if settings.proxy > 1:
-        paths.append(proxy_path(out, sequence.file_number(number)))
-        write_proxy(paths[1], host.turned(thinned / np.float32(peak)), host.box(domain), settings.proxy)
-    return sum(path.stat().st_size for path in paths)
+@dataclass(frozen=True)
+class _Export:
+    """A sequence as a program reads it, with densities divided by a peak."""
 
+    sequence: Sequence
+    settings: ExportSettings
+    peak: float
 
-def _grids(sequence: Sequence, settings: ExportSettings) -> tuple[str, ...]:
-    """Names of the grids in the files of all frames."""
-    burns = sequence.scene.medium.flame_color is not None
-    return ("density", *[HOSTS[settings.host].velocity] * settings.velocity, *[FLAME] * burns)
+    @property
+    def host(self) -> Host:
+        """What the program expects."""
+        return HOSTS[self.settings.host]
+
+    @property
+    def domain(self) -> Domain:
+        """The box in the program's axes."""
+        return self.host.box(self.sequence.scene.domain)
+
+    @property
+    def medium(self) -> Medium:
+        """Optical properties of smoke of density 1, as the files have it."""
+        medium = self.sequence.scene.medium
+        return replace(medium, extinction=medium.extinction * self.peak)
+
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """Names of the grids in the files of all frames."""
+        burns = self.sequence.scene.medium.flame_color is not None
+        return ("density", *[self.host.velocity] * self.settings.velocity, *[FLAME] * burns)
+
+    def write_frame(self, number: int, out: Path) -> int:
+        """Write the files of a frame; returns their bytes."""
+        sequence, host = self.sequence, self.host
+        domain, extinction = sequence.scene.domain, sequence.scene.medium.extinction
+        thinned = _thinned(sequence.density(number), domain, extinction)
+        rho, velocity, flame = thinned, None, None
+        if self.settings.velocity:
+            velocity = sequence.velocity_at_centres(number)
+        if FLAME in self.grids:
+            found = sequence.flame(number)
+            flame = np.zeros_like(rho) if found is None else found
+        if self.settings.precision == "quantised":
+            rho = _rounded(rho, density_step(domain, extinction))
+            velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, sequence.fps))
+            # radiance adds up along a ray as optical depth does
+            flame = None if flame is None else _rounded(flame, density_step(domain, 1.0))
+        if host.eight_bits:
+            rho = _rounded(thinned / np.float32(self.peak), 1 / 255)
+        paths = [frame_path(out, sequence.file_number(number), "vdb")]
+        write_vdb(
+            paths[0],
+            host.turned(rho),
+            None if velocity is None else host.turned(velocity),
+            self.domain,
+            sequence.settings,
+            None if flame is None else host.turned(flame),
+            velocity_name=host.velocity,
+            facts={"fps": sequence.fps, **UNITS, **light_properties(self.medium)},
+            whole_box=host.whole_box,
+        )
+        if self.settings.proxy > 1:
+            paths.append(proxy_path(out, sequence.file_number(number)))
+            write_proxy(paths[1], host.turned(thinned / np.float32(self.peak)), self.domain, self.settings.proxy)
+        return sum(path.stat().st_size for path in paths)
+
+    def usd(self) -> str:
+        """The text of the USD file."""
+        numbers = [self.sequence.file_number(number) for number in self.sequence.frames]
+        purpose = "default" if self.settings.proxy == 1 else "render"
+        files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
+        volumes = [UsdVolume("Volume", purpose, files, self.grids, self.domain)]
+        if self.settings.proxy > 1:
+            proxies = {number: proxy_path(Path(), number).name for number in numbers}
+            volumes.append(UsdVolume("Proxy", "proxy", proxies, ("density",), self.domain))
+        return usd_text(volumes, self.sequence.fps, self.medium, self.host.velocity, self.host.up_axis)
+
+    def note(self) -> dict[str, Any]:
+        """What the export is and how it was made."""
+        sequence, domain = self.sequence, self.domain
+        return {
+            "host": self.settings.host,
+            "precision": self.settings.precision,
+            "grids": list(self.grids),
+            "proxy": self.settings.proxy,
+            "frames": [sequence.file_number(sequence.frames[0]), sequence.file_number(sequence.frames[-1])],
+            "fps": sequence.fps,
+            "medium": {key: value for key, value in vars(self.medium).items() if value is not None},
+            "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},
+            "provenance": [dict(part) for part in sequence.provenance],
+        }
 
 
 def density_step(domain: Domain, extinction: float) -> float:
@@ -247,40 +300,6 @@ def _rounded(values: Array, step: float) -> Array:
 
 def _power_of_two(value: float) -> float:
     return 2.0 ** math.floor(math.log2(value))
-
-
-def _medium(sequence: Sequence, peak: float) -> Medium:
-    """Optical properties of smoke of density 1, as the files have it."""
-    medium = sequence.scene.medium
-    return replace(medium, extinction=medium.extinction * peak)
-
-
-def _usd(sequence: Sequence, settings: ExportSettings, peak: float) -> str:
-    host, grids = HOSTS[settings.host], _grids(sequence, settings)
-    domain, numbers = host.box(sequence.scene.domain), [sequence.file_number(number) for number in sequence.frames]
-    purpose = "default" if settings.proxy == 1 else "render"
-    files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
-    volumes = [UsdVolume("Volume", purpose, files, grids, domain)]
-    if settings.proxy > 1:
-        proxies = {number: proxy_path(Path(), number).name for number in numbers}
-        volumes.append(UsdVolume("Proxy", "proxy", proxies, ("density",), domain))
-    medium = _medium(sequence, peak)
-    return usd_text(volumes, sequence.fps, medium, host.velocity, host.up_axis)
-
-
-def _note(sequence: Sequence, settings: ExportSettings, peak: float) -> dict[str, Any]:
-    domain = HOSTS[settings.host].box(sequence.scene.domain)
-    return {
-        "host": settings.host,
-        "precision": settings.precision,
-        "grids": list(_grids(sequence, settings)),
-        "proxy": settings.proxy,
-        "frames": [sequence.file_number(sequence.frames[0]), sequence.file_number(sequence.frames[-1])],
-        "fps": sequence.fps,
-        "medium": {key: value for key, value in vars(_medium(sequence, peak)).items() if value is not None},
-        "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},
-        "provenance": [dict(part) for part in sequence.provenance],
-    }
 
 
 def _clear(out: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from smokelift.scene import Domain, Medium
+from smokelift.scene import Domain
 from smokelift.transport import Array
 
 HostName = Literal["blender", "houdini", "unreal"]
@@ -58,12 +58,6 @@ class Host:
         return (
             turned if values.ndim == 3 else turned[..., order] * np.array([sign for _, sign in self.axes], np.float32)
         )
-
-    def facts(self, fps: float, medium: Medium) -> dict[str, str | float]:
-        """Metadata of every grid: frame rate, units, and what smoke of density 1 does to light."""
-        units = {"length_unit": "m", "velocity_unit": "m/s", "extinction_unit": "1/m"}
-        known = {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
-        return {"fps": fps, **units, **known}
 
 
 HOSTS: Mapping[HostName, Host] = {

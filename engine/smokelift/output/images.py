@@ -1,18 +1,39 @@
-"""Pictures on disk that appear whole or not at all."""
+"""Pictures, sheets of pictures and videos on disk, which appear whole or not at all."""
 
 from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import av
 import numpy as np
 import numpy.typing as npt
 import OpenEXR
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from smokelift.footage.images import ImageError, linear_to_srgb
-from smokelift.output.atomic import DISK_FULL, atomic_path
+from smokelift.output.files import DISK_FULL, atomic_path
+
+Tile = npt.NDArray[np.uint8]
+"""An sRGB picture (rows, columns, 3)."""
+
+GAP = 4
+"""Pixels between tiles."""
+
+_LINE = 16
+"""Pixels of a line of text."""
+
+VIDEO_KINDS = {
+    ".mp4": ("mp4", "libx264"),
+    ".mov": ("mov", "libx264"),
+    ".mkv": ("matroska", "libx264"),
+    ".webm": ("webm", "libvpx-vp9"),
+}
+"""Container and codec of each suffix."""
 
 
 def eight_bit(image: npt.ArrayLike) -> npt.NDArray[np.uint8]:
@@ -63,3 +84,41 @@ def _of_system(error: RuntimeError) -> OSError:
     known = (number for number in DISK_FULL if os.strerror(number) in str(error))
     number = next(known, errno.EIO)
     return OSError(number, os.strerror(number))
+
+
+def write_sheet(path: Path, rows: Sequence[Sequence[Tile]], titles: Sequence[str], labels: Sequence[str]) -> None:
+    """Write rows of tiles as a PNG, whatever the file's suffix, with titles above columns and labels above rows.
+
+    Tiles are sRGB (rows, columns, 3), of one height in a row, and as wide as those of the first row or across all
+    columns.
+    """
+    lefts = GAP + np.cumsum([0, *(tile.shape[1] + GAP for tile in rows[0])])
+    tops = _LINE + np.cumsum([0, *(tiles[0].shape[0] + _LINE + GAP for tiles in rows)])
+    whole = Image.new("RGB", (int(lefts[-1]), int(tops[-1])), (32, 32, 32))
+    draw = ImageDraw.Draw(whole)
+    for title, left in zip(titles, lefts, strict=False):
+        draw.text((left, 2), title, fill=(230, 230, 230))
+    for top, tiles, label in zip(tops, rows, labels, strict=False):
+        draw.text((GAP, top + 2), label, fill=(170, 170, 170))
+        for tile, left in zip(tiles, lefts, strict=False):
+            whole.paste(Image.fromarray(tile), (int(left), int(top) + _LINE))
+    with atomic_path(path) as aside:
+        whole.save(aside, format="PNG")
+
+
+def write_video(path: Path, frames: Iterable[npt.NDArray[np.float32]], fps: float) -> None:
+    """Write linear frames (rows, columns, 3) of one size; the suffix says which kind of `VIDEO_KINDS`."""
+    container_format, codec = VIDEO_KINDS[path.suffix.lower()]
+    with atomic_path(path) as aside, av.open(f"file:{aside.absolute()}", "w", format=container_format) as container:
+        stream: Any = None
+        for frame in frames:
+            picture = eight_bit(frame)
+            picture = picture[: picture.shape[0] // 2 * 2, : picture.shape[1] // 2 * 2]  # codecs want even sides
+            if stream is None:
+                stream = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt = "yuv420p"
+                stream.options = {"crf": "18"}
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        if stream is not None:
+            container.mux(stream.encode())

@@ -16,8 +16,7 @@ from typing import Any, get_origin, get_type_hints
 import numpy as np
 
 from smokelift.checks import shown
-from smokelift.output.atomic import atomic_path
-from smokelift.output.layout import INDEX, MAX_START_NUMBER
+from smokelift.output.files import INDEX, MAX_START_NUMBER, atomic_path
 from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
 from smokelift.scene.toml_files import read_text
@@ -82,7 +81,7 @@ class Index:
     frames
         The figures of every finished frame, by its number as text.
     checksums
-        Of the frames' files, by name (`smokelift.output.checksum`).
+        Of the frames' files, by name (`smokelift.output.files`).
     complete
         Whether the run came to its end.
     start_number

@@ -1,7 +1,7 @@
 """Pictures that show at a glance what a sequence is: a contact sheet, an orbit, a strip and a video.
 
 All of them show the part of the picture that holds smoke in some frame. The scene's own camera has the clip's
-background behind the smoke, all others one colour: the background's own where it has one, else black.
+background behind the smoke, all others one color: the background's own where it has one, else black.
 """
 
 from __future__ import annotations
@@ -17,10 +17,8 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.given_background import backdrop_colour, background_picture
 from smokelift.footage.images import area_average
 from smokelift.output.framing import Framing
-from smokelift.output.images import eight_bit
+from smokelift.output.images import eight_bit, write_sheet, write_video
 from smokelift.output.sequence import Sequence
-from smokelift.output.sheet import write_sheet
-from smokelift.output.video_file import write_video
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, orbit
@@ -51,10 +49,7 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip, framing: Fra
     scene, camera = sequence.scene, framing.camera(sequence.scene.camera, SHEET_HEIGHT)
     own, others = _behind_own(scene, clip), _behind_others(scene, clip)
     viewers = [Viewer(scene, orbit(camera, framing.box, angle), others if angle else own) for angle in SHEET_ANGLES]
-    rows = []
-    for number in numbers:
-        volumes = sequence.density(number), sequence.flame(number)
-        rows.append([_filmed(clip, number, framing, camera), *(viewer.image(number, *volumes) for viewer in viewers)])
+    rows = [[_filmed(clip, n, framing, camera), *_rendered(sequence, n, viewers)] for n in numbers]
     titles = ["input", "reconstruction", *(_degrees(angle) for angle in SHEET_ANGLES[1:])]
     _write_pictures(path, rows, titles, [f"frame {number}" for number in numbers])
 
@@ -62,11 +57,10 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip, framing: Fra
 def write_orbit(path: Path, sequence: Sequence, clip: Clip, framing: Framing) -> None:
     """Write one moment from twelve angles, as a PNG."""
     number = _late(sequence)
-    volumes = sequence.density(number), sequence.flame(number)
     behind = _behind_others(sequence.scene, clip)
     camera = framing.camera(sequence.scene.camera.at(number - 1), SHEET_HEIGHT)
     viewers = [Viewer(sequence.scene, orbit(camera, framing.box, angle), behind) for angle in ORBIT_ANGLES]
-    pictures = [viewer.image(number, *volumes) for viewer in viewers]
+    pictures = _rendered(sequence, number, viewers)
     firsts = range(0, len(pictures), ORBIT_COLUMNS)
     rows = [pictures[first : first + ORBIT_COLUMNS] for first in firsts]
     columns = [", ".join(map(_degrees, ORBIT_ANGLES[column::ORBIT_COLUMNS])) for column in range(ORBIT_COLUMNS)]
@@ -83,7 +77,7 @@ def write_strip(path: Path, sequence: Sequence, clip: Clip, framing: Framing) ->
     camera = framing.camera(scene.camera, SHEET_HEIGHT)
     viewer = Viewer(scene, orbit(camera, framing.box, SIDE), _behind_others(scene, clip))
     filmed = [_filmed(clip, number, framing, camera) for number in numbers]
-    turned = [viewer.image(number, sequence.density(number), sequence.flame(number)) for number in numbers]
+    turned = [_rendered(sequence, number, [viewer])[0] for number in numbers]
     titles = [f"frame {number}" for number in numbers]
     _write_pictures(path, [filmed, turned], titles, ["input", f"reconstruction from {_degrees(SIDE)}"])
 
@@ -99,12 +93,9 @@ def _turning(sequence: Sequence, clip: Clip, framing: Framing) -> Iterator[Image
     camera = framing.camera(scene.camera, PREVIEW_HEIGHT)
     turns = [orbit(camera.at(n), framing.box, step * n) for n in range(frames[-1])]
     turning = replace(turns[0], matrices=tuple(turned.matrix for turned in turns))
-    front = Viewer(scene, camera, _behind_own(scene, clip))
-    around = Viewer(scene, turning, _behind_others(scene, clip))
+    viewers = [Viewer(scene, camera, _behind_own(scene, clip)), Viewer(scene, turning, _behind_others(scene, clip))]
     for number in frames:
-        volumes = sequence.density(number), sequence.flame(number)
-        filmed = _filmed(clip, number, framing, camera)
-        yield np.concatenate([filmed, front.image(number, *volumes), around.image(number, *volumes)], 1)
+        yield np.concatenate([_filmed(clip, number, framing, camera), *_rendered(sequence, number, viewers)], 1)
 
 
 def _behind_own(scene: CompleteScene, clip: Clip) -> Image | None:
@@ -113,24 +104,30 @@ def _behind_own(scene: CompleteScene, clip: Clip) -> Image | None:
 
 
 def _behind_others(scene: CompleteScene, clip: Clip) -> Image:
-    """What is behind the smoke for all cameras but the scene's own: one linear colour, (3,).
+    """What is behind the smoke for all cameras but the scene's own: one linear color, (3,).
 
-    A background seen from aside is not known, and its mean colour looks like haze. It is taken only where black hides
+    A background seen from aside is not known, and its mean color looks like haze. It is taken only where black hides
     the smoke, which absorbs and does no more; of a background that the sequence does not keep, the clip's mean is.
     """
     absorbs = scene.scattering == "absorption"
     if absorbs and scene.background.estimated:
         return np.asarray(clip.frame(0).mean((0, 1)))
     plate = background_picture(scene)
-    colour = plate if plate.ndim == 1 else backdrop_colour(plate)
-    if colour is not None:
-        return colour
+    color = plate if plate.ndim == 1 else backdrop_colour(plate)
+    if color is not None:
+        return color
     return np.asarray(plate.mean((0, 1)) if absorbs else np.zeros(3), np.float32)
 
 
 def _late(sequence: Sequence) -> int:
     """The frame after three quarters of a sequence, when the smoke has developed."""
     return sequence.frames[3 * (len(sequence.frames) - 1) // 4]
+
+
+def _rendered(sequence: Sequence, number: int, viewers: Rows[Viewer]) -> list[Image]:
+    """A frame as each viewer shows it."""
+    volumes = sequence.density(number), sequence.flame(number)
+    return [viewer.image(number, *volumes) for viewer in viewers]
 
 
 def _filmed(clip: Clip, number: int, framing: Framing, camera: Camera) -> Image:

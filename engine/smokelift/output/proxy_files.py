@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
+from smokelift.output.files import proxy_path
 from smokelift.output.index import SequenceError
-from smokelift.output.layout import proxy_path
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import vdb_module, write_vdb
 from smokelift.scene import Domain
-from smokelift.transport import Array
+from smokelift.transport import Array, block_means
 
 TIMES = 4
 """How many times as large the voxels of a proxy are."""
@@ -36,9 +34,9 @@ def write_proxy(
     of `times` voxels before the domain, if it is not the same. It raises VdbUnavailable, and OSError if the file cannot
     be written.
     """
-    rho, wide = coarser(density, domain, times)
-    fire = None if flame is None else coarser(flame, domain, times)[0]
-    write_vdb(path, rho, None, wide, flame=fire, lattice=None if lattice is None else lattice.coarser(times))
+    fire = None if flame is None else block_means(flame, times)
+    coarse_lattice = None if lattice is None else lattice.coarser(times)
+    write_vdb(path, block_means(density, times), None, domain.coarser(times), flame=fire, lattice=coarse_lattice)
 
 
 def write_proxies(sequence: Sequence) -> Iterator[int]:
@@ -56,12 +54,3 @@ def write_proxies(sequence: Sequence) -> Iterator[int]:
         except OSError as error:
             raise SequenceError(f"{path}: cannot be written: {error}") from error
         yield number
-
-
-def coarser(values: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
-    """Return the means of a volume (nx, ny, nz) over cubes of voxels, and the box of those, which may be larger."""
-    counts = tuple(-(-n // times) for n in domain.resolution)
-    padded = np.pad(values, [(0, count * times - n) for count, n in zip(counts, values.shape, strict=True)])
-    x, y, z = counts
-    coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
-    return coarse, domain.coarser(times)

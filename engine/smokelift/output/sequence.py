@@ -11,9 +11,8 @@ import numpy as np
 
 from smokelift.checks import shown
 from smokelift.output.archive import FLAME, VELOCITY, read_arrays
-from smokelift.output.checksum import checksum
+from smokelift.output.files import INDEX, checksum, frame_path
 from smokelift.output.index import Index, SequenceError, directory_path
-from smokelift.output.layout import INDEX, frame_path
 from smokelift.output.vdb import read_grid
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image

@@ -48,8 +48,8 @@ def usd_text(
     and `up_axis` is ``"Z"`` or ``"Y"``.
     """
     numbers = sorted(volumes[0].files)
-    known = {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
-    properties = "".join(f"            double {name} = {value:.9g}\n" for name, value in known.items())
+    known = light_properties(medium).items()
+    properties = "".join(f"            double {name} = {value:.9g}\n" for name, value in known)
     prims = "\n".join(_prim(volume, velocity) for volume in volumes)
     return f"""#usda 1.0
 (
@@ -73,6 +73,11 @@ def Xform "Smoke" (
 {prims}
 {_material(medium)}}}
 """
+
+
+def light_properties(medium: Medium) -> dict[str, float]:
+    """Return what smoke of density 1 does to light, by the name of the property."""
+    return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
 
 
 def _prim(volume: UsdVolume, velocity: str) -> str:
@@ -109,7 +114,7 @@ def _asset(grid: str, files: Mapping[int, str], *, vector: bool) -> str:
 def _material(medium: Medium) -> str:
     """The material: absorption and scattering, 1/m, are those of density 1 times the field ``density``."""
     scattering = [medium.extinction * albedo for albedo in medium.albedos]
-    absorption = [medium.extinction - share for share in scattering]
+    absorption = [medium.extinction - scattered for scattered in scattering]
     coefficients = "\n".join(
         f"""        def Shader "{name}"
         {{

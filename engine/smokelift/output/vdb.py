@@ -27,7 +27,7 @@ from scipy import ndimage
 
 from smokelift.checks.array_types import Array
 from smokelift.output.archive import FLAME
-from smokelift.output.atomic import atomic_path
+from smokelift.output.files import atomic_path
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.transport import StaggeredGrid, at_centres, faces_in

@@ -20,8 +20,19 @@ import numpy.typing as npt
 
 from smokelift.checks import counted
 from smokelift.output.archive import FLAME, VELOCITY, write_arrays
-from smokelift.output.atomic import DISK_FULL, atomic_path
-from smokelift.output.checksum import checksum
+from smokelift.output.files import (
+    BACKGROUND,
+    DISK_FULL,
+    INDEX,
+    LOCK,
+    MAX_START_NUMBER,
+    RESUME,
+    atomic_path,
+    checksum,
+    frame_path,
+    is_foreign,
+    proxy_path,
+)
 from smokelift.output.images import write_image
 from smokelift.output.index import (
     BOX,
@@ -30,16 +41,6 @@ from smokelift.output.index import (
     SequenceError,
     changed,
     plain,
-)
-from smokelift.output.layout import (
-    BACKGROUND,
-    INDEX,
-    LOCK,
-    MAX_START_NUMBER,
-    RESUME,
-    frame_path,
-    is_foreign,
-    proxy_path,
 )
 from smokelift.output.lock import Lock
 from smokelift.output.proxy_files import MIN_PROXY_VOXELS, write_proxy

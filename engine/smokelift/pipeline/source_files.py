@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from smokelift.footage.plate import ChangingPlate
-from smokelift.output.checksum import checksum
+from smokelift.output.files import checksum
 from smokelift.scene import Background, EnvironmentLight
 from smokelift.setup.shot import Shot, ShotView
 

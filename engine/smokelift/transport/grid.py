@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from smokelift.checks import numbers, shown
 from smokelift.checks.array_types import Array
@@ -20,6 +21,7 @@ from smokelift.scene.domain import checked_sides
 
 Faces = tuple[Array, Array, Array]
 VoxelBox = tuple[slice, slice, slice]
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +167,14 @@ def halved(shape: tuple[int, int, int]) -> tuple[int, int, int]:
     """Voxels of a grid half as fine; an odd last one counts as two."""
     x, y, z = ((count + 1) // 2 for count in shape)
     return x, y, z
+
+
+def block_means(values: npt.NDArray[Real], size: int) -> npt.NDArray[Real]:
+    """Means over blocks of so many values along every axis; what is missing in the last ones is zero."""
+    padded = np.pad(values, [(0, -count % size) for count in values.shape])
+    split = [n for count in padded.shape for n in (count // size, size)]
+    means: npt.NDArray[Real] = padded.reshape(split).mean(tuple(range(1, 2 * values.ndim, 2)))
+    return means
 
 
 def faces_in(faces: Faces, box: tuple[slice, ...]) -> Faces:

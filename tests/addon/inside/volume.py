@@ -15,8 +15,7 @@ from addon import look, shot_setup, smoke_takes, volume
 from addon.box_table import box_corners
 from addon.take import Take
 from conftest import FRAMES, changed, made, quietly, rendered
-from smokelift.output.images import write_image
-from smokelift.output.video_file import write_video
+from smokelift.output.images import write_image, write_video
 from smokelift.scene import Camera, Medium, Scene, scene_to_dict
 from tests.example_shot import smoke
 

@@ -12,8 +12,7 @@ from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
 from smokelift.footage.mask import Mask
 from smokelift.footage.plate import Plate, cleared, known_plate, uncovered
-from smokelift.output.images import write_image
-from smokelift.output.video_file import write_video
+from smokelift.output.images import write_image, write_video
 
 SIDE = 44
 """Column from which on the mask of the block is black; smoke stays to the left of it."""

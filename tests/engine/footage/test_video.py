@@ -17,7 +17,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.footage.video import lacks_index, median_quantiser
-from smokelift.output.video_file import write_video
+from smokelift.output.images import write_video
 
 FRAMES = [np.full((16, 32, 3), value, np.float32) for value in (0.1, 0.3, 0.5)]
 

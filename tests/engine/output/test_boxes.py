@@ -8,8 +8,8 @@ from small_sequence import needs_vdb
 
 from smokelift.output import vdb
 from smokelift.output.export import ExportSettings, export_sequence
+from smokelift.output.files import INDEX
 from smokelift.output.index import SequenceError
-from smokelift.output.layout import INDEX
 from smokelift.output.proxy_files import TIMES, write_proxies
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence

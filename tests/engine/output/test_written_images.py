@@ -10,8 +10,7 @@ import OpenEXR
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.output.images import eight_bit, write_image
-from smokelift.output.video_file import write_video
+from smokelift.output.images import eight_bit, write_image, write_video
 
 
 def test_eight_bit_is_srgb() -> None:

@@ -26,8 +26,8 @@ from smokelift.direct import (
     open_source,
 )
 from smokelift.direct.new_sequence import Written
+from smokelift.output.files import INDEX
 from smokelift.output.index import Index
-from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.report.cost import affordable_room
 from smokelift.scene import SIDES

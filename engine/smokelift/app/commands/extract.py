@@ -13,8 +13,7 @@ from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
-from smokelift.output.images import write_image
-from smokelift.output.video_file import VIDEO_KINDS, write_video
+from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.pipeline.extraction import ELEMENT_KINDS, Extraction, extract
 
 HELP = "separate the smoke of a clip from what is behind it, as pictures with alpha"

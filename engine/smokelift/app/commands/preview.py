@@ -8,8 +8,8 @@ from dataclasses import replace
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
+from smokelift.output.files import CONTACT_SHEET, ORBIT, PICTURES, PREVIEW, STRIP
 from smokelift.output.framing import frame_smoke
-from smokelift.output.layout import CONTACT_SHEET, ORBIT, PICTURES, PREVIEW, STRIP
 from smokelift.output.preview import write_contact_sheet, write_orbit, write_preview, write_strip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device

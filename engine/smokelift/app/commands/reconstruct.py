@@ -14,9 +14,8 @@ from smokelift.app.options import add_run_options, named_path, require_folder, s
 from smokelift.app.progress import Reporter, median_psnr, seconds_before
 from smokelift.checks import Figures, Finding
 from smokelift.footage.clip import Clip
-from smokelift.output.atomic import atomic_path
+from smokelift.output.files import INDEX, MAX_START_NUMBER, atomic_path
 from smokelift.output.images import eight_bit
-from smokelift.output.layout import INDEX, MAX_START_NUMBER
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct

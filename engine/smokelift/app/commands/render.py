@@ -7,9 +7,8 @@ import math
 
 from smokelift.app.options import named_path, require_folder
 from smokelift.app.progress import Reporter
-from smokelift.output.images import write_image
+from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.output.sequence import Sequence
-from smokelift.output.video_file import VIDEO_KINDS, write_video
 from smokelift.output.viewer import Viewer
 from smokelift.render import device
 from smokelift.scene import Camera, CompleteScene, Scene, orbit

@@ -12,6 +12,7 @@ from scipy import fft
 
 from smokelift.checks.array_types import Doubles
 from smokelift.evaluation.metrics.inputs import finite_array, relative
+from smokelift.transport import block_means
 
 PATCH = 7
 """Pixels along a patch: the finest structure with its surroundings; a patch of scale 4 spans a lobe."""
@@ -60,7 +61,7 @@ class PatchStatistics:
         values = finite_array(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
-        projected = [_basis().T @ _patches(_averaged(values, scale)).T for scale in SCALES]
+        projected = [_basis().T @ _patches(block_means(values, scale)).T for scale in SCALES]
         quantiles = np.stack([_quantiles(scale) for scale in projected])
         return PatchStatistics(quantiles, np.stack([scale.std(axis=1) for scale in projected]))
 
@@ -119,14 +120,6 @@ def _basis() -> Doubles:
 
 def _mean_ratio(values: Doubles, references: Doubles) -> float:
     return float(np.mean([relative(*pair) for pair in zip(values.tolist(), references.tolist(), strict=True)]))
-
-
-def _averaged(picture: Doubles, scale: int) -> Doubles:
-    """Means of squares of so many pixels; what is missing at the end is black."""
-    rows, columns = (-(-count // scale) for count in picture.shape)
-    whole = np.zeros((rows * scale, columns * scale))
-    whole[: picture.shape[0], : picture.shape[1]] = picture
-    return np.asarray(whole.reshape(rows, scale, columns, scale).mean((1, 3)))
 
 
 def _patches(picture: Doubles) -> Doubles:
