@@ -29,7 +29,7 @@ from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
 from benchmarks.accuracy.score import score
 from benchmarks.accuracy.sheets import Row, strip_rows, write_orbits
 from benchmarks.machine import describe
-from smokelift.output.sheet import write_sheet
+from smokelift.output.images import write_sheet
 
 PLAUSIBLE_AND_SMOOTH = ("balanced", "balanced:detail=0")
 """The default, whose detail in depth is made up, and the answer without it, which is the nearer one in PSNR."""

@@ -14,8 +14,7 @@ from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import images
 from smokelift.evaluation.orbit_shapes import SHAPES
 from smokelift.footage.images import area_average
-from smokelift.output.images import eight_bit
-from smokelift.output.sheet import write_sheet
+from smokelift.output.images import eight_bit, write_sheet
 
 Row = dict[str, Any]
 

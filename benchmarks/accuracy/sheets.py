@@ -11,8 +11,7 @@ from smokelift.evaluation.orbit import Orbit
 from smokelift.evaluation.orbit_page import orbit_curves, orbit_tiles, write_orbit_page
 from smokelift.evaluation.orbit_scores import AZIMUTHS
 from smokelift.footage.images import area_average
-from smokelift.output.images import eight_bit
-from smokelift.output.sheet import Tile
+from smokelift.output.images import Tile, eight_bit
 from smokelift.render import Image, scene_renderer
 
 STRIP_FRAMES = 8

@@ -23,8 +23,7 @@ from smokelift.direct import Moment, coarse, fit_simulation, spun_up
 from smokelift.direct.continuation import FITTED_MOMENTS
 from smokelift.direct.fitting import BUOYANCY_MOMENTS
 from smokelift.direct.simulation import Physics, Simulation
-from smokelift.output.images import eight_bit
-from smokelift.output.sheet import write_sheet
+from smokelift.output.images import eight_bit, write_sheet
 from smokelift.transport import Array, Velocity, advect, at_centres, divergence
 
 RUN = "balanced"

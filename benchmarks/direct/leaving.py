@@ -27,9 +27,8 @@ from smokelift.direct import (
     steady_part,
     usual_overlap,
 )
-from smokelift.output.images import eight_bit
+from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence
-from smokelift.output.sheet import write_sheet
 from smokelift.scene import Domain
 from smokelift.transport import Array, at_centres, faces_in
 

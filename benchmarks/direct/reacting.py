@@ -18,7 +18,7 @@ from smokelift.checks.array_types import Mask
 from smokelift.direct import Ball, Mesh, MovingMesh, Turbulence, fit_simulation, spun_up
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
-from smokelift.output.sheet import write_sheet
+from smokelift.output.images import write_sheet
 from smokelift.scene import Domain
 from smokelift.transport import Array
 

@@ -14,9 +14,9 @@ from PIL import Image
 from smokelift.evaluation.truth import Truth, TruthError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
+from smokelift.output.files import INDEX
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError
-from smokelift.output.layout import INDEX
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.render.environment import environment_lights

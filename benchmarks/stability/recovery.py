@@ -16,8 +16,8 @@ from benchmarks.stability.forked import Ended, Limits, nothing, run
 from benchmarks.stability.judge import files_of, verdict
 from benchmarks.stability.shot import TinyShot
 from smokelift.app.cli import main
+from smokelift.output.files import INDEX
 from smokelift.output.index import SequenceError
-from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift_command import CANCELLED, Termination
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from smokelift import Background, Camera, Clip, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings
 from smokelift.checks.array_types import Array
-from smokelift.output.images import write_image
-from smokelift.output.video_file import write_video
+from smokelift.output.images import write_image, write_video
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import render
 
