@@ -2,15 +2,14 @@
 
 from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
 from smokelift.direct.fitting import coarse, fit_simulation, spun_up
-from smokelift.direct.looping import loop_length, loop_sequence, steady_part, usual_overlap
+from smokelift.direct.looping import default_overlap, loop_length, loop_sequence, steady_part
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.moment import Moment, complete_velocity, read_moment
 from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.direct.new_sequence import open_source
-from smokelift.direct.obstacles import Ball, BoxObstacle
 from smokelift.direct.retiming import playback, retime_sequence
 from smokelift.direct.simulation import Simulation
-from smokelift.direct.surroundings import Fan
+from smokelift.direct.state import SmokeState, complete_velocity, read_state
+from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
 from smokelift.direct.turbulence import Turbulence
 
 __all__ = [
@@ -22,21 +21,21 @@ __all__ = [
     "Continuation",
     "Fan",
     "Mesh",
-    "Moment",
     "MovingMesh",
     "Simulation",
+    "SmokeState",
     "Turbulence",
     "coarse",
     "complete_velocity",
     "continue_sequence",
+    "default_overlap",
     "fit_simulation",
     "loop_length",
     "loop_sequence",
     "open_source",
     "playback",
-    "read_moment",
+    "read_state",
     "retime_sequence",
     "spun_up",
     "steady_part",
-    "usual_overlap",
 ]

@@ -1,13 +1,13 @@
 """The fire of a clip, and how it goes on after it.
 
-Fire is carried by the velocity of the smoke, burns out and is fed. From one moment f to the next f'
+Fire is carried by the velocity of the smoke, burns out and is fed. From one frame f to the next f'
 
     f' = k advect(f, u') + s,
 
-with one share k that is left of it in a step and a feed s >= 0 that stands still, since what burns does. Both come from
-the clip's moments: where they have less fire on the mean than was carried there nothing feeds it, and k is what they
-have of it; s is what the rest has more than k of that. So a fire whose smoke moves as in the clip keeps its mean, and
-one that is blown away from its fuel burns out. Figures: docs/experiments/fire.md.
+with one fraction k that is left of it in a step and a feed s >= 0 that stands still, since what burns does. Both come
+from the clip's frames: where they have less fire on the mean than was carried there nothing feeds it, and k is what
+they have of it; s is what the rest has more than k of that. So a fire whose smoke moves as in the clip keeps its mean,
+and one that is blown away from its fuel burns out. Figures: docs/experiments/fire.md.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.direct.moment import Moment
+from smokelift.direct.state import SmokeState
 from smokelift.transport import Array, advect
 
 
@@ -30,7 +30,7 @@ class Combustion:
     Attributes
     ----------
     remaining
-        Share of the emission that is left of it after a step, 0 to 1.
+        Fraction of the emission that is left of it after a step, 0 to 1.
     feed : (nx, ny, nz)
         Emission that a step adds.
     """
@@ -44,12 +44,12 @@ class Combustion:
         return emission if solid is None else np.where(solid, np.float32(0), emission)
 
 
-def fit_fire(moments: Sequence[Moment], dt: float) -> Combustion | None:
-    """Fit the fire of consecutive moments of a clip, `dt` seconds apart; None where they show none."""
-    burning = [(moment.flame, moment.velocity) for moment in moments if moment.flame is not None]
-    if len(burning) < len(moments):
+def fit_fire(states: Sequence[SmokeState], dt: float) -> Combustion | None:
+    """Fit the fire of consecutive states of a clip, `dt` seconds apart; None where they show none."""
+    burning = [(state.flame, state.velocity) for state in states if state.flame is not None]
+    if len(burning) < len(states):
         return None
-    advected = np.zeros(moments[0].density.shape, np.float32)
+    advected = np.zeros(states[0].density.shape, np.float32)
     found = advected.copy()
     for (flame, _), (following, velocity) in pairwise(burning):
         advected += advect(flame, velocity, dt, conserve=True)
@@ -62,4 +62,4 @@ def fit_fire(moments: Sequence[Moment], dt: float) -> Combustion | None:
     # The feed is clipped at zero. Scaled to the sum before the clipping it does not make the fire grow.
     net = found.sum(dtype=np.float64) - remaining * advected.sum(dtype=np.float64)
     scale = net / max(feed.sum(dtype=np.float64), 1e-30)
-    return Combustion(remaining, feed * np.float32(scale / (len(moments) - 1)))
+    return Combustion(remaining, feed * np.float32(scale / (len(states) - 1)))

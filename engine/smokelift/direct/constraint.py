@@ -48,10 +48,10 @@ def project_with_given_faces(
     for _ in range(limit):
         if squared <= goal:
             break
-        kept = restricted(search)
-        step = np.float32(squared / product(kept, kept))
+        on_given = restricted(search)
+        step = np.float32(squared / product(on_given, on_given))
         solution = [u + step * s for u, s in zip(solution, search, strict=True)]
-        residual = [a - step * r for a, r in zip(residual, projected(kept), strict=True)]
+        residual = [a - step * r for a, r in zip(residual, projected(on_given), strict=True)]
         before, squared = squared, product(residual, residual)
         ratio = np.float32(squared / before)
         search = [a + ratio * s for a, s in zip(residual, search, strict=True)]

@@ -12,22 +12,20 @@ from typing import Any
 import numpy as np
 
 from smokelift.direct.constraint import faces_of
-from smokelift.direct.eddies import with_small_eddies
-from smokelift.direct.fitting import BUOYANCY_MOMENTS, coarse, fit_simulation, spun_up
+from smokelift.direct.fitting import BUOYANCY_FRAMES, coarse, fit_simulation, spun_up
 from smokelift.direct.growth import (
     Growth,
+    camera_and_lamp_places,
     cut_sides,
     dissolved,
     emerged,
     in_larger_box,
-    kept_outside,
     moves,
 )
-from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, simulated_figures, write_copy
-from smokelift.direct.obstacles import Ball, BoxObstacle, Obstacle, Obstacles, require_place
-from smokelift.direct.surroundings import Fan, Surroundings
-from smokelift.direct.turbulence import Turbulence
+from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, write_copy, write_simulated
+from smokelift.direct.state import SmokeState, read_state
+from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Obstacle, Obstacles, Surroundings, require_place
+from smokelift.direct.turbulence import Turbulence, with_small_eddies
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -35,15 +33,15 @@ from smokelift.scene import SIDES, Box, Camera, CompleteScene, Domain, Side
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity
 
-FITTED_MOMENTS = 12
-"""Last moments of the clip, at most, that inflow, fire and dissipation are fitted to. In half a second the source of a
+FITTED_FRAMES = 12
+"""Last frames of the clip, at most, that inflow, fire and dissipation are fitted to. In half a second the source of a
 clip is steady, and the replay of so much is not noticed."""
 
 UNFADED = ("unfaded", "unfaded_flame")
 """Names of the density and the emission before the fading in the resume state: the simulation goes on from those."""
 
 DISSOLVED = "dissolved"
-"""Figure of a simulated frame: the share of its smoke that has dissolved before sides that cannot move."""
+"""Figure of a simulated frame: the fraction of its smoke that has dissolved before sides that cannot move."""
 
 CONTRADICTED = "contradicted_buoyancy"
 """Figure of a simulated frame: the buoyancy in m/s2 that was fitted and not taken, 0 if it was."""
@@ -123,8 +121,8 @@ def continue_sequence(
         are too small for the voxels, or a file cannot be read or written.
     """
     start = sequence.frames[-1] if continuation.start is None else continuation.start
-    kept = tuple(number for number in sequence.frames if number <= start)
-    if start not in sequence.frames or len(kept) < SHORTEST:
+    copied = tuple(number for number in sequence.frames if number <= start)
+    if start not in sequence.frames or len(copied) < SHORTEST:
         raise ValueError(
             f"{sequence.directory}: cannot go on from frame {start}; choose one from "
             f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
@@ -139,17 +137,11 @@ def continue_sequence(
     _surroundings(continuation, box, growth.clip).solid(1, 1 / sequence.fps)
     last = start + continuation.frames
     settings = {
-        "frames": continuation.frames,
+        **vars(continuation),
         "start": start,
-        "fade": continuation.fade,
-        "wind": continuation.wind,
         "turbulences": [asdict(turbulence) for turbulence in continuation.turbulences],
         "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
         "obstacles": [_as_settings(obstacle) for obstacle in continuation.obstacles],
-        "closed": continuation.closed,
-        "room": continuation.room,
-        "buoyancy": continuation.buoyancy,
-        "dissipation": continuation.dissipation,
     }
     given = [name for name in ("buoyancy", "dissipation") if settings[name] is not None]
     found = [name for name in ("buoyancy", "dissipation") if name not in given]
@@ -158,12 +150,12 @@ def continue_sequence(
         f"{', '.join([*found, 'inflow'])} and fire of the clip, as far as it shows them"
         + (f", and a given {' and '.join(given)}." if given else ".")
     )
-    camera_frames = [float(number) for number in range(kept[0], last + 1)]
+    camera_frames = [float(number) for number in range(copied[0], last + 1)]
     with directed_writer(sequence, out, "continue", settings, how, camera_frames, npz=npz, resume=resume) as writer:
         if writer.state is None and writer.finished:
             return
-        yield from _copied(sequence, kept, writer)
-        yield from _simulated(sequence, kept, continuation, growth, writer)
+        yield from _copied(sequence, copied, writer)
+        yield from _simulated(sequence, copied, continuation, growth, writer)
 
 
 def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter) -> Iterator[Written]:
@@ -173,73 +165,70 @@ def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter
 
 
 def _simulated(
-    sequence: Sequence, kept: tuple[int, ...], continuation: Continuation, growth: Growth, writer: SequenceWriter
+    sequence: Sequence, copied: tuple[int, ...], continuation: Continuation, growth: Growth, writer: SequenceWriter
 ) -> Iterator[Written]:
-    start, dt, clip = kept[-1], 1 / sequence.fps, growth.clip
+    start, dt, clip = copied[-1], 1 / sequence.fps, growth.clip
     # the first frame has no velocity of its own
-    numbers = kept[1:]
-    earlier = numbers[-BUOYANCY_MOMENTS:-FITTED_MOMENTS] if continuation.buoyancy is None else ()
-    moments = [read_moment(sequence, number) for number in numbers[-FITTED_MOMENTS:]]
+    numbers = copied[1:]
+    earlier = numbers[-BUOYANCY_FRAMES:-FITTED_FRAMES] if continuation.buoyancy is None else ()
+    states = [read_state(sequence, number) for number in numbers[-FITTED_FRAMES:]]
     simulation = fit_simulation(
-        moments,
+        states,
         dt,
         sequence.scene.inflow(),
         _surroundings(continuation, clip, clip),
-        earlier=[coarse(read_moment(sequence, number)) for number in earlier],
+        earlier=[coarse(read_state(sequence, number)) for number in earlier],
         depth_axis=_depth_axis(sequence.scene.camera),
         buoyancy=continuation.buoyancy,
         dissipation=continuation.dissipation,
     )
-    cut = cut_sides(moments[-1].density, growth.closed)
-    state = writer.state
-    if state is not None and state.number > start:
-        box = writer.box(state.number)
-        moment = _resumed(state, box, growth.closed)
-        larger = growth.after(box, moment, dt)
+    cut = cut_sides(states[-1].density, growth.closed)
+    saved = writer.state
+    if saved is not None and saved.number > start:
+        box = writer.box(saved.number)
+        state = _resumed(saved, box, growth.closed)
+        larger = growth.after(box, state, dt)
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     else:
         box, larger = clip, _start_box(continuation, growth)
-        moment = with_small_eddies(spun_up(simulation, moments))
-        moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
-    del moments  # they are large
+        state = with_small_eddies(spun_up(simulation, states))
+        state = replace(state, velocity=replace(state.velocity, closed=growth.closed))
+    del states  # they are large
     for step in range(1, continuation.frames + 1):
         number = start + step
         if number in writer.finished:
             continue
-        began = time.perf_counter()
+        started = time.perf_counter()
         if larger != box:
             ends, before = moves(box, larger), simulation.surroundings
             simulation = simulation.in_larger_box(ends, _surroundings(continuation, larger, clip))
-            moment = in_larger_box(moment, ends, before, simulation.surroundings, (step - 1) * dt)
+            state = in_larger_box(state, ends, before, simulation.surroundings, (step - 1) * dt)
             box = larger
-        moment = emerged(simulation.next(moment, step), clip.slices_in(box), cut, step, dt)
-        mass = float(moment.density.sum(dtype=np.float64))
-        moment = dissolved(moment, growth.stopped(box), dt, box.first_in(clip))
-        gone = 1 - float(moment.density.sum(dtype=np.float64)) / mass if mass > 0 else 0.0
-        left = np.float32(_share_left(step, continuation))
-        faded = replace(
-            moment, density=moment.density * left, flame=None if moment.flame is None else moment.flame * left
-        )
+        state = emerged(simulation.next(state, step), clip.slices_in(box), cut, step, dt)
+        mass = float(state.density.sum(dtype=np.float64))
+        state = dissolved(state, growth.stopped(box), dt, box.first_in(clip))
+        gone = 1 - float(state.density.sum(dtype=np.float64)) / mass if mass > 0 else 0.0
+        faded = state.thinned(np.float32(_shown_fraction(step, continuation)))
         solid = simulation.surroundings.solid(step, dt)
         obstacles = None if solid is None else solid.voxels
         further = {**vars(simulation.physics), DISSOLVED: gone}
-        figures = simulated_figures(faded, began, "simulated", further, obstacles)
-        volumes = [values for values in (moment.density, moment.flame) if values is not None]
-        faces, unfaded = moment.velocity.faces, dict(zip(UNFADED, volumes, strict=False))
-        state = ResumeState(number, faded.density, faces, unfaded)
-        writer.write(number, faded.density, faces, figures, flame=faded.flame, box=box, state=state)
-        yield number, figures
-        larger = growth.after(box, moment, dt)
+        volumes = [values for values in (state.density, state.flame) if values is not None]
+        unfaded = dict(zip(UNFADED, volumes, strict=False))
+        saved = ResumeState(number, faded.density, state.velocity.faces, unfaded)
+        yield write_simulated(
+            writer, number, faded, "simulated", further, started=started, solid=obstacles, box=box, state=saved
+        )
+        larger = growth.after(box, state, dt)
 
 
-def _resumed(state: ResumeState, box: Domain, closed: tuple[Side, ...]) -> Moment:
-    """The last simulated moment of a run that goes on."""
-    volumes = [np.asarray(state.extra[name], np.float32) for name in UNFADED if name in state.extra]
-    return Moment(volumes[0], Velocity(state.velocity, box.voxel_size, closed), *volumes[1:])
+def _resumed(saved: ResumeState, box: Domain, closed: tuple[Side, ...]) -> SmokeState:
+    """The last simulated state of a run that goes on."""
+    volumes = [np.asarray(saved.extra[name], np.float32) for name in UNFADED if name in saved.extra]
+    return SmokeState(volumes[0], Velocity(saved.velocity, box.voxel_size, closed), *volumes[1:])
 
 
-def _share_left(step: int, continuation: Continuation) -> float:
-    """The part of the smoke that is shown while it fades."""
+def _shown_fraction(step: int, continuation: Continuation) -> float:
+    """The fraction of the smoke that is shown while it fades."""
     return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
 
 
@@ -252,7 +241,7 @@ def _depth_axis(camera: Camera) -> int:
 def _growth(continuation: Continuation, scene: CompleteScene) -> Growth:
     closed = tuple(side for side in SIDES if side in (*scene.closed, *continuation.closed))
     voxels = int(continuation.room * math.prod(scene.domain.resolution))
-    return Growth(scene.domain, closed, voxels, kept_outside(scene))
+    return Growth(scene.domain, closed, voxels, camera_and_lamp_places(scene))
 
 
 def _start_box(continuation: Continuation, growth: Growth) -> Domain:

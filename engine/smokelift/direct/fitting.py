@@ -1,14 +1,14 @@
-"""A simulation fitted to a clip's last moments: its forces, its inlets, and a velocity that these forces explain.
+"""A simulation fitted to a clip's last frames: its forces, its inlets, and a velocity that these forces explain.
 
 An estimated velocity is smooth and slow: it explains how the smoke moved, but lacks the eddies that draw it out next. A
 simulation that starts from it makes threads. So the simulation runs along the clip first. It takes the velocity from
-the first moment alone, and at each moment the clip's density (direct insertion: Charney, Halem and Jastrow, "Use of
+the first frame alone, and at each frame the clip's density (direct insertion: Charney, Halem and Jastrow, "Use of
 incomplete historical data to infer the present state of the atmosphere", 1969). The density's detail turns the air
 around it, so that eddies come in on every scale that the clip shows.
 
-The buoyancy is the one whose velocity moves the smoke up as the clip does: each moment is carried on for a step, and
+The buoyancy is the one whose velocity moves the smoke up as the clip does: each frame is carried on for a step, and
 compared with the next one in the picture. What rises there is the pattern of the smoke, not its centre of mass, which
-sinks where a head dissolves while the base is fed. A velocity's change from one moment to the next does not show the
+sinks where a head dissolves while the base is fed. A velocity's change from one frame to the next does not show the
 buoyancy, since estimates err by more than that (docs/experiments/continuation.md).
 """
 
@@ -25,24 +25,25 @@ from scipy import ndimage
 from smokelift.checks.array_types import Mask
 from smokelift.direct.burning import fit_fire
 from smokelift.direct.inflow import Inflow, find_inflow
-from smokelift.direct.moment import Moment
 from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Array, Velocity, advect, at_centres
-from smokelift.velocity.pyramid import coarsen, coarsen_faces
+from smokelift.transport import Array, advect, at_centres
+from smokelift.velocity.estimator import coarsened
+from smokelift.velocity.pyramid import coarsen
 
 COARSE = 64
 """Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a mean motion needs no more."""
 
-MIN_MOMENTS = 8
-"""Moments that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
+MIN_FRAMES = 8
+"""Frames that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
 which is within its error."""
 
 UNUSUAL = 2.0
-"""Times the median speed above which a moment's velocity is taken to be wrong."""
+"""Times the median speed above which a state's velocity is taken to be wrong."""
 
-BUOYANCY_MOMENTS = 24
-"""Last moments, at most, that show the buoyancy: half of them are needed to forget that an estimated velocity is too
+BUOYANCY_FRAMES = 24
+"""Last frames, at most, that show the buoyancy: half of them are needed to forget that an estimated velocity is too
 slow (docs/experiments/continuation.md)."""
 
 BLUR = 1.5
@@ -69,51 +70,50 @@ PRECISION = 0.01
 
 
 def fit_simulation(
-    moments: Sequence[Moment],
+    states: Sequence[SmokeState],
     dt: float,
     marked: Mask | None = None,
     surroundings: Surroundings | None = None,
     *,
-    earlier: Sequence[Moment] = (),
+    earlier: Sequence[SmokeState] = (),
     depth_axis: int = 1,
     buoyancy: float | None = None,
     dissipation: float | None = None,
 ) -> Simulation:
-    """Fit forces, inlets and fire to the moments of a clip, for a simulation that goes on from them.
+    """Fit forces, inlets and fire to frames of a clip, for a simulation that goes on from them.
 
     Parameters
     ----------
-    moments
+    states
         Consecutive, two at least, `dt` seconds apart.
     marked : (nx, ny, nz) bool, optional
         Where smoke enters, if that is known.
     surroundings
         What the artist has placed; nothing if None.
     earlier
-        The moments before them, `coarse`, which show the buoyancy as well.
+        The frames before them, `coarse`, which show the buoyancy as well.
     depth_axis
         0 or 1: the axis, x or y, that is nearest to the camera's line of sight. Motion is compared in the picture.
     buoyancy, dissipation
         As in `Physics`, if they are known; None fits them.
     """
-    inflow = find_inflow(moments, dt, marked)
+    inflow = find_inflow(states, dt, marked)
     if dissipation is None:
-        dissipation = _dissipation(moments, dt, inflow.voxels)
+        dissipation = _dissipation(states, dt, inflow.voxels)
     if buoyancy is None:
-        fitted, rise = _buoyancy([*earlier, *map(coarse, moments)], dt, _coarse_mask(inflow.voxels), depth_axis)
+        fitted, rise = _buoyancy([*earlier, *map(coarse, states)], dt, _coarse_mask(inflow.voxels), depth_axis)
         contradicted = fitted * rise < 0
         physics = Physics(0.0 if contradicted else fitted, dissipation, fitted if contradicted else 0.0)
     else:
         physics = Physics(buoyancy, dissipation)
-    return Simulation(physics, inflow.cropped(), surroundings or Surroundings(), dt, fit_fire(moments, dt))
+    return Simulation(physics, inflow.cropped(), surroundings or Surroundings(), dt, fit_fire(states, dt))
 
 
-def coarse(moment: Moment) -> Moment:
-    """The moment on the grid that the buoyancy is fitted on, without fire."""
-    while max(moment.density.shape) > COARSE:
-        faces = coarsen_faces(moment.velocity)
-        moment = Moment(coarsen(moment.density), Velocity(faces.faces, faces.voxel_size, faces.closed))
-    return Moment(moment.density, moment.velocity)
+def coarse(state: SmokeState) -> SmokeState:
+    """The state on the grid that the buoyancy is fitted on, without fire."""
+    while max(state.density.shape) > COARSE:
+        state = SmokeState(coarsen(state.density), coarsened(state.velocity))
+    return SmokeState(state.density, state.velocity)
 
 
 def _coarse_mask(voxels: Mask) -> Mask:
@@ -122,40 +122,40 @@ def _coarse_mask(voxels: Mask) -> Mask:
     return voxels
 
 
-def spun_up(simulation: Simulation, moments: Sequence[Moment]) -> Moment:
-    """The last of some consecutive moments, with the velocity that the forces have made since the first.
+def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
+    """The last of some consecutive states, with the velocity that the forces have made since the first.
 
     The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
-    first = _first_typical(moments)
-    along, velocity = _along(simulation), moments[first].velocity
-    for step, moment in enumerate(moments[first:-1], first + 1):
-        velocity = along.velocity(replace(moment, velocity=velocity), step)
-    return replace(moments[-1], velocity=velocity)
+    first = _first_typical(states)
+    along, velocity = _along(simulation), states[first].velocity
+    for step, state in enumerate(states[first:-1], first + 1):
+        velocity = along.velocity(replace(state, velocity=velocity), step)
+    return replace(states[-1], velocity=velocity)
 
 
-def _first_typical(moments: Sequence[Moment]) -> int:
-    """The first moment whose velocity is as fast as usual: a wrong one would go on through all others."""
-    speeds = [sum(float(np.vdot(component, component)) for component in m.velocity.faces) ** 0.5 for m in moments]
+def _first_typical(states: Sequence[SmokeState]) -> int:
+    """The first state whose velocity is as fast as usual: a wrong one would go on through all others."""
+    speeds = [sum(float(np.vdot(component, component)) for component in m.velocity.faces) ** 0.5 for m in states]
     usual = UNUSUAL * float(np.median(speeds))
-    return next((number for number in range(len(moments) // 2) if speeds[number] <= usual), 0)
+    return next((number for number in range(len(states) // 2) if speeds[number] <= usual), 0)
 
 
 def _along(simulation: Simulation) -> Simulation:
-    """The simulation of the clip itself: step n goes to moment n, and what entered then enters."""
+    """The simulation of the clip itself: step n goes to state n, and what entered then enters."""
     return replace(simulation, inflow=simulation.inflow.forwards(), surroundings=Surroundings(), fire=None)
 
 
-def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:
+def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:
     """The buoyancy whose velocity moves the smoke up as the clip does, and how fast the clip says that it rises (m/s).
 
-    The velocity spins up along all moments, with their densities; the second half of them is compared.
+    The velocity spins up along all states, with their densities; the second half of them is compared.
     """
-    moments = moments[-BUOYANCY_MOMENTS:]
-    if len(moments) < MIN_MOMENTS or not all(moment.density.any() for moment in moments):
+    states = states[-BUOYANCY_FRAMES:]
+    if len(states) < MIN_FRAMES or not all(state.density.any() for state in states):
         return 0.0, 0.0
-    half, first = len(moments) // 2, _first_typical(moments)
-    still = Simulation(Physics(0.0, 0.0), Inflow(inlets, moments).cropped(), Surroundings(), dt)
+    half, first = len(states) // 2, _first_typical(states)
+    still = Simulation(Physics(0.0, 0.0), Inflow(inlets, states).cropped(), Surroundings(), dt)
     compared = (~ndimage.binary_dilation(inlets, iterations=AROUND)).astype(np.float32)
     compared[:, :, :BORDER] = compared[:, :, -BORDER:] = 0
 
@@ -163,23 +163,23 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, depth_axis: in
         blurred: Array = ndimage.gaussian_filter((density * compared).sum(depth_axis), BLUR)
         return blurred
 
-    found = [picture(moment.density) for moment in moments]
+    found = [picture(state.density) for state in states]
 
-    rise = float(np.mean([_rise(moment, compared) for moment in moments]))
+    rise = float(np.mean([_rise(state, compared) for state in states]))
 
     def too_high(buoyancy: float) -> float:
         """Voxels per frame by which the carried smoke rises more than the clip's."""
         along = _along(replace(still, physics=Physics(buoyancy, 0.0)))
-        velocity, carried = moments[first].velocity, []
-        for step, before in enumerate(moments[first:-1], first + 1):
+        velocity, carried = states[first].velocity, []
+        for step, before in enumerate(states[first:-1], first + 1):
             velocity = along.velocity(replace(before, velocity=velocity), step)
             if step >= half:
                 carried.append(picture(advect(before.density, velocity, dt, conserve=True)))
         return _higher(carried, found[half:], rise)
 
-    density = moments[half].density
+    density = states[half].density
     typical = float(np.vdot(density, density) / density.sum(dtype=np.float64))
-    by_a_voxel = moments[0].velocity.voxel_size / (typical * (half * dt) ** 2)
+    by_a_voxel = states[0].velocity.voxel_size / (typical * (half * dt) ** 2)
     return _root(too_high, by_a_voxel), rise
 
 
@@ -205,10 +205,10 @@ def _higher(carried: Sequence[Array], found: Sequence[Array], rise: float) -> fl
     return float(higher if brighter * rise < 0 else sums[0] / products[0, 0])
 
 
-def _rise(moment: Moment, compared: Array) -> float:
+def _rise(state: SmokeState, compared: Array) -> float:
     """Upward velocity (m/s) of the smoke that is compared, by its own velocity."""
-    density = moment.density * compared
-    upwards = at_centres(moment.velocity.faces)[2]
+    density = state.density * compared
+    upwards = at_centres(state.velocity.faces)[2]
     return float(np.vdot(density, upwards)) / max(float(density.sum(dtype=np.float64)), 1e-30)
 
 
@@ -228,10 +228,10 @@ def _root(function: Callable[[float], float], start: float) -> float:
     return now
 
 
-def _dissipation(moments: Sequence[Moment], dt: float, inlets: Mask) -> float:
+def _dissipation(states: Sequence[SmokeState], dt: float, inlets: Mask) -> float:
     """The rate that brings the mass outside the inlets from that of the carried smoke to that found; at least 0."""
     carried_mass = found_mass = 0.0
-    for before, after in pairwise(moments):
+    for before, after in pairwise(states):
         carried = advect(before.density, after.velocity, dt, conserve=True)
         carried_mass += float(carried.sum(dtype=np.float64, where=~inlets))
         found_mass += float(after.density.sum(dtype=np.float64, where=~inlets))

@@ -8,11 +8,11 @@ camera or a lamp.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from smokelift.direct.moment import Moment
+from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.scene import SIDES, Box, CompleteScene, Domain, EnvironmentLight, PointLight, Side
 from smokelift.scene.checks import Vector
@@ -26,10 +26,10 @@ MARGIN_VOXELS = 4
 """Voxels of clear air between smoke and an open side. Pressure is zero there, which bends the flow nearby."""
 
 SEEN = np.float32(1e-3)
-"""Share of the largest density above which smoke counts as there."""
+"""Fraction of the largest density above which smoke counts as there."""
 
 FADE = 0.25
-"""Share of the box's length over which smoke dissolves before a side that cannot move."""
+"""Fraction of the box's length over which smoke dissolves before a side that cannot move."""
 
 FADE_POWER = 2.0
 """Power of the distance to such a side that is left of the smoke: its value and its slope end at zero."""
@@ -38,7 +38,7 @@ AT_SIDE = np.float32(0.5)
 """Voxels from the surface at which smoke is gone to a voxel's centre, at least."""
 
 BUMPS = 0.6
-"""Share of that length by which the surface has bumps at which the smoke is gone."""
+"""Fraction of that length by which the surface has bumps at which the smoke is gone."""
 
 WAVES = ((0.3, 0.9, 0.0), (1.4, 1.3, 2.1), (2.5, 0.7, 4.0), (2.0, 2.1, 1.0))
 """Bumps of the end: direction in radians, number in a fade's length, and phase. No two agree, so no pattern is seen."""
@@ -65,7 +65,7 @@ class Growth:
     voxels
         Of the largest box.
     outside
-        Points in metres that stay outside: cameras and lamps.
+        Points in meters that stay outside: cameras and lamps.
     """
 
     clip: Domain
@@ -73,14 +73,14 @@ class Growth:
     voxels: int
     outside: tuple[Vector, ...] = ()
 
-    def after(self, box: Domain, moment: Moment, dt: float) -> Domain:
-        """The box for the step that follows a moment, whose smoke may be near a side of its own."""
-        smoke = box_around(moment.density > SEEN * moment.density.max(), 0)
+    def after(self, box: Domain, state: SmokeState, dt: float) -> Domain:
+        """The box for the step that follows a state, whose smoke may be near a side of its own."""
+        smoke = box_around(state.density > SEEN * state.density.max(), 0)
         grown = box
         for side, axis, is_high in open_sides(self.closed):
             if smoke[axis].stop == 0:
                 break
-            fastest = float(np.abs(moment.velocity.faces[axis]).max()) * dt / box.voxel_size
+            fastest = float(np.abs(state.velocity.faces[axis]).max()) * dt / box.voxel_size
             clear = box.resolution[axis] - smoke[axis].stop if is_high else smoke[axis].start
             blocks = math.ceil((MARGIN_VOXELS + fastest - clear) / BLOCK)
             if blocks > 0 and self._fits(larger := _moved(grown, side, blocks)):
@@ -118,8 +118,8 @@ class Growth:
         return small and not any(box.contains(point) for point in self.outside)
 
 
-def kept_outside(scene: CompleteScene) -> tuple[Vector, ...]:
-    """The places in metres of a scene's cameras and lamps: a renderer needs them outside the box."""
+def camera_and_lamp_places(scene: CompleteScene) -> tuple[Vector, ...]:
+    """The places in meters of a scene's cameras and lamps: a renderer needs them outside the box."""
     cameras = [scene.camera, *(view.camera for view in scene.views)]
     eyes = [camera for camera in cameras if camera.type == "perspective"]
     matrices = [matrix for camera in eyes for matrix in camera.matrices or (camera.matrix,)]
@@ -135,44 +135,46 @@ def moves(box: Domain, larger: Domain) -> Moves:
     return x, y, z
 
 
-def in_larger_box(moment: Moment, ends: Moves, before: Surroundings, after: Surroundings, time: float) -> Moment:
-    """A moment, at a time in seconds, in a box that is larger by some `moves`.
+def in_larger_box(state: SmokeState, ends: Moves, before: Surroundings, after: Surroundings, time: float) -> SmokeState:
+    """A state, at a time in seconds, in a box that is larger by some `moves`.
 
     The velocity of the air goes on as that of what is placed in the larger box; what the smoke has beside the air of
     its own box goes on as it is at the side.
     """
-    velocity = moment.velocity
+    velocity = state.velocity
     air = before.air(velocity, time)
     x, y, z = (np.pad(u - a, ends, mode="edge") for u, a in zip(velocity.faces, air, strict=True))
     flow = Velocity((x, y, z), velocity.voxel_size, velocity.closed)
     faces = (u + a for u, a in zip(flow.faces, after.air(flow, time), strict=True))
-    flame = None if moment.flame is None else np.pad(moment.flame, ends)
-    return Moment(np.pad(moment.density, ends), flow.with_faces(faces), flame)
+    flame = None if state.flame is None else np.pad(state.flame, ends)
+    return SmokeState(np.pad(state.density, ends), flow.with_faces(faces), flame)
 
 
-def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float, first: tuple[int, ...] = (0, 0, 0)) -> Moment:
-    """A moment whose smoke has lost what it loses in a step on its way to sides that cannot move.
+def dissolved(
+    state: SmokeState, stopped: tuple[Side, ...], dt: float, first: tuple[int, ...] = (0, 0, 0)
+) -> SmokeState:
+    """A state whose smoke has lost what it loses in a step on its way to sides that cannot move.
 
     What is left of it goes with the distance to the power `FADE_POWER`, to a surface before the side that has bumps. So
     it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight. The box
     begins at the voxel `first` of the clip's: the bumps stay where they are when the box grows.
     """
     if not stopped:
-        return moment
+        return state
     left = np.ones((), np.float32)
-    shape = moment.density.shape
+    shape = state.density.shape
     for side, axis, is_high in open_sides(()):
         if side not in stopped:
             continue
         count, band = shape[axis], np.float32(FADE * shape[axis])
         inside = np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
         distance = (count - 1 - inside if is_high else inside) - BUMPS * band * _bumps(shape, axis, float(band), first)
-        voxels = np.float32((1 if is_high else -1) * dt / moment.velocity.voxel_size)
-        moved = np.maximum(voxels * at_centres(moment.velocity.faces)[axis], 0)
+        voxels = np.float32((1 if is_high else -1) * dt / state.velocity.voxel_size)
+        moved = np.maximum(voxels * at_centres(state.velocity.faces)[axis], 0)
         now = np.clip(distance, 0, band)
         before = np.minimum(now + moved, band)
         left = left * ((now + AT_SIDE) / (before + AT_SIDE)) ** np.float32(FADE_POWER)
-    return _thinned(moment, left)
+    return state.thinned(left)
 
 
 def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ...]) -> Array:
@@ -186,35 +188,30 @@ def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ..
     return np.float32(0.5) + np.float32(0.5) * total
 
 
-def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step: int, dt: float) -> Moment:
-    """A moment whose smoke is thin where it has just come out of sides of the clip's box that had cut it.
+def emerged(state: SmokeState, clip: tuple[slice, ...], cut: tuple[Side, ...], step: int, dt: float) -> SmokeState:
+    """A state whose smoke is thin where it has just come out of sides of the clip's box that had cut it.
 
     It is so many steps of `dt` seconds after the clip, whose box is given in voxels.
     """
     missing = 1 - min(1.0, step * dt / EMERGING) ** 2
     if not cut or missing == 0:
-        return moment
-    inside = np.zeros(moment.density.shape, np.float32)
+        return state
+    inside = np.zeros(state.density.shape, np.float32)
     inside[clip] = 1
-    from_inside = advect(inside, moment.velocity, dt, scheme="semi-lagrangian")
+    from_inside = advect(inside, state.velocity, dt, scheme="semi-lagrangian")
     left = np.ones_like(inside)
     for side, axis, is_high in open_sides(()):
         if side in cut:
             beyond = [slice(None)] * 3
             beyond[axis] = slice(clip[axis].stop, None) if is_high else slice(None, clip[axis].start)
             left[tuple(beyond)] = 1 - np.float32(missing) * from_inside[tuple(beyond)]
-    return _thinned(moment, left)
+    return state.thinned(left)
 
 
 def cut_sides(density: Array, closed: tuple[Side, ...]) -> tuple[Side, ...]:
     """The sides of the box of a density (nx, ny, nz), but for the walls, at which there is smoke."""
     seen = density > SEEN * density.max()
     return tuple(side for side, axis, is_high in open_sides(closed) if seen.take(-is_high, axis).any())
-
-
-def _thinned(moment: Moment, left: Array) -> Moment:
-    flame = None if moment.flame is None else moment.flame * left
-    return replace(moment, density=moment.density * left, flame=flame)
 
 
 def _moved(box: Domain, side: Side, blocks: int) -> Domain:

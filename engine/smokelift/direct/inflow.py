@@ -1,4 +1,12 @@
-"""Where smoke enters in the last moments of a clip, and what enters after them."""
+"""Where smoke enters in the last frames of a clip, and what enters after them.
+
+Where a velocity is wrong, the change that it leaves unexplained has both signs side by side, because smoke is moved and
+not made. Where smoke enters, the change is positive all over. So an inlet shows in the mean of the residual over a few
+voxels, beside the mean of its magnitude: their ratio, the coherence, is near one in an inlet and near zero elsewhere.
+
+An inlet also stands out from what is left unexplained in the rest of the smoke, and from other inlets. The front of
+smoke that is faster than the velocity looks like a wide, weak one.
+"""
 
 from __future__ import annotations
 
@@ -6,34 +14,66 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.checks.array_types import Mask
 from smokelift.direct.constraint import FaceMasks, faces_of
-from smokelift.direct.moment import Moment
-from smokelift.direct.source_detection import ResidualMeans, SourceDetection
+from smokelift.direct.state import SmokeState
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, advect, faces_in
 
-MOTION = 0.5
-"""Share of its change that may be motion in a voxel of an inlet, at most."""
+BLUR_VOXELS = 2.0
+"""Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets. This and the three
+ramps below: docs/experiments/velocity-weights.md."""
 
-PROMINENT = 0.25
-"""Share of the strongest inlet's smoke that lasts in an inlet at least, where the weaker half of the moments counts:
-inlets of one scene are of one kind, and what a wrong velocity leaves is scattered and moves on."""
+COHERENCE = (0.4, 0.6)
+"""Mean residual over mean magnitude: nothing is an inlet below the first, everything that stands out is one above the
+second."""
 
-MIN_DENSITY_SHARE = 0.01
-"""Share of the largest density below which a voxel is not in the smoke."""
+STRENGTH = (3.0, 6.0)
+"""The same for the mean residual, in medians of its magnitude over the smoke."""
+
+PROMINENCE = (0.1, 0.2)
+"""The same for the mean residual over that of the strongest inlet: inlets of one scene are of one kind."""
+
+MIN_SCORE = 0.5
+"""Score above which a voxel is in an inlet."""
+
+MIN_LASTING_FRACTION = 0.25
+"""Smoke that lasts in an inlet over that of the strongest, at least, where the weaker half of the frames counts: what a
+wrong velocity leaves is scattered and moves on."""
+
+MIN_DENSITY_FRACTION = 0.01
+"""Fraction of the largest density below which a voxel is not in the smoke."""
+
+MIN_RESIDUAL_FRACTION = np.float32(1e-4)
+"""Fraction of the largest density below which a residual means nothing."""
 
 MARGIN_VOXELS = 1
 """Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
 
 
+class Residual(NamedTuple):
+    """The change of a density that a velocity leaves unexplained, and the larger density of before and after."""
+
+    change: Array
+    largest: Array
+
+
+class ResidualMeans(NamedTuple):
+    """Means of residuals and of their magnitude, over a few voxels and over frames, in units of the largest density."""
+
+    mean: Array
+    magnitude: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Inflow:
-    """The inlets, and the moments of the clip that are replayed in them.
+    """The inlets, and the frames of the clip that are replayed in them.
 
     Forwards and backwards in turn, so that no frame jumps and the statistics stay those of the clip.
 
@@ -41,24 +81,24 @@ class Inflow:
     ----------
     voxels : (nx, ny, nz) bool
         Those of all inlets, in a box around them.
-    moments
+    states
         Of the clip, in their order, in that box.
     first
         The simulation's voxel at which that box begins.
     """
 
     voxels: Mask
-    moments: Sequence[Moment]
+    states: Sequence[SmokeState]
     first: tuple[int, ...] = (0, 0, 0)
 
-    def at(self, step: int) -> Moment:
-        """The moment that is replayed so many steps after the last one."""
-        last = len(self.moments) - 1
-        return self.moments[abs(last - step % (2 * last))] if last else self.moments[0]
+    def at(self, step: int) -> SmokeState:
+        """The state that is replayed so many steps after the last one."""
+        last = len(self.states) - 1
+        return self.states[abs(last - step % (2 * last))] if last else self.states[0]
 
     def forwards(self) -> Inflow:
-        """The inflow from the first moment on, so that step n replays moment n."""
-        return replace(self, moments=self.moments[::-1])
+        """The inflow from the first state on, so that step n replays state n."""
+        return replace(self, states=self.states[::-1])
 
     @property
     def box(self) -> tuple[slice, ...]:
@@ -87,67 +127,86 @@ class Inflow:
         """Inflow in the smallest box."""
         box = box_around(self.voxels, 0)
         if not self.voxels.any():
-            box = (slice(0, 1),) * 3  # a moment has a voxel at least
-        moments = [
-            Moment(m.density[box].copy(), m.velocity.with_faces(u.copy() for u in faces_in(m.velocity.faces, box)))
-            for m in self.moments
+            box = (slice(0, 1),) * 3  # a box has a voxel at least
+        states = [
+            SmokeState(m.density[box].copy(), m.velocity.with_faces(u.copy() for u in faces_in(m.velocity.faces, box)))
+            for m in self.states
         ]
-        return Inflow(self.voxels[box], moments, tuple(a + side.start for a, side in zip(self.first, box, strict=True)))
+        return Inflow(self.voxels[box], states, tuple(a + side.start for a, side in zip(self.first, box, strict=True)))
 
 
-def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None) -> Inflow:
-    """Find the inlets of a clip from its last moments, two at least, `dt` seconds apart.
+def find_inflow(states: Sequence[SmokeState], dt: float, marked: Mask | None = None) -> Inflow:
+    """Find the inlets of a clip from the states of its last frames, two at least, `dt` seconds apart.
 
     Inlets that are known are marked (nx, ny, nz); otherwise they are found from what the velocities do not explain.
     """
-    voxels = _detect_inlets(moments, dt) if marked is None else marked
+    voxels = _detect_inlets(states, dt) if marked is None else marked
     if voxels.any():
         voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN_VOXELS)
-    return Inflow(voxels, moments)
+    return Inflow(voxels, states)
 
 
-def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
-    """The voxels of inlets by the mean over all moments, for inlets stand still and errors do not."""
-    changes = [_unexplained(before, after, dt) for before, after in pairwise(moments)]
-    means = _means(changes)
-    middle = len(moments) // 2
-    halves = [_means(part).mean for part in (changes[:middle], changes[middle:]) if part]
-    densest = changes[-1][1]
-    entering = SourceDetection().weight(means, densest > MIN_DENSITY_SHARE * densest.max()) < MOTION
-    given = np.zeros_like(densest)
-    for moment in moments:
-        given += _given_away(moment)
-    return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves), given)
+def _detect_inlets(states: Sequence[SmokeState], dt: float) -> Mask:
+    """The voxels of inlets by the mean over all frames, for inlets stand still and errors do not."""
+    residuals = [_residual(before, after, dt) for before, after in pairwise(states)]
+    means = residual_means(residuals)
+    middle = len(states) // 2
+    halves = [residual_means(part).mean for part in (residuals[:middle], residuals[middle:]) if part]
+    largest = residuals[-1].largest
+    entering = inlet_score(means, largest > MIN_DENSITY_FRACTION * largest.max()) > MIN_SCORE
+    outflow = np.zeros_like(largest)
+    for state in states:
+        outflow += _outflow(state)
+    return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves), outflow)
 
 
-def _unexplained(before: Moment, after: Moment, dt: float) -> tuple[Array, Array]:
-    """The change that a velocity does not explain, and the larger density of what it explains and what there is."""
+def _residual(before: SmokeState, after: SmokeState, dt: float) -> Residual:
     carried = advect(before.density, after.velocity, dt)
-    return after.density - carried, np.maximum(after.density, carried)
+    return Residual(after.density - carried, np.maximum(after.density, carried))
 
 
-def _means(changes: Sequence[tuple[Array, Array]]) -> ResidualMeans:
-    """Means over changes, one at least, that velocities do not explain."""
-    means = None
-    for number, (residual, densest) in enumerate(changes, 1):
-        means = SourceDetection(news=1 / number).means(residual, densest, means)
-    assert means is not None
+def residual_means(residuals: Sequence[Residual]) -> ResidualMeans:
+    """Return the means over residuals, one at least."""
+    means = ResidualMeans(*(np.zeros_like(residuals[0].change) for _ in range(2)))
+    for number, (change, largest) in enumerate(residuals, 1):
+        relative = change / max(largest.max(), np.float32(1e-30))
+        for mean, values in zip(means, (relative, np.abs(relative)), strict=True):
+            mean *= np.float32(1 - 1 / number)
+            mean += np.float32(1 / number) * _core.blur(values, BLUR_VOXELS, 3.0)
     return means
 
 
-def _given_away(moment: Moment) -> Array:
+def inlet_score(means: ResidualMeans, smoke: Mask) -> Array:
+    """Return how surely smoke enters in each voxel (nx, ny, nz), from 0 to 1."""
+    mean = means.mean
+    typical = float(np.median(np.abs(mean[smoke]))) if smoke.any() else 0.0
+    if typical == 0.0:
+        return np.zeros(mean.shape, np.float32)
+    coherent = _ramp(mean / (means.magnitude + MIN_RESIDUAL_FRACTION), COHERENCE)
+    strong = _ramp(mean / np.float32(typical), STRENGTH)
+    prominent = _ramp(mean / max(np.max(coherent * mean), MIN_RESIDUAL_FRACTION), PROMINENCE)
+    score: Array = coherent * strong * prominent
+    return score
+
+
+def _ramp(values: Array, ends: tuple[float, float]) -> Array:
+    low, high = ends
+    return np.clip((values - np.float32(low)) / np.float32(high - low), 0, 1)
+
+
+def _outflow(state: SmokeState) -> Array:
     """Smoke that flows from each voxel into others of the box, less what flows from there into it, times m/s."""
-    given = np.zeros_like(moment.density)
-    for axis, component in enumerate(moment.velocity.faces):
-        density, flow = np.moveaxis(moment.density, axis, 0), np.moveaxis(component, axis, 0)[1:-1]
+    outflow = np.zeros_like(state.density)
+    for axis, component in enumerate(state.velocity.faces):
+        density, flow = np.moveaxis(state.density, axis, 0), np.moveaxis(component, axis, 0)[1:-1]
         through = 0.5 * flow * (density[1:] + density[:-1])
-        along = np.moveaxis(given, axis, 0)
+        along = np.moveaxis(outflow, axis, 0)
         along[:-1] += through
         along[1:] -= through
-    return given
+    return outflow
 
 
-def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, given: Array) -> Mask:
+def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, outflow: Array) -> Mask:
     """The connected components of voxels (nx, ny, nz) in which most smoke enters all the time, and goes into the box.
 
     Where smoke gathers before it leaves the box, more appears than velocities explain as well; it flows in from there.
@@ -156,7 +215,7 @@ def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, given: Ar
     if count == 0:
         return entering
     numbers = np.arange(1, count + 1)
-    sums, lasting_sums, given_sums = (ndimage.sum_labels(each, labels, numbers) for each in (strength, lasting, given))
-    sums = np.where(given_sums > 0, sums, 0)
-    kept: Mask = np.isin(labels, numbers[(sums > 0) & (lasting_sums >= PROMINENT * sums.max())])
-    return kept
+    entered, lasted, left = (ndimage.sum_labels(each, labels, numbers) for each in (strength, lasting, outflow))
+    entered = np.where(left > 0, entered, 0)
+    strongest: Mask = np.isin(labels, numbers[(entered > 0) & (lasted >= MIN_LASTING_FRACTION * entered.max())])
+    return strongest

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.direct.interpolation import interpolate
-from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, simulated_figures, write_copy
+from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, write_copy, write_simulated
+from smokelift.direct.state import SmokeState, interpolate, read_state
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Side
 from smokelift.scene.domain import open_sides
@@ -29,18 +28,18 @@ TINY = 1e-20
 """Keeps quotients of no smoke finite."""
 
 BORDER, BORDER_FACTOR = 0.2, 16.0
-"""Share of the box's length before an open side where smoke of one end alone goes sooner, and how many times the usual
-density is at the side: smoke of that density is gone there after a tenth of the overlap."""
+"""Fraction of the box's length before an open side where smoke of one end alone goes sooner, and how many times the
+usual density is at the side: smoke of that density is gone there after a tenth of the overlap."""
 
 STEADY = 0.15
-"""Share of the smoke that may be elsewhere, in profiles along the axes, after a loop that counts as steady."""
+"""Fraction of the smoke that may be elsewhere, in profiles along the axes, after a loop that counts as steady."""
 
 
 def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, int]:
     """Return the first and the last frame of the longest part in which the smoke is steady.
 
     Where it is in none, of the parts that are half as long as the sequence or longer, the one in which it is most so.
-    Start and end share `overlap` frames, by default those of `usual_overlap`.
+    Start and end share `overlap` frames, by default those of `default_overlap`.
     """
     whole = len(sequence.frames)
     shortest = max(SHORTEST, math.ceil(whole / 2), 2 * (overlap or 0))
@@ -49,7 +48,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     profiles = [_profile(sequence.density(number)) for number in sequence.frames]
     parts: list[tuple[float, int, int]] = []
     for count in range(whole, shortest - 1, -1):
-        shared = usual_overlap(count) if overlap is None else overlap
+        shared = default_overlap(count) if overlap is None else overlap
         for first in range(whole - count + 1):
             middle = first + shared // 2
             parts.append((_change(profiles[middle], profiles[middle + count - shared]), first, first + count - 1))
@@ -59,7 +58,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     return sequence.frames[first], sequence.frames[last]
 
 
-def usual_overlap(count: int) -> int:
+def default_overlap(count: int) -> int:
     """Return the frames that the start and the end share of so many: a third."""
     return min(LONGEST_OVERLAP, count // 3)
 
@@ -125,23 +124,22 @@ def loop_sequence(
             number, source = index + 1, first + index
             if number in writer.finished:
                 continue
-            began = time.perf_counter()
+            started = time.perf_counter()
             if index < overlap:
-                share = number / (overlap + 1)
-                start, end = read_moment(sequence, source), read_moment(sequence, source + length)
-                moment = seam(end, start, share, (overlap + 1) * (1 / sequence.fps))
-                figures = simulated_figures(moment, began, "looped", {"place": source, "share": share})
-                writer.write(number, moment.density, moment.velocity.faces, figures, flame=moment.flame)
-                yield number, figures
+                fraction = number / (overlap + 1)
+                start, end = read_state(sequence, source), read_state(sequence, source + length)
+                state = seam(end, start, fraction, (overlap + 1) * (1 / sequence.fps))
+                further = {"place": source, "share": fraction}
+                yield write_simulated(writer, number, state, "looped", further, started=started)
             else:
                 yield write_copy(sequence, source, writer, number, {"place": source})
 
 
-def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
-    """The smoke on its way from one moment of a clip, `end`, to another that it is to become, `start`.
+def seam(end: SmokeState, start: SmokeState, fraction: float, duration: float) -> SmokeState:
+    """The smoke on its way from one state of a clip, `end`, to another that it is to become, `start`.
 
-    It has gone a share, 0 to 1, of the way, which takes a duration in seconds. The velocity gains what moves the one's
-    shapes to the other's in them.
+    It has gone a fraction, 0 to 1, of the way, which takes a duration in seconds. The velocity gains what moves the
+    one's shapes to the other's in them.
     """
     if not (end.density.any() and start.density.any()):  # there are no shapes to carry
         way = Velocity.zero(end.velocity.shape, end.velocity.voxel_size, end.velocity.closed)
@@ -149,13 +147,13 @@ def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
         velocity = end.velocity
         way = estimate_velocity(end.density, start.density, duration, velocity.voxel_size, closed=velocity.closed)
     mix = partial(mix_by_edges, closed=end.velocity.closed)
-    moment = interpolate(end, start, way, duration, share, mix)
-    faces = [u + w for u, w in zip(moment.velocity.faces, way.faces, strict=True)]
-    return replace(moment, velocity=Velocity((faces[0], faces[1], faces[2]), way.voxel_size, way.closed))
+    state = interpolate(end, start, way, duration, fraction, mix)
+    faces = (u + w for u, w in zip(state.velocity.faces, way.faces, strict=True))
+    return replace(state, velocity=state.velocity.with_faces(faces))
 
 
-def mix_by_edges(end: Array, start: Array, share: float, closed: tuple[Side, ...] = ()) -> Array:
-    """Mix two densities (nx, ny, nz) so that neither shows through the other; a share of 0 gives the first.
+def mix_by_edges(end: Array, start: Array, fraction: float, closed: tuple[Side, ...] = ()) -> Array:
+    """Mix two densities (nx, ny, nz) so that neither shows through the other; a fraction of 0 gives the first.
 
     Where both are alike it is a linear mix. Where one alone has smoke, the thin of it goes first and comes last, as air
     dissolves smoke, and no shape becomes a ghost of itself. Each has the weight
@@ -170,19 +168,19 @@ def mix_by_edges(end: Array, start: Array, share: float, closed: tuple[Side, ...
         return np.zeros_like(end)
     usual = (float(np.vdot(end, end)) + float(np.vdot(start, start))) / (of_end + of_start)
     difference = np.abs(end - start) / np.maximum(end + start, np.float32(TINY))
-    lone = np.square(np.float32(usual) * difference * _sooner(end.shape, closed))
+    lone = np.square(np.float32(usual) * difference * _density_factor(end.shape, closed))
 
     def weighted(a: Array, b: Array, s: float) -> Array:
         own, other = np.float32(1 - s) * np.square(a), np.float32(s) * (np.square(b) + lone)
         weight: Array = own / np.maximum(own + other, np.float32(TINY))
         return a * weight
 
-    mixed = weighted(end, start, share) + weighted(start, end, 1 - share)
-    mass = (1 - share) * of_end + share * of_start
+    mixed = weighted(end, start, fraction) + weighted(start, end, 1 - fraction)
+    mass = (1 - fraction) * of_end + fraction * of_start
     return mixed * np.float32(mass / max(float(mixed.sum(dtype=np.float64)), TINY))
 
 
-def _sooner(shape: tuple[int, ...], closed: tuple[Side, ...]) -> Array:
+def _density_factor(shape: tuple[int, ...], closed: tuple[Side, ...]) -> Array:
     """How many times as dense smoke counts as the usual, 1 away from the open sides."""
     factor = np.ones((), np.float32)
     for _, axis, is_high in open_sides(closed):
@@ -200,6 +198,6 @@ def _profile(density: Array) -> Array:
 
 
 def _change(before: Array, after: Array) -> float:
-    """The share of two profiles that differs, from 0 to 1."""
+    """The fraction of two profiles that differs, from 0 to 1."""
     both = float(before.sum() + after.sum())
     return float(np.abs(before - after).sum()) / both if both > 0 else 0.0

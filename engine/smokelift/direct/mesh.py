@@ -52,7 +52,7 @@ class Crossings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A surface of triangles (n, 3, 3), corners in metres, as an obstacle.
+    """A surface of triangles (n, 3, 3), corners in meters, as an obstacle.
 
     Which way they turn does not matter, as long as it is the same over each part.
     """
@@ -61,7 +61,7 @@ class Mesh:
 
     @staticmethod
     def read(path: Path) -> Mesh:
-        """Read a binary STL file, in metres, Z up.
+        """Read a binary STL file, in meters, Z up.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Mesh:
         return Mesh(triangles)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """The corners in metres of the box around it."""
+        """The corners in meters of the box around it."""
         corners = self.triangles.reshape(-1, 3)
         (a, b, c), (d, e, f) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         return (a, b, c), (d, e, f)

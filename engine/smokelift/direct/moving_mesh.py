@@ -72,7 +72,7 @@ class MovingMesh:
         return self.places[min(step, len(self.places) - 1)]
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """The corners in metres of the box around all its places."""
+        """The corners in meters of the box around all its places."""
         lows, highs = zip(*(place.bounds() for place in self.places), strict=True)
         (a, b, c), (d, e, f) = np.min(lows, axis=0).tolist(), np.max(highs, axis=0).tolist()
         return (a, b, c), (d, e, f)

@@ -12,7 +12,7 @@ import numpy as np
 
 from smokelift.checks import counted
 from smokelift.checks.array_types import Mask
-from smokelift.direct.moment import Moment
+from smokelift.direct.state import SmokeState
 from smokelift.output.files import INDEX, checksum
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -87,22 +87,40 @@ def write_copy(
     return number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
 
 
-def simulated_figures(
-    moment: Moment, began: float, origin: str, further: Mapping[str, float], solid: Mask | None = None
-) -> dict[str, Any]:
-    """The figures of a frame that no picture shows, and further ones.
+def write_simulated(
+    writer: SequenceWriter,
+    number: int,
+    smoke: SmokeState,
+    origin: str,
+    further: Mapping[str, float],
+    *,
+    started: float,
+    solid: Mask | None = None,
+    **options: Any,
+) -> Written:
+    """Write a frame that no picture shows, with its figures and further ones.
 
-    Work on it began at `began` of `time.perf_counter`; its origin is a word. Inside obstacles, `solid` (nx, ny, nz),
-    nothing counts.
+    Parameters
+    ----------
+    origin
+        Where it comes from, a word.
+    started
+        When work on it did, by `time.perf_counter`.
+    solid : (nx, ny, nz), optional
+        Obstacles, inside which no divergence counts.
+    options
+        See `SequenceWriter.write`.
     """
-    return {
+    figures = {
         "origin": origin,
-        "mass": float(moment.density.sum(dtype=np.float64)) * moment.velocity.voxel_size**3,
-        "divergence": _largest_divergence(moment.velocity, solid),
+        "mass": float(smoke.density.sum(dtype=np.float64)) * smoke.velocity.voxel_size**3,
+        "divergence": _largest_divergence(smoke.velocity, solid),
         **further,
         "seconds_density": 0.0,
-        "seconds_velocity": time.perf_counter() - began,
+        "seconds_velocity": time.perf_counter() - started,
     }
+    writer.write(number, smoke.density, smoke.velocity.faces, figures, flame=smoke.flame, **options)
+    return number, figures
 
 
 def _largest_divergence(velocity: Velocity, solid: Mask | None) -> float:

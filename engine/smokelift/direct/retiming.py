@@ -1,4 +1,4 @@
-"""A sequence at another pace."""
+"""A sequence at another speed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks.array_types import Doubles
-from smokelift.direct.interpolation import interpolate
-from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.new_sequence import Written, directed_writer, simulated_figures
+from smokelift.direct.new_sequence import Written, directed_writer, write_simulated
+from smokelift.direct.state import SmokeState, interpolate, read_state
 from smokelift.output.sequence import Sequence
 
 STEPS = 64
-"""Steps a frame of the trapezoidal rule that integrates 1 / speed over a ramp."""
+"""Steps per frame of the trapezoidal rule that integrates 1 / speed over a ramp."""
 
 
 def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
@@ -36,7 +35,7 @@ def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
 def retime_sequence(
     sequence: Sequence, out: str | Path, speeds: tuple[float, ...], *, npz: bool = False, resume: bool = False
 ) -> Iterator[Written]:
-    """Write a sequence at another pace: frames between the clip's own are interpolated from both neighbours.
+    """Write a sequence at another speed: frames between the clip's own are interpolated from both neighbours.
 
     Velocities are scaled with the speed: at half the speed they are half of the smoke's.
 
@@ -60,25 +59,24 @@ def retime_sequence(
     ValueError
         If a file cannot be read or written.
     """
-    times, pace = playback(len(sequence.frames), speeds)
+    times, speeds_shown = playback(len(sequence.frames), speeds)
     first, dt = sequence.frames[0], 1 / sequence.fps
     how = "Frames between those of the clip are made of both neighbors, carried there by the velocity."
     camera_frames = [first + float(at) for at in times]
-    pair: dict[int, Moment] = {}
+    pair: dict[int, SmokeState] = {}
     with directed_writer(
         sequence, out, "retime", {"speeds": speeds}, how, camera_frames, npz=npz, resume=resume
     ) as writer:
-        for number, (at, speed) in enumerate(zip(times.tolist(), pace.tolist(), strict=True), 1):
+        for number, (at, speed) in enumerate(zip(times.tolist(), speeds_shown.tolist(), strict=True), 1):
             if number in writer.finished:
                 continue
-            began = time.perf_counter()
+            started = time.perf_counter()
             low = first + min(int(at), len(sequence.frames) - 2)
-            pair = {n: pair[n] if n in pair else read_moment(sequence, n) for n in (low, low + 1)}
+            pair = {n: pair[n] if n in pair else read_state(sequence, n) for n in (low, low + 1)}
             before, after = pair[low], pair[low + 1]
-            moment = interpolate(before, after, after.velocity, dt, at + first - low)
-            faces = moment.velocity.with_faces(np.float32(speed) * u for u in moment.velocity.faces)
-            figures = simulated_figures(
-                replace(moment, velocity=faces), began, "retimed", {"place": at, "speed": speed}
+            state = interpolate(before, after, after.velocity, dt, at + first - low)
+            velocity = state.velocity.with_faces(np.float32(speed) * u for u in state.velocity.faces)
+            further = {"place": at, "speed": speed}
+            yield write_simulated(
+                writer, number, replace(state, velocity=velocity), "retimed", further, started=started
             )
-            writer.write(number, moment.density, faces.faces, figures, flame=moment.flame)
-            yield number, figures

@@ -1,7 +1,7 @@
-"""The simulation that continues a clip from its last moment.
+"""The simulation that continues a clip from its last frame.
 
 A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
-the moment before to this one:
+the frame before to this one:
 
     u'   = Project(advect(u - a, u) + dt (b rho up) + a'), in inlets and fans with their own velocity
     rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
@@ -24,13 +24,12 @@ import numpy as np
 from smokelift.checks.array_types import Mask
 from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
-from smokelift.direct.moment import Moment
-from smokelift.direct.obstacles import Solid
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.state import SmokeState
+from smokelift.direct.surroundings import Solid, Surroundings
 from smokelift.transport import Array, Velocity, advect, on_faces, project
 
 TRACE = np.float32(1e-4)
-"""Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
+"""Fraction of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
 
 
 @dataclass(frozen=True)
@@ -76,22 +75,22 @@ class Simulation:
     dt: float
     fire: Combustion | None = None
 
-    def next(self, moment: Moment, step: int) -> Moment:
-        """Return the moment one step later; step 1 starts from the clip's last moment."""
+    def next(self, state: SmokeState, step: int) -> SmokeState:
+        """Return the state one step later; step 1 starts from the clip's last state."""
         solid = self.surroundings.solid(step, self.dt)
-        velocity = self._driven(moment, step, solid)
+        velocity = self._driven(state, step, solid)
         obstacle = None if solid is None else solid.voxels
-        density = self._advected(moment.density, velocity, obstacle)
+        density = self._advected(state.density, velocity, obstacle)
         density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
         self.inflow.density_into(density, step, obstacle)
         flame = None
-        if self.fire is not None and moment.flame is not None:
-            flame = self.fire.after(self._advected(moment.flame, velocity, obstacle), obstacle)
-        return Moment(density, velocity, flame)
+        if self.fire is not None and state.flame is not None:
+            flame = self.fire.after(self._advected(state.flame, velocity, obstacle), obstacle)
+        return SmokeState(density, velocity, flame)
 
-    def velocity(self, moment: Moment, step: int) -> Velocity:
-        """The velocity of the moment one step later."""
-        return self._driven(moment, step, self.surroundings.solid(step, self.dt))
+    def velocity(self, state: SmokeState, step: int) -> Velocity:
+        """The velocity of the state one step later."""
+        return self._driven(state, step, self.surroundings.solid(step, self.dt))
 
     def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
         """The simulation in a larger box with what is placed there.
@@ -103,11 +102,10 @@ class Simulation:
         fire = None if self.fire is None else replace(self.fire, feed=np.pad(self.fire.feed, ends))
         return replace(self, inflow=inflow, surroundings=surroundings, fire=fire)
 
-    def _driven(self, moment: Moment, step: int, solid: Solid | None) -> Velocity:
-        moved = self._self_advected(moment.velocity, step)
-        driven = moved.with_faces(self._with_forces(moved, moment, step))
-        velocity = project(driven) if solid is None else solid.projected(driven)
-        return Velocity(velocity.faces, velocity.voxel_size, velocity.closed)
+    def _driven(self, state: SmokeState, step: int, solid: Solid | None) -> Velocity:
+        moved = self._self_advected(state.velocity, step)
+        driven = moved.with_faces(self._with_forces(moved, state, step))
+        return project(driven) if solid is None else solid.projected(driven)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
         return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
@@ -119,12 +117,12 @@ class Simulation:
         moved = advect(flow, velocity, self.dt)
         from_inside = advect(np.ones(velocity.shape, np.float32), velocity, self.dt, scheme="semi-lagrangian")
         inside = on_faces(np.stack([from_inside] * 3, axis=-1))
-        return moved.with_faces(u * share for u, share in zip(moved.faces, inside, strict=True))
+        return moved.with_faces(u * weight for u, weight in zip(moved.faces, inside, strict=True))
 
-    def _with_forces(self, moved: Velocity, moment: Moment, step: int) -> list[Array]:
+    def _with_forces(self, moved: Velocity, state: SmokeState, step: int) -> list[Array]:
         """The velocity on faces after forces, inlets and fans, before the projection."""
         faces = [component.copy() for component in moved.faces]
-        lifted = 0.5 * (moment.density[:, :, 1:] + moment.density[:, :, :-1])
+        lifted = 0.5 * (state.density[:, :, 1:] + state.density[:, :, :-1])
         faces[2][:, :, 1:-1] += np.float32(self.dt * self.physics.buoyancy) * lifted
         for fan_faces, fan_velocity in self.surroundings.blown:
             for component, inside, speed in zip(faces, fan_faces, fan_velocity, strict=True):
@@ -135,9 +133,9 @@ class Simulation:
 
 def _without_traces(density: Array, solid: Mask | None) -> Array:
     """The density with zero for traces and in obstacles, where interpolation puts some, and with its mass restored."""
-    kept = density > TRACE * density.max()
+    there = density > TRACE * density.max()
     if solid is not None:
-        kept &= ~solid
-    cleared = np.where(kept, density, np.float32(0))
+        there &= ~solid
+    cleared = np.where(there, density, np.float32(0))
     mass, mass_left = (float(values.sum(dtype=np.float64)) for values in (density, cleared))
     return cleared * np.float32(mass / mass_left) if mass_left > 0 else cleared

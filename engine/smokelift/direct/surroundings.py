@@ -1,20 +1,163 @@
-"""What an artist places around the smoke: wind, turbulence, fans and obstacles."""
+"""What an artist places around the smoke: wind, turbulence, fans and obstacles, and what of it is solid at a step."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from smokelift.direct.constraint import FaceMasks
-from smokelift.direct.obstacles import Ball, Obstacles, Solid
+from smokelift.checks.array_types import Mask
+from smokelift.direct.constraint import FaceMasks, faces_between, faces_of, project_with_given_faces
+from smokelift.direct.mesh import Mesh
+from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.direct.turbulence import Turbulence
+from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
-from smokelift.transport import Array, Velocity
+from smokelift.transport import Array, Faces, Velocity, divergence, face_shapes, outflow
 
 RISE = 0.5
 """Seconds in which the air takes on most (1 - 1/e) of a wind that sets in: a gust, and not a blow."""
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A round obstacle or, moving, a fan: its centre and radius in meters."""
+
+    centre: Vector
+    radius: float
+
+    def voxels(self, domain: Domain) -> Mask:
+        """The voxels whose centres lie in it, shape (nx, ny, nz)."""
+        x, y, z = domain.offsets(self.centre)
+        inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
+        return inside
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """The corners in meters of the box around it."""
+        (x, y, z), r = self.centre, self.radius
+        return (x - r, y - r, z - r), (x + r, y + r, z + r)
+
+
+@dataclass(frozen=True)
+class BoxObstacle:
+    """A box as obstacle, by its corners in meters."""
+
+    low: Vector
+    high: Vector
+
+    def voxels(self, domain: Domain) -> Mask:
+        """The voxels whose centres lie in it, shape (nx, ny, nz)."""
+        above, below = domain.offsets(self.low), domain.offsets(self.high)
+        x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
+        inside: Mask = x & y & z
+        return inside
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Its corners in meters."""
+        return self.low, self.high
+
+
+Obstacle = Ball | BoxObstacle | Mesh | MovingMesh
+
+
+class Solid(NamedTuple):
+    """What is solid at a step.
+
+    Attributes
+    ----------
+    voxels : (nx, ny, nz) bool
+    velocity
+        Of what they are made of, in m/s on all faces; None where all of it stands still.
+    """
+
+    voxels: Mask
+    velocity: Faces | None
+
+    def projected(self, velocity: Velocity) -> Velocity:
+        """The nearest velocity that is without divergence outside, and moves with the solid on its faces and inside.
+
+        Nothing goes through the solid's faces but what it displaces; one that swells displaces air.
+        """
+        inside = faces_of(self.voxels)
+        wanted = velocity.with_faces(self.velocity or (np.float32(0) * component for component in velocity.faces))
+        if self.velocity is None:
+            field = project_with_given_faces(velocity, faces_between(self.voxels), wanted.faces)
+        else:
+            swelling = np.where(self.voxels, divergence(wanted) * np.float32(velocity.voxel_size), np.float32(0))
+            outwards = outflow(swelling, velocity)
+            rest, given = (
+                field.with_faces(u - a for u, a in zip(field.faces, outwards.faces, strict=True))
+                for field in (velocity, wanted)
+            )
+            found = project_with_given_faces(rest, faces_between(self.voxels), given.faces)
+            field = found.with_faces(u + a for u, a in zip(found.faces, outwards.faces, strict=True))
+        return velocity.with_faces(
+            np.where(mask, own, component)
+            for mask, own, component in zip(inside, wanted.faces, field.faces, strict=True)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Everything that smoke cannot go through, in a box or outside it."""
+
+    domain: Domain
+    things: tuple[Obstacle, ...]
+
+    def at(self, step: int, dt: float) -> Solid | None:
+        """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
+        if not self.things:
+            return None
+        solid = Solid(self._still, None)
+        for thing in self.things:
+            if isinstance(thing, MovingMesh):
+                solid = _with(solid, *thing.solid(self.domain, step, dt))
+        if solid.voxels.all():
+            raise ValueError("the obstacles fill the whole box; make them smaller.")
+        return solid if solid.voxels.any() else None
+
+    @cached_property
+    def _still(self) -> Mask:
+        """The voxels of what does not move."""
+        still: Mask = np.zeros(self.domain.shape, bool)
+        for thing in self.things:
+            if not isinstance(thing, MovingMesh):
+                still |= thing.voxels(self.domain)
+        return still
+
+
+def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
+    """What is solid with a thing that moves."""
+    before = solid.velocity or [np.zeros(shape, np.float32) for shape in face_shapes(voxels.shape)]
+    x, y, z = (np.where(mask, own, other) for mask, own, other in zip(faces_of(voxels), velocity, before, strict=True))
+    return Solid(solid.voxels | voxels, (x, y, z))
+
+
+def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> None:
+    """Refuse a thing of that name that no smoke can meet, or a mesh that is open.
+
+    It has to hold a voxel of the box at the start, or to stand where the box can grow to.
+    """
+    low, high = thing.bounds()
+    within = all(c <= a and b <= d for a, b, c, d in zip(low, high, domain.min, domain.max, strict=True))
+    if isinstance(thing, MovingMesh):
+        here = any(_overlap(place, domain) for place in thing.places)
+    else:
+        here = bool(thing.voxels(domain).any())
+    if not here and (within or not _overlap(thing, reach)):
+        raise ValueError(
+            f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m, nor of what the box can grow "
+            "to; move it in, make it larger, or give the box more room."
+        )
+
+
+def _overlap(thing: Obstacle, box: Box) -> bool:
+    """Whether a thing reaches into a box, as far as its own bounds tell."""
+    low, high = thing.bounds()
+    return all(a < d and b > c for a, b, c, d in zip(low, high, box.min, box.max, strict=True))
 
 
 @dataclass(frozen=True)
@@ -51,12 +194,12 @@ class Surroundings:
 
     def air(self, like: Velocity, time: float) -> list[Array]:
         """The velocity in m/s that wind and turbulence have given to all air after a time in seconds, on faces."""
-        share = np.float32(1 - math.exp(-time / RISE))
+        gained = np.float32(1 - math.exp(-time / RISE))
         faces = [np.full_like(component, speed) for component, speed in zip(like.faces, self.wind, strict=True)]
         for turbulence in self.turbulences:
             eddies = turbulence.velocity(like, time, self.first)
             faces = [component + eddy for component, eddy in zip(faces, eddies, strict=True)]
-        return [share * component for component in faces]
+        return [gained * component for component in faces]
 
     def solid(self, step: int, dt: float) -> Solid | None:
         """What is solid after so many steps; None if nothing is."""

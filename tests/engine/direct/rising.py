@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.direct import Ball, Moment, Simulation
+from smokelift.direct import Ball, Simulation, SmokeState
 from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Physics
@@ -40,8 +40,8 @@ def blob(centre=(0.0, 0.0, 0.8), width=0.3) -> np.ndarray:
     return np.where(density > 1e-3, density, np.float32(0))
 
 
-def at_rest(density: np.ndarray) -> Moment:
-    return Moment(density, Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)))
+def at_rest(density: np.ndarray) -> SmokeState:
+    return SmokeState(density, Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)))
 
 
 def free(physics: Physics = PHYSICS, surroundings: Surroundings | None = None) -> Simulation:
@@ -50,21 +50,21 @@ def free(physics: Physics = PHYSICS, surroundings: Surroundings | None = None) -
     return Simulation(physics, nowhere, surroundings or Surroundings(), DT)
 
 
-def course(simulation: Simulation, moment: Moment, frames: int) -> list[Moment]:
-    """A moment and those after it."""
-    moments = [moment]
+def course(simulation: Simulation, state: SmokeState, frames: int) -> list[SmokeState]:
+    """A state and those after it."""
+    states = [state]
     for step in range(1, frames + 1):
-        moments.append(simulation.next(moments[-1], step))
-    return moments
+        states.append(simulation.next(states[-1], step))
+    return states
 
 
 @cache
-def plume(burning: bool = False) -> tuple[Moment, ...]:
+def plume(burning: bool = False) -> tuple[SmokeState, ...]:
     """Smoke from an inlet, 1 s after it has begun; if it burns, with fire that is fed from there."""
     inlet = Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     faces = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)).faces
     faces[2][:, :, 1:] = 1.0
-    entering = Moment(inlet.astype(np.float32), Velocity(faces, DOMAIN.voxel_size, ("z-",)))
+    entering = SmokeState(inlet.astype(np.float32), Velocity(faces, DOMAIN.voxel_size, ("z-",)))
     inflow = Inflow(inlet, (entering,))
     simulation = Simulation(
         PHYSICS, inflow, Surroundings(), DT, Combustion(LEFT, 0.2 * entering.density) if burning else None
@@ -78,5 +78,5 @@ def write_plume(directory: Path, frames: int = 10, burning: bool = False) -> Non
     """The plume as a finished sequence with NumPy twins."""
     medium = replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1) if burning else None)
     with SequenceWriter(directory, replace(SCENE, medium=medium), {"quality": "draft"}, npz=True) as writer:
-        for number, moment in enumerate(plume(burning)[:frames], 1):
-            writer.write(number, moment.density, moment.velocity.faces, {"psnr": 30.0}, flame=moment.flame)
+        for number, state in enumerate(plume(burning)[:frames], 1):
+            writer.write(number, state.density, state.velocity.faces, {"psnr": 30.0}, flame=state.flame)

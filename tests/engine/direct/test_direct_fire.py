@@ -7,8 +7,7 @@ import pytest
 
 from smokelift.direct import Ball, fit_simulation
 from smokelift.direct.burning import Combustion, fit_fire
-from smokelift.direct.obstacles import Obstacles
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.surroundings import Obstacles, Surroundings
 from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume
 
 
@@ -33,7 +32,7 @@ def test_the_feed_makes_no_more_fire_than_the_clip_has() -> None:
     after[:8] *= 0.4
     after[8:12] *= 0.8
     after[12:] *= 2.0
-    moments = [replace(at_rest(blob()), flame=flame) for flame in (before, after)]
-    fire = fit_fire(moments, DT)
+    states = [replace(at_rest(blob()), flame=flame) for flame in (before, after)]
+    fire = fit_fire(states, DT)
     assert fire is not None
     assert fire.after(before, None).sum() == pytest.approx(after.sum(), rel=1e-4)

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import DISSOLVED, Continuation, Moment, Turbulence, continue_sequence, open_source
+from smokelift.direct import DISSOLVED, Continuation, SmokeState, Turbulence, continue_sequence, open_source
 from smokelift.direct.growth import (
     BLOCK,
     MARGIN_VOXELS,
     Growth,
+    camera_and_lamp_places,
     cut_sides,
     dissolved,
     emerged,
     in_larger_box,
-    kept_outside,
     moves,
 )
 from smokelift.direct.surroundings import Surroundings
@@ -31,7 +31,7 @@ def run(source, out, continuation, **options):
     return Sequence.open(out)
 
 
-def blowing(speed: float, density: np.ndarray) -> Moment:
+def blowing(speed: float, density: np.ndarray) -> SmokeState:
     """Smoke that goes along x with all air."""
     still = at_rest(density)
     x, y, z = still.velocity.faces
@@ -39,8 +39,8 @@ def blowing(speed: float, density: np.ndarray) -> Moment:
 
 
 def test_a_side_moves_before_smoke_arrives_there():
-    def grown(moment: Moment) -> tuple[tuple[int, int], ...]:
-        return moves(DOMAIN, ROOMY.after(DOMAIN, moment, DT))
+    def grown(state: SmokeState) -> tuple[tuple[int, int], ...]:
+        return moves(DOMAIN, ROOMY.after(DOMAIN, state, DT))
 
     small = blob((0.0, 0.0, 1.5), 0.1)
     assert grown(at_rest(0 * small)) == grown(at_rest(small)) == ((0, 0),) * 3
@@ -61,7 +61,7 @@ def test_a_box_stays_below_its_largest_size_and_before_cameras_and_lamps():
     assert np.prod(box.resolution) <= tight.voxels
     assert set(tight.stopped(box)) == {"x-", "x+", "y-", "y+", "z+"}
     lamp = PointLight((1.2, 0.0, 1.0), (1.0, 1.0, 1.0))
-    outside = kept_outside(replace(SCENE, lights=(*SCENE.lights, lamp)))
+    outside = camera_and_lamp_places(replace(SCENE, lights=(*SCENE.lights, lamp)))
     assert outside == (SCENE.camera.position, lamp.position)
     assert replace(ROOMY, outside=outside).stopped(DOMAIN) == ("x+",)
 
@@ -72,12 +72,12 @@ def test_a_larger_box_changes_nothing_where_the_smaller_was():
         Surroundings((0.3, 0.0, 0.0), (Turbulence(0.5, 0.6),), first=box.first_in(clip)) for box in (clip, larger)
     )
     still = at_rest(blob())
-    moment = replace(still, velocity=still.velocity.with_faces(before.air(still.velocity, 0.5)), flame=still.density)
-    found = in_larger_box(moment, moves(clip, larger), before, after, 0.5)
+    state = replace(still, velocity=still.velocity.with_faces(before.air(still.velocity, 0.5)), flame=still.density)
+    found = in_larger_box(state, moves(clip, larger), before, after, 0.5)
     part = clip.slices_in(larger)
-    np.testing.assert_array_equal(found.density[part], moment.density)
-    np.testing.assert_array_equal(found.flame[part], moment.density)
-    assert np.count_nonzero(found.density) == np.count_nonzero(moment.density)
+    np.testing.assert_array_equal(found.density[part], state.density)
+    np.testing.assert_array_equal(found.flame[part], state.density)
+    assert np.count_nonzero(found.density) == np.count_nonzero(state.density)
     for here, there in zip(found.velocity.faces, after.air(found.velocity, 0.5), strict=True):
         np.testing.assert_allclose(here, there, atol=2e-5)
 
@@ -85,12 +85,12 @@ def test_a_larger_box_changes_nothing_where_the_smaller_was():
 def test_smoke_dissolves_softly_before_a_side_that_cannot_move():
     """What goes there fades with the distance, at any speed, and is gone at the side; what stays is not touched."""
     for speed in (0.5, 3.0):
-        moment = blowing(speed, np.ones(DOMAIN.shape, np.float32))
+        state = blowing(speed, np.ones(DOMAIN.shape, np.float32))
         for _ in range(round(3 / (speed * DT))):  # smoke that comes in all the time
-            carried = advect(np.pad(moment.density, ((0, 0),) * 3), moment.velocity, DT)
+            carried = advect(np.pad(state.density, ((0, 0),) * 3), state.velocity, DT)
             carried[:2] = 1
-            moment = dissolved(replace(moment, density=carried), ("x+",), DT)
-        profile = moment.density[:, 8, 12]
+            state = dissolved(replace(state, density=carried), ("x+",), DT)
+        profile = state.density[:, 8, 12]
         assert (profile[:9] > 0.9).all()
         assert profile[-1] < 0.1
         assert np.abs(np.diff(profile)).max() < 0.5
@@ -105,13 +105,13 @@ def test_smoke_that_the_clip_cut_comes_out_thinly_at_first():
     velocity = Velocity.zero(larger.shape, larger.voxel_size, ("z-",))
     x, y, z = velocity.faces
     z[:, :, 1:] = larger.voxel_size / DT
-    moment = Moment(np.pad(cut, moves(DOMAIN, larger)), velocity.with_faces((x, y, z)))
+    state = SmokeState(np.pad(cut, moves(DOMAIN, larger)), velocity.with_faces((x, y, z)))
     tops = []
     for step in range(1, 30):
-        density = advect(moment.density, moment.velocity, DT)
+        density = advect(state.density, state.velocity, DT)
         density[:, :, 0] = 1
-        moment = emerged(replace(moment, density=density), DOMAIN.slices_in(larger), ("z+",), step, DT)
-        tops.append(moment.density[8, 8, 24:])
+        state = emerged(replace(state, density=density), DOMAIN.slices_in(larger), ("z+",), step, DT)
+        tops.append(state.density[8, 8, 24:])
     assert tops[0].max() < 0.01
     assert np.abs(np.diff(tops[11])).max() < 0.2
     assert tops[-1].min() > 0.5

@@ -1,15 +1,18 @@
-"""Eddies in all air: their speed, their size, and what they do to smoke."""
+"""Eddies in all air: their speed, their size, what they do to smoke, and those that a smooth velocity gains."""
 
 import numpy as np
 import pytest
 
-from smokelift.direct import Moment, Turbulence
+from smokelift.direct import SmokeState, Turbulence
 from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Velocity, divergence
+from smokelift.direct.turbulence import with_small_eddies
+from smokelift.transport import Velocity, at_centres, divergence, project
 from tests.engine.direct.rising import DOMAIN, at_rest, blob, course, free
 
 STILL = Velocity.zero((40, 40, 40), 0.05)
+SHAPE = (32, 32, 40)
+VOXEL = 0.05
 
 
 def eddies(turbulence: Turbulence, time: float = 0.0) -> Velocity:
@@ -53,7 +56,46 @@ def test_a_seed_makes_the_same_eddies_on_any_grid():
 
 def test_a_hundred_frames_keep_the_speed_of_the_eddies():
     around = Surroundings(wind=(0.3, 0.0, 0.0), turbulences=(Turbulence(0.5, 0.5, 1),))
-    nothing = Moment(np.zeros(DOMAIN.shape, np.float32), at_rest(blob()).velocity)
-    moments = course(free(Physics(0.0, 0.0), around), nothing, 100)
-    assert speed(moments[-1].velocity) == pytest.approx(np.hypot(0.3, 0.5), rel=0.25)
-    assert max(speed(m.velocity) for m in moments) < 1.3 * np.hypot(0.3, 0.5)
+    nothing = SmokeState(np.zeros(DOMAIN.shape, np.float32), at_rest(blob()).velocity)
+    states = course(free(Physics(0.0, 0.0), around), nothing, 100)
+    assert speed(states[-1].velocity) == pytest.approx(np.hypot(0.3, 0.5), rel=0.25)
+    assert max(speed(m.velocity) for m in states) < 1.3 * np.hypot(0.3, 0.5)
+
+
+def stirred(*sizes: float) -> SmokeState:
+    """A block of smoke in eddies of some sizes in voxels, 0.4 m/s each."""
+    density = np.zeros(SHAPE, np.float32)
+    density[6:26, 6:26, 8:32] = 1
+    still = Velocity.zero(SHAPE, VOXEL)
+    each = [Turbulence(0.4, size * VOXEL, 9).velocity(still, 0.0) for size in sizes]
+    return SmokeState(density, project(still.with_faces([sum(parts) for parts in zip(*each, strict=True)])))
+
+
+def energy(state: SmokeState, smoke: bool) -> float:
+    inside = (state.density > 0) == smoke
+    return sum(float(np.square(u[inside]).mean()) for u in at_centres(state.velocity.faces))
+
+
+def test_a_smooth_velocity_gains_eddies_in_the_smoke():
+    smooth = stirred(16)
+    found = with_small_eddies(smooth)
+    assert energy(found, True) > 1.15 * energy(smooth, True)
+    far = np.ones(SHAPE, bool)
+    far[1:-1, 1:-1, 1:-1] = False
+    for before, after in zip(*(at_centres(m.velocity.faces) for m in (smooth, found)), strict=True):
+        assert np.abs(after - before)[far].mean() < 0.1 * np.abs(before)[far].mean()
+    assert np.abs(divergence(found.velocity)).max() * VOXEL < 1e-4
+    again = with_small_eddies(smooth)
+    np.testing.assert_array_equal(again.velocity.faces[0], found.velocity.faces[0])
+
+
+def test_a_velocity_that_has_its_eddies_gains_few():
+    full = stirred(2.2, 4, 8, 16)
+    assert energy(with_small_eddies(full), True) == pytest.approx(energy(full, True), rel=0.25)
+
+
+def test_still_air_and_narrow_boxes_stay():
+    still = SmokeState(np.ones(SHAPE, np.float32), Velocity.zero(SHAPE, VOXEL))
+    assert not any(component.any() for component in with_small_eddies(still).velocity.faces)
+    narrow = SmokeState(np.ones((8, 8, 8), np.float32), Velocity.zero((8, 8, 8), VOXEL))
+    assert with_small_eddies(narrow) is narrow

@@ -6,7 +6,7 @@ import argparse
 
 from smokelift.app.options import add_directed_options, frame_range, require_new
 from smokelift.app.progress import Reporter, say_sequence
-from smokelift.direct import loop_length, loop_sequence, open_source, steady_part, usual_overlap
+from smokelift.direct import default_overlap, loop_length, loop_sequence, open_source, steady_part
 
 HELP = "make a part of a sequence repeat without a seam"
 
@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """Loop the sequence, and say every frame."""
     sequence = open_source(options.directory)
     first, last = options.frames or steady_part(sequence, options.overlap)
-    overlap = usual_overlap(last - first + 1) if options.overlap is None else options.overlap
+    overlap = default_overlap(last - first + 1) if options.overlap is None else options.overlap
     total = loop_length(sequence, first, last, overlap)
     require_new(options)
     written = loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)

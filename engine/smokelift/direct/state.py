@@ -1,0 +1,125 @@
+"""The state of moving smoke: how it is read from a sequence, and what lies between two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from smokelift.direct.constraint import FaceMasks, project_with_given_faces
+from smokelift.output.sequence import Sequence
+from smokelift.transport import Array, Velocity, advect, divergence, on_faces, project
+
+Carried = TypeVar("Carried", Array, Velocity)
+Mix = Callable[[Array, Array, float], Array]
+"""Mixes two densities or emissions by a fraction: 0 gives the first."""
+
+DIVERGENCE_TOLERANCE = 1e-3
+"""Divergence times voxel size over the largest speed, below which a velocity counts as free of divergence."""
+
+COMPLETION_ITERATIONS = 30
+"""Iterations in which a velocity that is known near smoke alone is completed."""
+
+RESOLVED = 1e-6
+"""Nearer than this to 0 or 1 the result is one of the two states itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmokeState:
+    """Smoke at one time, and how it moves.
+
+    Attributes
+    ----------
+    density : (nx, ny, nz) float32
+        At voxel centres.
+    velocity
+        Without divergence, in m/s; it has carried the frame before to this one.
+    flame : (nx, ny, nz) float32, optional
+        Emission of fire; None without any.
+    """
+
+    density: Array
+    velocity: Velocity
+    flame: Array | None = None
+
+    def thinned(self, left: Array | np.float32) -> SmokeState:
+        """What is left of it where a fraction of its smoke and fire is, (nx, ny, nz) or one number."""
+        flame = None if self.flame is None else self.flame * left
+        return replace(self, density=self.density * left, flame=flame)
+
+
+def read_state(sequence: Sequence, number: int) -> SmokeState:
+    """Read a frame of a sequence."""
+    velocity = sequence.velocity(number)
+    return SmokeState(sequence.density(number), complete_velocity(velocity), sequence.flame(number))
+
+
+def complete_velocity(velocity: Velocity) -> Velocity:
+    """The velocity without divergence that is nearest to one that is known near smoke alone, and zero elsewhere.
+
+    Files keep the velocity near smoke. Cut off there it has divergence, and projecting that would slow the smoke down;
+    so the air around is set in motion instead. A velocity without divergence stays as it is.
+    """
+    largest = max(float(np.abs(component).max()) for component in velocity.faces)
+    if float(np.abs(divergence(velocity)).max()) * velocity.voxel_size <= DIVERGENCE_TOLERANCE * largest:
+        return velocity
+    found = project_with_given_faces(velocity, _known(velocity), velocity.faces, limit=COMPLETION_ITERATIONS)
+    return velocity.with_faces(found.faces)
+
+
+def _known(velocity: Velocity) -> FaceMasks:
+    """The faces both of whose voxels have a velocity."""
+    known = velocity.centres().any(axis=-1, keepdims=True).astype(np.float32)
+    x, y, z = (both == 1 for both in on_faces(np.broadcast_to(known, (*velocity.shape, 3))))
+    return x, y, z
+
+
+def blend(a: Array, b: Array, fraction: float) -> Array:
+    """Mix two densities linearly: a fraction of 0 gives the first."""
+    return (1 - np.float32(fraction)) * a + np.float32(fraction) * b
+
+
+def interpolate(
+    before: SmokeState, after: SmokeState, motion: Velocity, dt: float, fraction: float, mix: Mix = blend
+) -> SmokeState:
+    """Return the smoke at a fraction of the time from one state to another.
+
+    The first state is advected forwards by its part of the time, the second backwards by the rest, and the two are
+    blended by the fraction. So nothing shows twice where the motion is right, and the mass changes linearly from that
+    of the first to that of the second.
+
+    Parameters
+    ----------
+    motion
+        Velocity in m/s that carries the first to the second in `dt` seconds, at the points of arrival.
+    fraction
+        0 for the first, 1 for the second.
+    mix
+        Mixes what of density and of emission is carried from both, by the fraction; linearly by default.
+    """
+    if fraction < RESOLVED:
+        return before
+    if fraction > 1 - RESOLVED:
+        return after
+    midway = advect_back(motion, motion, (1 - fraction) * dt)
+
+    def blended(first: Array, second: Array) -> Array:
+        forwards = advect(first, midway, fraction * dt, conserve=True)
+        return mix(forwards, advect_back(second, midway, (1 - fraction) * dt), fraction)
+
+    density = blended(before.density, after.density)
+    flame = None if before.flame is None or after.flame is None else blended(before.flame, after.flame)
+    velocities = (
+        advect(before.velocity, midway, fraction * dt),
+        advect_back(after.velocity, midway, (1 - fraction) * dt),
+    )
+    faces = (blend(a, b, fraction) for a, b in zip(velocities[0].faces, velocities[1].faces, strict=True))
+    return SmokeState(density, project(before.velocity.with_faces(faces)), flame)
+
+
+def advect_back(field: Carried, velocity: Velocity, dt: float) -> Carried:
+    """Advect a density or a velocity against a velocity (m/s): to where it was `dt` seconds ago."""
+    backwards = velocity.with_faces(-component for component in velocity.faces)
+    return advect(field, backwards, dt, conserve=not isinstance(field, Velocity))

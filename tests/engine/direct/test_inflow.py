@@ -1,0 +1,90 @@
+"""Inlets: what counts as smoke that enters, what does not, and what enters after the clip."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from smokelift.direct import Ball, SmokeState
+from smokelift.direct.inflow import Inflow, Residual, find_inflow, inlet_score, residual_means
+from smokelift.transport import Velocity
+from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free, plume
+
+SHAPE = (24, 24, 32)
+INLET = (slice(8, 14), slice(8, 14), slice(4, 10))
+FRONT = (slice(4, 20), slice(4, 20), slice(24, 29))
+
+
+def residual(inlet: float = 0.0, front: float = 0.0) -> np.ndarray:
+    """What motion that is a little wrong leaves, with new smoke in an inlet and before a front."""
+    x, y, z = np.indices(SHAPE)
+    left = 0.02 * np.sin(1.3 * x) * np.cos(1.1 * y) * np.sin(0.9 * z)
+    left[INLET] += inlet
+    left[FRONT] += front
+    return left.astype(np.float32)
+
+
+def score(*changes: np.ndarray, density: float = 1.0) -> np.ndarray:
+    residuals = [Residual(np.float32(density) * each, np.full(SHAPE, density, np.float32)) for each in changes]
+    return inlet_score(residual_means(residuals), np.ones(SHAPE, bool))
+
+
+def test_an_inlet_stands_out_from_motion_that_is_wrong() -> None:
+    found = score(residual(inlet=0.5))
+    assert found[10, 10, 7] == 1
+    assert found[FRONT].max() < 0.1
+    assert score(residual()).max() < 0.1
+    for density in (1e-3, 1e3):
+        np.testing.assert_allclose(score(residual(inlet=0.5), density=density), found, atol=1e-4)
+
+
+def test_a_weak_front_beside_an_inlet_is_none() -> None:
+    alone, beside = score(residual(front=0.05)), score(residual(front=0.05, inlet=1.0))
+    assert alone[12, 12, 26] > 0.9
+    assert (beside[12, 12, 26], beside[10, 10, 7]) == (0, 1)
+
+
+def test_what_passes_counts_less_than_what_lasts() -> None:
+    lasting = score(*[residual(inlet=0.5)] * 8, residual(inlet=0.5, front=0.2))
+    assert (lasting[10, 10, 7], lasting[12, 12, 26]) == (1, 0)
+
+
+def test_the_inlet_of_a_plume_is_found():
+    found = find_inflow(plume(), DT).voxels
+    true = Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    assert (found & true).sum() > 0.3 * true.sum()
+    far = ~Ball((0.0, 0.0, 0.3), 0.7).voxels(DOMAIN)
+    assert not (found & far).any()
+
+
+def test_smoke_that_only_moves_has_no_inlet():
+    assert not find_inflow(course(free(), at_rest(blob()), 8), DT).voxels.any()
+
+
+def test_what_enters_at_changing_places_is_no_inlet():
+    rest = at_rest(blob())
+    grown = [rest.density]
+    for place in (-0.5,) * 4 + (0.5,) * 4:
+        news = Ball((place, 0.0, 1.0), 0.3).voxels(DOMAIN)
+        grown.append(grown[-1] + np.float32(0.2) * news)
+    assert not find_inflow([replace(rest, density=density) for density in grown], DT).voxels.any()
+
+
+def test_where_smoke_gathers_before_it_leaves_is_no_inlet():
+    """Too little of what rises to an open side goes out in a reconstruction, so that there is more than comes."""
+    rising = [np.zeros_like(component) for component in at_rest(blob()).velocity.faces]
+    rising[2][:] = 0.2
+    top = blob((0.0, 0.0, 2.9))
+    states = [
+        SmokeState(np.float32(1 + 0.2 * number) * top, Velocity(rising, DOMAIN.voxel_size)) for number in range(8)
+    ]
+    assert not find_inflow(states, DT).voxels.any()
+    sinking = [replace(m, velocity=m.velocity.with_faces(-u for u in m.velocity.faces)) for m in states]
+    assert find_inflow(sinking, DT).voxels.any()
+
+
+def test_an_inlet_replays_its_states_without_a_jump():
+    states = plume()[:4]
+    inflow = Inflow(np.ones(DOMAIN.shape, bool), states)
+    places = [states.index(inflow.at(step)) for step in range(9)]
+    assert places == [3, 2, 1, 0, 1, 2, 3, 2, 1]
+    assert Inflow(inflow.voxels, states[:1]).at(5) is states[0]
