@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import BLACK, KnownDensities, known_densities
-from smokelift.direct import Moment, complete_velocity
+from smokelift.direct import SmokeState, complete_velocity
 from smokelift.evaluation import metrics
 from smokelift.evaluation.frame_means import PictureMeans
 from smokelift.evaluation.resampling import resampled
@@ -17,18 +17,18 @@ from smokelift.render import scene_renderer
 from smokelift.transport import Array, Velocity, on_faces
 
 
-def true_moment(truth: Truth, frame: int) -> Moment:
+def true_moment(truth: Truth, frame: int) -> SmokeState:
     """Return a moment of the truth, from frame 1."""
     velocity = replace(truth.velocity(frame - 1), closed=truth.closed)
-    return Moment(truth.density(frame), complete_velocity(velocity))
+    return SmokeState(truth.density(frame), complete_velocity(velocity))
 
 
-def reconstructed_moment(folder: Path, truth: Truth, frame: int) -> Moment:
+def reconstructed_moment(folder: Path, truth: Truth, frame: int) -> SmokeState:
     """Return a moment of a run of `benchmarks.accuracy`, from frame 1."""
     with np.load(folder / f"{frame + 1:04d}.npz") as file:
         density, centres = (file[name].astype(np.float32) for name in ("density", "velocity"))
     voxel_size = truth.voxel_size * truth.shape[0] / density.shape[0]
-    return Moment(density, complete_velocity(Velocity(on_faces(centres), voxel_size, truth.closed)))
+    return SmokeState(density, complete_velocity(Velocity(on_faces(centres), voxel_size, truth.closed)))
 
 
 def picture_psnr(known: KnownScene, densities: Sequence[Array], frames: Sequence[int], run: str, folder: Path) -> float:

@@ -19,9 +19,9 @@ import numpy.typing as npt
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
 from benchmarks.direct.clips import density_error, picture_psnr, reconstructed_moment, true_moment
 from benchmarks.tables import markdown
-from smokelift.direct import Moment, coarse, fit_simulation, spun_up
-from smokelift.direct.continuation import FITTED_MOMENTS
-from smokelift.direct.fitting import BUOYANCY_MOMENTS
+from smokelift.direct import SmokeState, coarse, fit_simulation, spun_up
+from smokelift.direct.continuation import FITTED_FRAMES
+from smokelift.direct.fitting import BUOYANCY_FRAMES
 from smokelift.direct.simulation import Physics, Simulation
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.transport import Array, Velocity, advect, at_centres, divergence
@@ -42,8 +42,8 @@ HEADER = [
 
 
 def ways(
-    moments: list[Moment], frames: int, dt: float, fitted: list[Moment] | None = None
-) -> Iterator[tuple[str, list[Moment], Physics | None]]:
+    moments: list[SmokeState], frames: int, dt: float, fitted: list[SmokeState] | None = None
+) -> Iterator[tuple[str, list[SmokeState], Physics | None]]:
     """Yield every way to continue moments by so many frames, with its moments and its physics.
 
     The physics is fitted to the moments, or to others in their place.
@@ -53,22 +53,22 @@ def ways(
     carried = [last]
     for _ in range(frames):
         density = advect(carried[-1].density, last.velocity, dt, conserve=True)
-        carried.append(Moment(density, last.velocity))
+        carried.append(SmokeState(density, last.velocity))
     yield "carried", carried[1:], None
     simulation = fitted_simulation(fitted or moments, dt)
-    simulated = [spun_up(simulation, moments[-FITTED_MOMENTS:])]
+    simulated = [spun_up(simulation, moments[-FITTED_FRAMES:])]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))
     yield "simulated", simulated[1:], simulation.physics
 
 
-def fitted_simulation(moments: list[Moment], dt: float) -> Simulation:
+def fitted_simulation(moments: list[SmokeState], dt: float) -> Simulation:
     """Return the simulation that `smokelift continue` goes on with."""
-    earlier = [coarse(moment) for moment in moments[-BUOYANCY_MOMENTS:-FITTED_MOMENTS]]
-    return fit_simulation(moments[-FITTED_MOMENTS:], dt, earlier=earlier)
+    earlier = [coarse(moment) for moment in moments[-BUOYANCY_FRAMES:-FITTED_FRAMES]]
+    return fit_simulation(moments[-FITTED_FRAMES:], dt, earlier=earlier)
 
 
-def with_dissolving_heads(moments: list[Moment], dt: float, rate: float) -> list[Moment]:
+def with_dissolving_heads(moments: list[SmokeState], dt: float, rate: float) -> list[SmokeState]:
     """Return moments whose smoke dissolves since the first: above 30 % of its height, up to a rate (1/s) at its top."""
     layers = moments[-1].density.sum((0, 1))
     top = int(np.flatnonzero(layers > 1e-3 * layers.max())[-1])
@@ -87,7 +87,7 @@ def rise(velocities: list[Velocity], density: Array, dt: float) -> float:
     return way
 
 
-def largest_divergence(moment: Moment) -> float:
+def largest_divergence(moment: SmokeState) -> float:
     """Return the largest |div u| times voxel size over the largest |u|."""
     largest = max(float(np.abs(component).max()) for component in moment.velocity.faces)
     return float(np.abs(divergence(moment.velocity)).max()) * moment.velocity.voxel_size / largest
@@ -99,7 +99,7 @@ def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list
     assert truth is not None
     count = truth.frames if folder is None else len(list(folder.glob("[0-9]*.npz")))
     cut = 2 * count // 3
-    shown, frames = range(max(1, cut - BUOYANCY_MOMENTS), cut), range(cut, count)
+    shown, frames = range(max(1, cut - BUOYANCY_FRAMES), cut), range(cut, count)
     if folder is None:
         moments = [true_moment(truth, frame) for frame in shown]
     else:
@@ -130,7 +130,7 @@ def picture(known: KnownScene, path: Path) -> None:
     assert truth is not None
     cut = 2 * truth.frames // 3
     frames = range(cut, truth.frames)
-    moments = [true_moment(truth, frame) for frame in range(max(1, cut - BUOYANCY_MOMENTS), cut)]
+    moments = [true_moment(truth, frame) for frame in range(max(1, cut - BUOYANCY_FRAMES), cut)]
     shown = [0, len(frames) // 3, 2 * len(frames) // 3, len(frames) - 1]
     white = float(max(truth.density(f).mean(axis=1).max() for f in frames))
     columns = {"what came": [truth.density(frames[i]) for i in shown]}

@@ -22,10 +22,10 @@ from smokelift.direct import (
     Continuation,
     Fan,
     continue_sequence,
+    default_overlap,
     loop_sequence,
     open_source,
     steady_part,
-    usual_overlap,
 )
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence
@@ -133,7 +133,7 @@ def main() -> None:
     print(markdown(HEADER, table), flush=True)
     if options.picture:
         first, last = steady_part(source)
-        overlap = usual_overlap(last - first + 1)
+        overlap = default_overlap(last - first + 1)
         list(loop_sequence(source, options.out / "loop", first, last, overlap))
         loop = Sequence.open(options.out / "loop")
         wide = _around([sequence.scene.domain for sequence in made.values()])

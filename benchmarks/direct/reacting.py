@@ -16,8 +16,7 @@ from benchmarks.direct.continuation import tile
 from benchmarks.truth.scenes import BOX_MIN, BOX_SIZE
 from smokelift.checks.array_types import Mask
 from smokelift.direct import Ball, Mesh, MovingMesh, Turbulence, fit_simulation, spun_up
-from smokelift.direct.obstacles import Obstacles
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.surroundings import Obstacles, Surroundings
 from smokelift.output.images import write_sheet
 from smokelift.scene import Domain
 from smokelift.transport import Array
