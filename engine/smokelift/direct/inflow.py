@@ -35,10 +35,10 @@ COHERENCE = (0.4, 0.6)
 second."""
 
 STRENGTH = (3.0, 6.0)
-"""The same for the mean residual, in medians of its magnitude over the smoke."""
+"""Mean residual in medians of its magnitude over the smoke, likewise."""
 
 PROMINENCE = (0.1, 0.2)
-"""The same for the mean residual over that of the strongest inlet: inlets of one scene are of one kind."""
+"""Mean residual over that of the strongest inlet, likewise: inlets of one scene are of one kind."""
 
 MIN_SCORE = 0.5
 """Score above which a voxel is in an inlet."""

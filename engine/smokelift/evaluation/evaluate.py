@@ -11,12 +11,10 @@ import numpy.typing as npt
 
 from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
-from smokelift.evaluation.orbit import Orbit
-from smokelift.evaluation.orbit_page import orbit_curves, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit import Orbit, orbit_curves, orbit_tiles, write_orbit_page
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
-from smokelift.evaluation.resampling import on_grid, resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, on_grid, resampled
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Volume

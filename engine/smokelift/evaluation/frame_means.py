@@ -10,16 +10,15 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.evaluation import metrics
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import linear_to_srgb
+from smokelift.evaluation.truth import Truth, resampled
+from smokelift.output.images import eight_bit
 from smokelift.render import Image, Volume
 from smokelift.transport import Array
 
 Figures = dict[str, Any]
 
 SMOKE_SHARE = 0.01
-"""Share of a frame's largest true density above which a voxel counts as smoke."""
+"""Fraction of a frame's largest true density above which a voxel counts as smoke."""
 
 SURROUNDING_VOXELS = 2
 """Voxels around the smoke in which a velocity still matters: advection and motion blur reach there."""
@@ -55,7 +54,7 @@ class VolumeMeans:
         """Add a frame of the truth, from 0, in order, and return its own metrics.
 
         The density (nx, ny, nz) has any resolution over the truth's box. The velocity (nx, ny, nz, 3), in m/s at the
-        voxels' centres, is of the smoke that arrives in this frame; it is compared from the second frame on.
+        voxels' centers, is of the smoke that arrives in this frame; it is compared from the second frame on.
         """
         truth = self._truth
         found, true = resampled(density, truth.shape), truth.density(frame)
@@ -110,10 +109,10 @@ def finite_mean(values: Iterable[float | None]) -> float | None:
 
 def eight_bit_values(image: npt.ArrayLike) -> Array:
     """Linear radiance as the sRGB values (1 is white) that an 8-bit picture holds."""
-    return np.asarray(np.rint(255 * np.clip(linear_to_srgb(image), 0, 1)) / 255, np.float32)
+    return eight_bit(image) / np.float32(255)
 
 
 def _without_copies(*pictures: Image) -> tuple[Image, ...]:
-    """Pictures (..., 3) with one channel in place of three where all are grey: every figure is a mean over channels."""
-    grey = all(np.array_equal(picture[..., :-1], picture[..., 1:]) for picture in pictures)
-    return tuple(picture[..., :1] for picture in pictures) if grey else pictures
+    """Pictures (..., 3) with one channel in place of three where all are gray: every figure is a mean over channels."""
+    gray = all(np.array_equal(picture[..., :-1], picture[..., 1:]) for picture in pictures)
+    return tuple(picture[..., :1] for picture in pictures) if gray else pictures

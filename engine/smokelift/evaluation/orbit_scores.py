@@ -25,7 +25,7 @@ AZIMUTHS = tuple(range(15, 180, 15))
 
 ON = 5
 """Azimuths, of 15 degrees each, from one picture of the truth to the one that it is compared with for its own distance:
-pictures that far from each other share next to no detail."""
+pictures that far from each other have next to no detail in common."""
 
 FLICKER_AZIMUTHS = (45, 75, 105, 135)
 """Azimuths at which three consecutive frames are compared."""
@@ -34,9 +34,9 @@ MOMENTS, FIRST_FRAMES = 6, 4
 """Frames that are scored, spread over the clip, and the first ones, which have hardly any before them to start from
 and are left out."""
 
-OUTLINE_SHARE, OUTLINE_MARGIN = 0.08, 2
-"""Share of the truth's largest value from which on a pixel is within its outline, and the pixels around that are, too:
-a linear interpolation and a pixel's rounding reach no farther."""
+OUTLINE_FRACTION, OUTLINE_MARGIN = 0.08, 2
+"""Fraction of the truth's largest value from which on a pixel is within its outline, and the pixels around that are,
+too: a linear interpolation and a pixel's rounding reach no farther."""
 
 
 def orbit_scores(
@@ -54,7 +54,7 @@ def orbit_scores(
     ``patches`` and ``texture``, the distances of `PatchStatistics`, means over azimuths, and by azimuth;
     ``patches_worst``, the largest of an azimuth; ``patches_own`` and ``texture_own``, those of the truth from itself
     `ON` azimuths on, or of the front from the front half the clip on; ``edges`` and ``flicker``, mean gradients and
-    second differences in time over the reference's; ``halo``, the share of the light outside the outlines that the
+    second differences in time over the reference's; ``halo``, the fraction of the light outside the outlines that the
     truth has at any azimuth. The figures of `RayShapes`, along the camera's rays and by azimuth, and the truth's. None
     where there is nothing to say.
     """
@@ -152,7 +152,9 @@ def _pictures(orbit: Orbit, density: Volume, azimuths: tuple[int, ...]) -> list[
 def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
     """Pixels (rows, columns) of the turntable's screen that show smoke at any azimuth, with a margin."""
     brightest = np.max(pictures, axis=0)
-    return np.asarray(ndimage.binary_dilation(brightest > OUTLINE_SHARE * brightest.max(), iterations=OUTLINE_MARGIN))
+    return np.asarray(
+        ndimage.binary_dilation(brightest > OUTLINE_FRACTION * brightest.max(), iterations=OUTLINE_MARGIN)
+    )
 
 
 def _outside(picture: Array, outline: npt.NDArray[np.bool_]) -> float | None:

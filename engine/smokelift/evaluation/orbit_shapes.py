@@ -82,11 +82,11 @@ def _turned(upright: Volume, table: Turntable, degrees: float) -> Volume:
 def _linear(places: Doubles, counts: tuple[int, int]) -> sparse.csr_array:
     """Weights (places, grid points) of a linear interpolation; what is outside the grid is zero."""
     low = np.floor(places + 1e-6).astype(int)
-    share = places - low
+    fraction = places - low
     rows, columns, weights = [], [], []
     for corner in ((0, 0), (0, 1), (1, 0), (1, 1)):
         at = low + corner
-        weight = np.prod(np.where(corner, share, 1 - share), axis=1)
+        weight = np.prod(np.where(corner, fraction, 1 - fraction), axis=1)
         inside = ((at >= 0) & (at < counts)).all(1) & (weight > 1e-6)
         rows.append(np.flatnonzero(inside))
         columns.append(at[inside] @ (counts[1], 1))

@@ -1,17 +1,18 @@
-"""Scenes whose flow is known, to compare results with: the files that benchmarks/truth/bake.py writes."""
+"""Scenes whose flow is known, as benchmarks/truth/bake.py writes them, and volumes on their grid."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks.array_types import Array
+from smokelift.footage.images import area_average
 from smokelift.output.archive import VELOCITY, Shape, read_arrays
-from smokelift.scene import SIDES, Side
+from smokelift.scene import SIDES, CompleteScene, Side
 from smokelift.scene.domain import checked_sides
 from smokelift.transport import Velocity, face_shapes
 
@@ -115,3 +116,23 @@ class Truth:
         """Cells where smoke was put into the density of a frame, [x, y, z]."""
         count = int(np.prod(self.shape))
         return np.unpackbits(self.inflow_packed[frame], count=count).reshape(self.shape).astype(bool)
+
+
+def on_grid(scene: CompleteScene, shape: tuple[int, int, int]) -> CompleteScene:
+    """Return a scene whose box has so many voxels."""
+    return replace(scene, domain=replace(scene.domain, resolution=shape))
+
+
+def resampled(values: Array, shape: tuple[int, int, int]) -> Array:
+    """Return a volume (nx, ny, nz, ...) on another grid over the same box.
+
+    Along an axis where that is coarser its values are means, otherwise they are interpolated.
+    """
+    if values.shape[:3] == tuple(shape):
+        return values
+    x, y, z = shape
+    rest = values.shape[3:]
+    flat = area_average(values.reshape(*values.shape[:2], -1), y, x)  # two axes, then the third
+    upright = np.moveaxis(flat.reshape(x, y, values.shape[2], *rest), 2, 0)
+    layers = area_average(upright.reshape(values.shape[2], -1, 1), x * y * int(np.prod(rest, dtype=int)), z)
+    return np.ascontiguousarray(np.moveaxis(layers.reshape(z, x, y, *rest), 0, 2))

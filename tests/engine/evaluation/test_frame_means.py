@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, resampled
 from smokelift.transport import Velocity
 
 SHAPE = (16, 16, 24)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smokelift.evaluation.orbit import Orbit, grey
-from smokelift.evaluation.orbit_page import COLOURS, DEGREES, orbit_curves, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit import COLORS, DEGREES, Orbit, gray, orbit_curves, orbit_tiles, write_orbit_page
 from smokelift.scene import Background, CompleteScene, DirectionalLight, Medium, PointLight, completed
 
 
@@ -47,8 +46,8 @@ def test_smoke_that_only_absorbs_is_seen_by_its_shadow(plume, scene):
         assert np.corrcoef((shadow > 0.05).ravel(), (lit > 0.05).ravel())[0, 1] > 0.8
 
 
-def test_grey_values_are_as_they_are_seen():
-    np.testing.assert_allclose(grey(np.array([[[0.2, 0.2, 0.2], [-1, -1, -1]]])), [[0.2 ** (1 / 2.2), 0]])
+def test_gray_values_are_as_they_are_seen():
+    np.testing.assert_allclose(gray(np.array([[[0.2, 0.2, 0.2], [-1, -1, -1]]])), [[0.2 ** (1 / 2.2), 0]])
 
 
 def test_rows_of_ten_azimuths_above_the_curves(plume, tmp_path):
@@ -62,5 +61,5 @@ def test_rows_of_ten_azimuths_above_the_curves(plume, tmp_path):
     page = np.asarray(Image.open(tmp_path / "page.png"))
     assert page.shape[1] == sum(tile.shape[1] + 4 for tile in tiles) + 4
     assert page.shape[0] > 2 * tiles[0].shape[0] + 100
-    reach = [np.flatnonzero((page[-150:] == colour).all(-1).any(0)) for colour in COLOURS[:2]]
+    reach = [np.flatnonzero((page[-150:] == color).all(-1).any(0)) for color in COLORS[:2]]
     assert reach[0].max() < 0.7 * page.shape[1] < reach[1].max()  # the first ends at 90 degrees

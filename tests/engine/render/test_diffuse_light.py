@@ -107,5 +107,5 @@ def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
 
 
 def test_anisotropic_smoke_is_refused():
-    with pytest.raises(ValueError, match=r"needs anisotropy 0, not 0\.3"):
+    with pytest.raises(ValueError):
         renderer(medium=replace(MEDIUM, anisotropy=0.3))

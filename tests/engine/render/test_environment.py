@@ -156,7 +156,7 @@ def test_negative_values_count_as_black(light_of, tmp_path: Path) -> None:
 def test_values_that_are_not_finite_are_refused(tmp_path: Path, value: float) -> None:
     radiance = np.ones((8, 16, 3))
     radiance[3, 4, 1] = value
-    with pytest.raises(ImageError, match=r"broken\.exr: holds values that are not finite; save it with 32-bit"):
+    with pytest.raises(ImageError):
         environment_lights(write_raw(tmp_path / "broken.exr", radiance), 8)
 
 

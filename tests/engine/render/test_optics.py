@@ -35,7 +35,7 @@ def test_unshadowed_source_is_the_radiance_of_thin_smoke() -> None:
 
 def test_a_moving_camera_needs_a_frame() -> None:
     moving = replace(CAMERA, matrices=(CAMERA.matrix, CAMERA.matrix))
-    with pytest.raises(ValueError, match="The camera moves; give the one of a frame"):
+    with pytest.raises(ValueError):
         scene_renderer(replace(SCENE, camera=moving))
 
 

@@ -238,7 +238,7 @@ def test_a_gradient_is_written_where_an_earlier_one_was(density, wall):
 
 def test_a_point_light_inside_the_domain_is_refused():
     lamp = PointLight((0.7, 0.6, 0.8), (1, 1, 1))
-    with pytest.raises(ValueError, match="inside the domain"):
+    with pytest.raises(ValueError):
         Renderer(make_camera((0.3, -2.0, 0.9)), DOMAIN, Medium(), (lamp,), np.zeros(3))
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.evaluation.metrics.inputs import counted, finite_array, pair, relative
-from smokelift.evaluation.metrics.volumes import volume_error
+from smokelift.evaluation.metrics.volumes import checked_mask, finite_array, pair, relative, volume_error
 from smokelift.transport import require_positive
 
 
@@ -19,7 +18,7 @@ def velocity_error(
     Parameters
     ----------
     velocity, truth
-        Vectors at voxel centres, shape (nx, ny, nz, 3), in one unit.
+        Vectors at voxel centers, shape (nx, ny, nz, 3), in one unit.
     mask
         Which voxels count (those with smoke, as a rule), shape (nx, ny, nz); None counts all.
 
@@ -35,7 +34,7 @@ def velocity_error(
         If the shapes differ, a value is not finite, or no voxel counts.
     """
     found, true = pair(velocity, truth)
-    counts = counted(mask, found.shape[:-1])
+    counts = checked_mask(mask, found.shape[:-1])
     u, v = found[counts], true[counts]
     error = relative(float(np.linalg.norm(u - v)), float(np.linalg.norm(v)))
     speed = np.linalg.norm(v, axis=-1)
@@ -49,7 +48,7 @@ def velocity_error(
 
 
 def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayLike | None = None) -> float:
-    """Return the mean |div u| in 1/s of a velocity at voxel centres, measured at the corners between eight voxels.
+    """Return the mean |div u| in 1/s of a velocity at voxel centers, measured at the corners between eight voxels.
 
     Where velocities at the centres are means of opposite faces, that is the mean over the eight voxels of the
     divergence on their faces: zero if that is. Central differences would be small for a smooth flow only.
@@ -59,7 +58,7 @@ def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayL
     velocity
         Shape (nx, ny, nz, 3), m/s.
     voxel_size
-        Edge of a voxel in metres.
+        Edge of a voxel in meters.
     mask
         Which voxels count, shape (nx, ny, nz): a corner counts if all of its eight do. None counts all.
 
@@ -78,9 +77,9 @@ def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayL
         for across in {0, 1, 2} - {axis}:
             slope = (np.delete(slope, 0, across) + np.delete(slope, -1, across)) / 2
         outflow += slope / voxel_size
-    counts = counted(mask, u.shape[:3])
+    counts = checked_mask(mask, u.shape[:3])
     corners = np.lib.stride_tricks.sliding_window_view(counts, (2, 2, 2)).all(axis=(3, 4, 5))
-    return float(np.abs(outflow)[counted(corners, outflow.shape)].mean())
+    return float(np.abs(outflow)[checked_mask(corners, outflow.shape)].mean())
 
 
 def warp_error(

@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
 from smokelift.checks.array_types import Doubles
-from smokelift.evaluation.metrics.inputs import finite_array, relative
+from smokelift.evaluation.metrics.volumes import finite_array, relative
 from smokelift.transport import block_means
 
 PATCH = 7
@@ -30,8 +30,8 @@ PATCHES = 20_000
 """Patches of a picture and scale that count, about, evenly chosen: forty a quantile say enough, and large grids
 have ten times as many."""
 
-SMOKE_SHARE = 0.05
-"""Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
+SMOKE_FRACTION = 0.05
+"""Fraction of a picture's largest value: a patch without a brighter pixel shows no smoke."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ def _mean_ratio(values: Doubles, references: Doubles) -> float:
 def _patches(picture: Doubles) -> Doubles:
     """The patches around pixels with smoke near them, each without its mean, [patch, pixel]; one of zeros if none."""
     around = sliding_window_view(np.pad(picture, PATCH // 2), (PATCH, PATCH))
-    rows, columns = np.nonzero(around.max((2, 3)) > SMOKE_SHARE * picture.max())
+    rows, columns = np.nonzero(around.max((2, 3)) > SMOKE_FRACTION * picture.max())
     step = max(1, len(rows) // PATCHES)
     chosen = around[rows[::step], columns[::step]].reshape(-1, PATCH**2)
     return chosen - chosen.mean(1, keepdims=True) if len(chosen) else np.zeros((1, PATCH**2))
@@ -136,6 +136,6 @@ def _quantiles(values: Doubles) -> Doubles:
     ordered = np.sort(values.astype(np.float32), axis=1)
     place = (np.arange(QUANTILES) + 0.5) / QUANTILES * (values.shape[1] - 1)
     below = place.astype(int)
-    share = place - below
+    fraction = place - below
     above = np.minimum(below + 1, values.shape[1] - 1)
-    return np.asarray((1 - share) * ordered[:, below] + share * ordered[:, above])
+    return np.asarray((1 - fraction) * ordered[:, below] + fraction * ordered[:, above])

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
-from smokelift.evaluation.metrics.inputs import counted, pair
+from smokelift.evaluation.metrics.volumes import checked_mask, pair
 from smokelift.transport import require_positive
 
 
@@ -36,7 +36,7 @@ def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, 
     require_positive("peak", peak)
     first, second = pair(a, b)
     error = (first - second) ** 2
-    mean = float(error[counted(mask, error.shape)].mean())
+    mean = float(error[checked_mask(mask, error.shape)].mean())
     return math.inf if mean == 0.0 else 10.0 * math.log10(peak**2 / mean)
 
 

@@ -1,6 +1,6 @@
 """Shapes of smoke along rays: how it stands in depth, whatever its texture.
 
-Lengths are in shares of the smoke's width: its standard deviation across its rows, the mean over the smoke.
+Lengths are in units of the smoke's width: its standard deviation across its rows, the mean over the smoke.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks.array_types import Doubles
-from smokelift.evaluation.metrics.inputs import finite_array
+from smokelift.evaluation.metrics.volumes import finite_array
 
-PART_SHARE = 0.2
-"""Share of a ray's largest density from which on its smoke is in a part of it."""
+PART_FRACTION = 0.2
+"""Fraction of a ray's largest density from which on its smoke is in a part of it."""
 
-MODE_SHARE = 0.1
-"""Share of the smoke of a ray's parts from which on its second largest part counts as another mode."""
+MODE_FRACTION = 0.1
+"""Fraction of the smoke of a ray's parts from which on its second largest part counts as another mode."""
 
 FAINT_RAY, FAINT_ROW = 0.1, 0.02
-"""Shares of the smoke of a usual ray (the ninth decile) and of the largest row, below which one does not count."""
+"""Fractions of the smoke of a usual ray (the ninth decile) and of the largest row, below which one does not count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class RayShapes:
     Attributes
     ----------
     several_modes
-        Share of the smoke on rays that meet several lobes, with a gap between them.
+        Fraction of the smoke on rays that meet several lobes, with a gap between them.
     scatter
         Standard deviation of the rays' middles about the middle of their row, over the row's standard deviation along
         the rays: 0 where smoke is symmetric about an upright plane, 1 where each ray is short.
@@ -96,7 +96,7 @@ class RayShapes:
 
 def _several_modes(rays: Doubles) -> npt.NDArray[np.bool_]:
     """Whether rays (columns, rows, voxels) have a second part that counts."""
-    inside = rays > PART_SHARE * rays.max(-1, keepdims=True)
+    inside = rays > PART_FRACTION * rays.max(-1, keepdims=True)
     starts = inside.copy()
     starts[..., 1:] &= ~inside[..., :-1]
     # parts are numbered along the rays, one ray after the other
@@ -110,4 +110,4 @@ def _several_modes(rays: Doubles) -> npt.NDArray[np.bool_]:
     total = np.bincount(ray, masses, minlength=inside[..., 0].size)
     found = np.zeros(total.shape)
     found[ray[second]] = masses[second]
-    return np.asarray(found > MODE_SHARE * total).reshape(inside.shape[:-1])
+    return np.asarray(found > MODE_FRACTION * total).reshape(inside.shape[:-1])
