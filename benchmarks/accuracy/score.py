@@ -21,8 +21,7 @@ from smokelift.evaluation import metrics
 from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.orbit_shapes import SHAPES
-from smokelift.evaluation.resampling import on_grid, resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, on_grid, resampled
 from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array

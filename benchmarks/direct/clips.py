@@ -11,8 +11,7 @@ from benchmarks.accuracy.score import BLACK, KnownDensities, known_densities
 from smokelift.direct import SmokeState, complete_velocity
 from smokelift.evaluation import metrics
 from smokelift.evaluation.frame_means import PictureMeans
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, resampled
 from smokelift.render import scene_renderer
 from smokelift.transport import Array, Velocity, on_faces
 

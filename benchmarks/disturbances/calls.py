@@ -13,7 +13,7 @@ from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
 from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values, finite_mean
 from smokelift.evaluation.metrics import psnr, velocity_error
-from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Method, compose
 from smokelift.render import scene_renderer
 from smokelift.setup.prepare import prepare_shot

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from benchmarks.accuracy.scenes import BakedViews
 from smokelift import Camera, Medium, Scene
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, resampled
 from smokelift.footage.images import Picture
 from smokelift.render import Renderer
 from smokelift.scene import DirectionalLight, Domain

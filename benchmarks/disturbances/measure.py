@@ -9,7 +9,7 @@ from benchmarks.disturbances.known import FRONT, GRID, Known, Take
 from smokelift import Reconstruction, Settings, prepare_shot
 from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values, finite_mean
 from smokelift.evaluation.metrics import psnr, velocity_error, volume_error
-from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Frame, compose
 from smokelift.render import scene_renderer
 from smokelift.scene import CompleteScene

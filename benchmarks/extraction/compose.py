@@ -15,8 +15,7 @@ from benchmarks.background.clips import FPS, Smoke, drift, eight_bits, exposed, 
 from benchmarks.extraction.plates import BLACK, plate, plate_name
 from benchmarks.truth.clip import write_video
 from smokelift import Background, Camera, ClipSource, Scene
-from smokelift.evaluation.resampling import on_grid
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, on_grid
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
 from smokelift.render import scene_renderer

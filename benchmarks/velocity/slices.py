@@ -18,8 +18,7 @@ import numpy.typing as npt
 
 from benchmarks.velocity.accuracy import CHAIN, estimates
 from benchmarks.velocity.pairs import near_smoke
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, resampled
 
 RUN = "balanced:detail=0"
 
