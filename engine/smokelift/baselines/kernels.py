@@ -13,6 +13,8 @@ import taichi as ti
 from smokelift.render.gpu.light_kernels import (
     affine,
     faces_voxel,
+    integers3,
+    ndarray2,
     ndarray3,
     ndarray4,
     parallel_at_voxel,
@@ -21,16 +23,6 @@ from smokelift.render.gpu.light_kernels import (
     vec2,
     vec3,
 )
-
-ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
-samples_type = ti.types.ndarray(dtype=ti.i32, ndim=3)
-
-
-@ti.kernel
-def pack(density: ndarray3, extinction: ndarray4, per_density: ti.f32):
-    """Write the extinction (1/m) of every voxel; ``per_density`` is that at density 1."""
-    for index in ti.grouped(ti.ndrange(*density.shape)):
-        extinction[index[0] + 1, index[1] + 1, index[2] + 1, 0] = per_density * density[index]
 
 
 @ti.func
@@ -143,7 +135,7 @@ def march(
     inscatter: ndarray4,
     first: ndarray3,
     step: ndarray3,
-    samples: samples_type,
+    samples: integers3,
     position: ndarray2,
     grad: ndarray2,
     scattered: ndarray3,
@@ -195,7 +187,7 @@ def march(
 def accumulate(
     position: ndarray2,
     grad: ndarray2,
-    samples: samples_type,
+    samples: integers3,
     of_scattered: ndarray3,
     of_every_sample: ndarray2,
     gradient: ndarray3,

@@ -33,7 +33,6 @@ trilinearly, and the record is spread with the same weights.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +42,9 @@ from smokelift.render.gpu import taichi_runtime as taichi
 
 # isort: split
 # what imports Taichi comes after the runtime, which suppresses its greeting
-from smokelift.baselines import kernels as kernels
-from smokelift.render.gpu import light_kernels
+from smokelift.baselines import kernels
+from smokelift.render.gpu import camera_kernels
+from smokelift.render.gpu.backend import LightColumns, energy, face_rays, slopes
 from smokelift.render.light_sweeps import ParallelSweep
 from smokelift.render.plan import plan_render
 from smokelift.render.renderer import Image, Volume
@@ -75,13 +75,14 @@ class PaperRenderer:
         self._shadows = setup.shadows
         self._lights = setup.lighting.lights
         # without lights a black one: kernels want a channel
-        self._colour = setup.lighting.colour if self._lights else np.zeros((1, 3))
-        self._channels = len(self._colour)
+        self._color = setup.lighting.color if self._lights else np.zeros((1, 3))
+        self._channels = len(self._color)
         x, y, z = domain.resolution
         self._to_eye = taichi.matrix(setup.to_eye)
         self._extinction = taichi.zeros((x + 2, y + 2, z + 2, 1))
         self._inscatter = taichi.zeros((x, y, z, 2 * self._channels))
-        self._columns: dict[tuple[int, int, int], Any] = {}
+        self._columns = LightColumns(domain.resolution)
+        self._voxels = taichi.upload(setup.marked)
         if self._lights and not self._shadows:
             self._shade()  # with no extinction yet
         first, step, count = _samples(camera, domain)
@@ -97,7 +98,7 @@ class PaperRenderer:
 
     def image(self, density: Volume) -> Image:
         """Render a density (nx, ny, nz) in linear radiance (rows, columns, 3), and record its derivatives."""
-        kernels.pack(taichi.upload(density), self._extinction, self.medium.extinction)
+        camera_kernels.pack(taichi.upload(density), self._voxels, self._extinction, self.medium.extinction)
         if self._shadows:
             self._shade()
         kernels.march(
@@ -106,7 +107,7 @@ class PaperRenderer:
             self.medium.extinction, self.domain.voxel_size, self._shadows, self._channels,
         )  # fmt: skip
         scattered = taichi.download(self._scattered)
-        return np.asarray(scattered @ self._colour + self._transmittance[..., None] * self._background, np.float32)
+        return np.asarray(scattered @ self._color + self._transmittance[..., None] * self._background, np.float32)
 
     def gradient(self, image_gradient: Image) -> Volume:
         """The paper's densityGrad (nx, ny, nz) for dloss / dimage (rows, columns, 3), from the last image's record."""
@@ -116,7 +117,7 @@ class PaperRenderer:
         gradient = taichi.zeros(self.domain.resolution)
         kernels.accumulate(
             self._position, self._grad, self._samples,
-            taichi.upload(of_image @ self._colour.T), taichi.upload(of_every_sample), gradient, self._channels,
+            taichi.upload(of_image @ self._color.T), taichi.upload(of_every_sample), gradient, self._channels,
         )  # fmt: skip
         return np.asarray(taichi.download(gradient))
 
@@ -126,31 +127,20 @@ class PaperRenderer:
 
     def _shade(self) -> None:
         """Make the volume of in-scattered radiance, by the exact renderer's sweeps."""
-        h, medium = self.domain.voxel_size, self.medium
+        medium = self.medium
+        further = (self._to_eye, medium.anisotropy, medium.albedo, self.domain.voxel_size, self._channels)
         for number, light in enumerate(self._lights):
-            energy = taichi.vector(np.resize(light.energy, 3))
-            scatters = (energy, self._to_eye, medium.anisotropy, medium.albedo, h, self._channels, number)
             if isinstance(light, ParallelSweep):
-                slopes = (*light.slope, light.first)
-                x, y, z = (n + (axis != light.axis) for axis, n in enumerate(self.domain.resolution))
-                columns = self._buffer((x, y, z))
-                light_kernels.accumulate_columns(self._extinction, columns, light.axis, light.travel, *slopes)
+                columns = self._columns.parallel(self._extinction, light, light.travel)
                 kernels.shade_parallel(
-                    columns, self._inscatter, light.axis, *slopes, light.step,
-                    taichi.vector(light.direction), *scatters,
+                    columns, self._inscatter, *slopes(light), light.step, taichi.vector(light.direction),
+                    energy(light), *further, number,
                 )  # fmt: skip
                 continue
             for face in light.faces:
-                columns = self._buffer((face.planes, face.columns_b[1], face.columns_c[1]))
-                begin = taichi.vector(np.array([face.columns_b[0], face.columns_c[0]]))
-                rays = (face.axis, face.travel, face.first, face.far, begin, taichi.vector(light.position))
-                light_kernels.accumulate_rays(self._extinction, columns, *rays, light.voxel_size)
-                kernels.shade_point(columns, self._inscatter, *rays, *scatters)
-
-    def _buffer(self, shape: tuple[int, int, int]) -> Any:
-        if shape not in self._columns:
-            self._columns[shape] = taichi.zeros(shape)
-        return self._columns[shape]
+                columns = self._columns.point(self._extinction, light, face)
+                rays = face_rays(light, face)
+                kernels.shade_point(columns, self._inscatter, *rays, energy(light), *further, number)
 
 
 def _samples(camera: Camera, domain: Domain) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:

@@ -23,7 +23,7 @@ from smokelift.footage.images import Picture
 from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
 from smokelift.render import Volume
-from smokelift.render.blas import products_on_one_thread
+from smokelift.render.device import products_on_one_thread
 from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity

@@ -1,6 +1,6 @@
 """Camera rays in grid coordinates.
 
-Every ray is sampled where it crosses the planes of voxel centres of its own dominant axis, so a sample needs a
+Every ray is sampled where it crosses the planes of voxel centers of its own dominant axis, so a sample needs a
 bilinear look-up in one plane, and the position in the plane is linear in the plane's number:
 
     position_b(k) = start_b + slope_b k,   |slope_b| <= 1.
@@ -32,7 +32,7 @@ class Rays:
     Attributes
     ----------
     lines : (rows, columns, 4) float32
-        start_b, slope_b, start_c, slope_c in voxel units, voxel centres at integers.
+        start_b, slope_b, start_c, slope_c in voxel units, voxel centers at integers.
     length : (rows, columns) float32
         Distance between samples, m.
     planes : (rows, columns, 4) int32

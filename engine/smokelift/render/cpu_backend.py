@@ -42,7 +42,7 @@ class RaySupport:
 
 
 class CpuBackend:
-    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them.
+    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colors of them.
 
     `ray_support` is that of another backend, or found anew.
     """

@@ -1,15 +1,24 @@
 """Which device renders: the processor with compiled code, or, if it is asked for, a GPU with Taichi.
 
 Taichi may be missing, and importing it takes longer than all that is estimated before a run.
+
+Beside them OpenBLAS, which comes with NumPy and SciPy, has threads that wait actively for milliseconds after every
+product. They keep the cores from the engine's own threads: a frame of 64 x 64 x 96 voxels takes 1.6 times as long
+beside them on two cores (docs/experiments/memory-and-time.md). The command ``smokelift`` starts without them.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from contextlib import AbstractContextManager
+from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal
+
+import scipy.linalg  # noqa: F401  its OpenBLAS is another than NumPy's, and is limited only if it is loaded
+from threadpoolctl import ThreadpoolController
 
 from smokelift.render.cpu_backend import CpuBackend, RaySupport
 from smokelift.render.plan import RenderPlan
@@ -102,3 +111,15 @@ def driver_installed() -> bool:
             continue
         return True
     return False
+
+
+def products_on_one_thread() -> AbstractContextManager[Any]:
+    """Within this context products take one thread, and after it as many as before."""
+    limit: AbstractContextManager[Any] = _libraries().limit(limits=1, user_api="blas")
+    return limit
+
+
+@lru_cache(maxsize=1)
+def _libraries() -> ThreadpoolController:
+    """Return the libraries that are loaded; to find them takes as long as a picture."""
+    return ThreadpoolController()

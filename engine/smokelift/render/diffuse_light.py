@@ -33,7 +33,7 @@ class DiffuseLight:
         self._support = support
         albedos = plan.medium.albedos
         self._albedo = max(albedos)
-        # grey smoke scatters all channels alike, whatever colours they are
+        # gray smoke scatters all channels alike, whatever colors they are
         whole = slice(0, FIELDS * plan.lighting.channels)
         self._alike = [(self._albedo, whole)] if plan.medium.is_grey else _channels(albedos)
         shares = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo

@@ -27,7 +27,7 @@ from smokelift.scene.projection import project_points
 def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:
     """The light of a flame as a camera that stands still sees it through smoke, radiance (rows, columns).
 
-    What the smoke scatters of it is left out. The flame (nx, ny, nz), radiance per metre, is not negative; the optics
+    What the smoke scatters of it is left out. The flame (nx, ny, nz), radiance per meter, is not negative; the optics
     give the domain, and the smoke's extinction.
     """
     width, height = camera.size
@@ -41,7 +41,7 @@ def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> I
 
 
 def emission_matrix(density: Volume, camera: Camera, optics: Optics, pixels: Mask, voxels: Mask) -> sparse.csr_array:
-    """The matrix, in metres, that turns the emission of some voxels into the light that some pixels get of it.
+    """The matrix, in meters, that turns the emission of some voxels into the light that some pixels get of it.
 
     Its rows are the marked pixels (rows, columns), its columns the marked voxels (nx, ny, nz), in the order of
     `numpy.flatnonzero`. Density, camera and optics are as in `emitted`.
@@ -82,8 +82,8 @@ def _samples(
                     continue
                 b, c = (lines[here, n] + lines[here, n + 1] * k for n in (0, 2))
                 voxels, shares = [], []
-                for i, near_b in _neighbours(b, shape[b_axis]):
-                    for j, near_c in _neighbours(c, shape[c_axis]):
+                for i, near_b in _neighbors(b, shape[b_axis]):
+                    for j, near_c in _neighbors(c, shape[c_axis]):
                         voxels.append(k * strides[axis] + i * strides[b_axis] + j * strides[c_axis])
                         shares.append(near_b * near_c)
                 places, share = np.array(voxels), np.array(shares)
@@ -94,7 +94,7 @@ def _samples(
                 yield here, places, share * step
 
 
-def _neighbours(place: NDArray[np.float32], count: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float32]]]:
+def _neighbors(place: NDArray[np.float32], count: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float32]]]:
     """The two voxels of a row beside some places, and their linear weights: 0 outside the grid."""
     low = np.floor(place).astype(np.intp)
     for index, weight in ((low, 1 - (place - low)), (low + 1, place - low)):

@@ -14,7 +14,7 @@ MIN_LIGHTS, MAX_LIGHTS = 4, 256
 
 TOLERANCE = 0.01
 """Relative L2 change of the picture. Single scattering at a voxel a step is itself good to a few tenths of a percent,
-and one code value of an 8-bit picture is half a percent of middle grey (docs/experiments/renderer-agreement.md)."""
+and one code value of an 8-bit picture is half a percent of middle gray (docs/experiments/renderer-agreement.md)."""
 
 REFERENCE_VOXELS = 28
 """Voxels along the longest edge of the smoke that the number is chosen with: enough for its lumps, and quick."""
@@ -59,7 +59,7 @@ def _coarse(domain: Domain) -> Domain:
 
 
 def _coarse_camera(camera: Camera, domain: Domain) -> Camera:
-    """The camera with pixels about as wide as voxels at the domain's centre."""
+    """The camera with pixels about as wide as voxels at the domain's center."""
     width, height = camera.size
     shrink = max(1.0, voxel_width(camera, domain), max(width, height) / REFERENCE_PIXELS)
     return camera.resized(max(1, round(width / shrink)), max(1, round(height / shrink)))

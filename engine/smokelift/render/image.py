@@ -24,13 +24,13 @@ def render(density: Volume, scene: Scene, camera: Camera | None = None) -> Image
     Parameters
     ----------
     density : (nx, ny, nz)
-        Density at voxel centres, >= 0.
+        Density at voxel centers, >= 0.
     scene
         Needs a domain, and a camera unless one is given. What else it leaves open takes the defaults of
         `smokelift.scene.completed`: single scattering, and black behind the smoke.
     camera
         Another camera than the scene's. The scene's background picture belongs to the scene's camera, so before
-        another camera a picture is replaced by its mean colour.
+        another camera a picture is replaced by its mean color.
 
     Returns
     -------

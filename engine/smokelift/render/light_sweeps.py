@@ -92,7 +92,7 @@ class PointSweep:
     Attributes
     ----------
     position : (3,)
-        In the box's grid coordinates: voxel centres at integers.
+        In the box's grid coordinates: voxel centers at integers.
     energy : (channels,)
         Intensity over the voxel edge squared, W/m^2: the irradiance one voxel away.
     voxel_size
@@ -116,17 +116,17 @@ class Lighting:
     ----------
     lights
         The sweeps to do.
-    colour : (channels, 3)
-        Turns the channels into colours. Light of one colour needs one channel, other light three.
+    color : (channels, 3)
+        Turns the channels into colors. Light of one color needs one channel, other light three.
     """
 
     lights: tuple[ParallelSweep | PointSweep, ...]
-    colour: Doubles
+    color: Doubles
 
     @property
     def channels(self) -> int:
         """How many channels of in-scattered radiance there are: 0, 1 or 3."""
-        return len(self.colour)
+        return len(self.color)
 
 
 def lighting(
@@ -139,35 +139,35 @@ def lighting(
 ) -> Lighting:
     """Lights over a box of a domain's voxels, by its first voxel and its size; those without energy are left out.
 
-    The lights' energy is multiplied by a share of red, green and blue, the colour of the smoke. With `split` each
-    colour has a channel of its own, although one may do. A point light inside the domain or too far away raises a
+    The lights' energy is multiplied by a fraction of red, green and blue, the color of the smoke. With `split` each
+    color has a channel of its own, although one may do. A point light inside the domain or too far away raises a
     SceneError.
     """
-    bright = [light for light in lights if (np.array(_colour(light)) * scattered).max() >= DARKEST]
+    bright = [light for light in lights if (np.array(_color(light)) * scattered).max() >= DARKEST]
     if not bright:
         return Lighting((), np.zeros((0, 3)))
-    colours = np.array([_colour(light) for light in bright], np.float64) * scattered
-    colour, energies = (np.eye(3), colours) if split else _channels(colours)
+    colors = np.array([_color(light) for light in bright], np.float64) * scattered
+    color, energies = (np.eye(3), colors) if split else _channels(colors)
     sweeps = [
         _point(light, energy, domain, corner, shape)
         if isinstance(light, PointLight)
         else _parallel(light, energy, domain, corner)
         for light, energy in zip(bright, energies, strict=True)
     ]
-    return Lighting(tuple(sweeps), colour)
+    return Lighting(tuple(sweeps), color)
 
 
-def _colour(light: FiniteLight) -> tuple[float, float, float]:
+def _color(light: FiniteLight) -> tuple[float, float, float]:
     return light.irradiance if isinstance(light, DirectionalLight) else light.intensity
 
 
-def _channels(colours: Doubles) -> tuple[Doubles, Doubles]:
-    """Split colours (lights, 3) into energies (lights, channels) and the channels' colours (channels, 3)."""
-    first = colours[0]
-    share = colours @ first / (first @ first)
-    if np.allclose(colours, share[:, None] * first, rtol=1e-6, atol=0):
-        return first[None], share[:, None]
-    return np.eye(3), colours
+def _channels(colors: Doubles) -> tuple[Doubles, Doubles]:
+    """Split colors (lights, 3) into energies (lights, channels) and the channels' colors (channels, 3)."""
+    first = colors[0]
+    energies = colors @ first / (first @ first)
+    if np.allclose(colors, energies[:, None] * first, rtol=1e-6, atol=0):
+        return first[None], energies[:, None]
+    return np.eye(3), colors
 
 
 def _parallel(light: DirectionalLight, energy: Doubles, domain: Domain, corner: Voxel) -> ParallelSweep:

@@ -35,7 +35,7 @@ class RenderPlan:
     to_eye : (3, 4)
         Affine map from a voxel's index in the box to the direction from there to the eye, of any length.
     lighting
-        The lights, in coordinates of the box, in the smoke's colour. Without channels the smoke only absorbs.
+        The lights, in coordinates of the box, in the smoke's color. Without channels the smoke only absorbs.
     shadows
         Whether light is attenuated on its way to the voxels.
     diffuse
@@ -82,11 +82,11 @@ def plan_render(
         )
     if support is None:
         support = np.broadcast_to(np.True_, domain.resolution)
-    # with the neighbours of the voxels that may hold smoke; one voxel if none may
+    # with the neighbors of the voxels that may hold smoke; one voxel if none may
     x, y, z = part = box_around(support, 1) if support.any() else (slice(0, 1),) * 3
     corner, box = (x.start, y.start, z.start), domain.part(part)
     scatters = () if scattering == "absorption" else lights
-    # light that is scattered again takes on more of the smoke's colour
+    # light that is scattered again takes on more of the smoke's color
     split = scattering == "multiple" and not medium.is_grey
     found = lighting(scatters, domain, corner, box.resolution, medium.color, split)
     return RenderPlan(

@@ -1,10 +1,10 @@
 """One camera before one grid: a density in, an image out, and the derivative back.
 
-Smoke takes the same share of all colours away, so a picture is scattered radiance S, in one channel where all that is
-scattered has the same colour and in three otherwise, and transmittance T = exp(-optical depth). Colours are a matter of
+Smoke takes the same fraction of all colors away, so a picture is scattered radiance S, in one channel where all that is
+scattered has the same color and in three otherwise, and transmittance T = exp(-optical depth). Colors are a matter of
 the last line:
 
-    L_rgb = S colour + T background_rgb.
+    L_rgb = S color + T background_rgb.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render.blas import products_on_one_thread
 from smokelift.render.cpu_backend import RaySupport
+from smokelift.render.device import products_on_one_thread
 from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 
@@ -65,8 +65,8 @@ class Renderer:
         self.camera, self.domain, self.medium = camera, domain, medium
         plan = plan_render(camera, domain, medium, lights, scattering, support)
         self._background = np.asarray(background, np.float32)
-        sent = np.asarray(plan.lighting.colour, np.float32)
-        self._colour = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
+        sent = np.asarray(plan.lighting.color, np.float32)
+        self._color = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
         self._backend = device.backend(plan, ray_support)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
@@ -76,7 +76,7 @@ class Renderer:
         Parameters
         ----------
         density : (nx, ny, nz) float32
-            At voxel centres, finite and >= 0.
+            At voxel centers, finite and >= 0.
         keep_record
             Keep what `gradient` needs: channels + 1 numbers a sample of every ray.
 
@@ -87,8 +87,8 @@ class Renderer:
         """
         scattered, self._depth = self._backend.image(density, keep_record)
         with products_on_one_thread():
-            coloured = scattered @ self._colour
-        return np.asarray(coloured + self.transmittance[..., None] * self._background)
+            colored = scattered @ self._color
+        return np.asarray(colored + self.transmittance[..., None] * self._background)
 
     @property
     def ray_support(self) -> RaySupport | None:
@@ -98,7 +98,7 @@ class Renderer:
     @property
     def absorbs_only(self) -> bool:
         """Whether no light is scattered: pictures are the attenuated background."""
-        return not self._colour.size
+        return not self._color.size
 
     @property
     def transmittance(self) -> Image:
@@ -125,5 +125,5 @@ class Renderer:
         background = np.broadcast_to(self._background, image_gradient.shape)
         transmittance_gradient = np.einsum("...c,...c", image_gradient, background)
         with products_on_one_thread():
-            scattered_gradient = np.ascontiguousarray(image_gradient @ self._colour.T)
+            scattered_gradient = np.ascontiguousarray(image_gradient @ self._color.T)
         return self._backend.gradient(scattered_gradient, transmittance_gradient, out)

@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift import _core
-from smokelift.render.blas import products_on_one_thread
+from smokelift.render.device import products_on_one_thread
 
 LARGE_PAGE = 1 << 21
 

@@ -13,12 +13,12 @@ from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
 from smokelift.render.gpu import taichi_runtime as taichi
-from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep
+from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep, Shape
 from smokelift.render.plan import RenderPlan
 
 
 class GpuBackend:
-    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them."""
+    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colors of them."""
 
     ray_support = None
 
@@ -28,7 +28,7 @@ class GpuBackend:
         x, y, z = plan.shape
         self._box = tuple(slice(c, c + n) for c, n in zip(plan.corner, plan.shape, strict=True))
         near = ndimage.binary_dilation(plan.marked, np.ones((3, 3, 3)))
-        self._marked = taichi.upload(plan.marked.astype(np.int32))
+        self._marked = taichi.upload(plan.marked)
         self._near = taichi.upload(near.astype(np.int32))
         self._padded = (x + 2, y + 2, z + 2)
         self._medium = taichi.zeros((*self._padded, self._channels + 1))
@@ -42,7 +42,7 @@ class GpuBackend:
         self._gradient: Any = None
         self._scratch: Any = None
         self._to_eye = taichi.matrix(plan.to_eye)
-        self._columns: dict[tuple[int, int, int], Any] = {}
+        self._columns = LightColumns(plan.shape)
         self._diffuse = DiffuseLight(plan, _core.Support(plan.marked)) if plan.diffuse else None
         if self._channels and not plan.shadows:
             self._shade()
@@ -72,9 +72,8 @@ class GpuBackend:
         plan = self._plan
         if self._gradient is None:
             self._gradient = taichi.zeros((*self._padded, self._channels + 1))
-        scattered_gradient = (
-            scattered_gradient if self._channels else np.zeros((*transmittance_gradient.shape, 1), np.float32)
-        )
+        if not self._channels:
+            scattered_gradient = np.zeros((*transmittance_gradient.shape, 1), np.float32)
         camera.march_adjoint(
             self._record, self._length, self._planes, self._depth,
             taichi.upload(scattered_gradient), taichi.upload(transmittance_gradient), self._channels,
@@ -115,59 +114,72 @@ class GpuBackend:
             if isinstance(sweep, ParallelSweep):
                 self._scatter(sweep, self._gradient, self._scratch, 0, adjoint=True)
                 # the adjoint of the sweep is that of the light that travels the other way
-                columns = self._sweep(self._scratch, sweep, -sweep.travel)
-                light.add_parallel_shadow(columns, self._near, self._gradient, *_slopes(sweep), sweep.step)
+                columns = self._columns.parallel(self._scratch, sweep, -sweep.travel)
+                light.add_parallel_shadow(columns, self._near, self._gradient, *slopes(sweep), sweep.step)
                 continue
             for face in sweep.faces:
                 columns = self._scatter_face(sweep, face, self._gradient, self._scratch, 0, adjoint=True)
-                rays = _rays(sweep, face)
+                rays = face_rays(sweep, face)
                 light.gather_rays(self._scratch, columns, *rays, sweep.voxel_size)
                 light.add_point_shadow(columns, self._near, self._gradient, *rays)
 
     def _scatter(self, sweep: ParallelSweep, source: Any, result: Any, add: int, *, adjoint: bool) -> None:
-        columns = self._sweep(self._medium, sweep, sweep.travel)
+        columns = self._columns.parallel(self._medium, sweep, sweep.travel)
         light.scatter_parallel(
-            columns, self._near, source, result, *_slopes(sweep), sweep.step, taichi.vector(sweep.direction),
-            self._energy(sweep), self._to_eye, *self._phase, add, adjoint,
+            columns, self._near, source, result, *slopes(sweep), sweep.step, taichi.vector(sweep.direction),
+            energy(sweep), self._to_eye, *self._phase, add, adjoint,
         )  # fmt: skip
 
     def _scatter_face(self, sweep: PointSweep, face: Face, source: Any, result: Any, add: int, *, adjoint: bool) -> Any:
         """Scatter through one face of a point light, and return its columns."""
-        columns = self._cast(sweep, face)
+        columns = self._columns.point(self._medium, sweep, face)
         light.scatter_point(
-            columns, self._near, source, result, *_rays(sweep, face),
-            self._energy(sweep), self._to_eye, *self._phase, add, adjoint,
+            columns, self._near, source, result, *face_rays(sweep, face),
+            energy(sweep), self._to_eye, *self._phase, add, adjoint,
         )  # fmt: skip
         return columns
-
-    def _sweep(self, voxels: Any, sweep: ParallelSweep, travel: int) -> Any:
-        x, y, z = (n + (axis != sweep.axis) for axis, n in enumerate(self._plan.shape))
-        columns = self._buffer((x, y, z))
-        light.accumulate_columns(voxels, columns, sweep.axis, travel, *sweep.slope, sweep.first)
-        return columns
-
-    def _cast(self, sweep: PointSweep, face: Face) -> Any:
-        columns = self._buffer((face.planes, face.columns_b[1], face.columns_c[1]))
-        light.accumulate_rays(self._medium, columns, *_rays(sweep, face), sweep.voxel_size)
-        return columns
-
-    def _buffer(self, shape: tuple[int, int, int]) -> Any:
-        if shape not in self._columns:
-            self._columns[shape] = taichi.zeros(shape)
-        return self._columns[shape]
-
-    def _energy(self, sweep: ParallelSweep | PointSweep) -> Any:
-        return taichi.vector(np.resize(sweep.energy, 3))
 
     @property
     def _phase(self) -> tuple[float, float]:
         return self._plan.medium.anisotropy, self._plan.medium.albedo
 
 
-def _slopes(sweep: ParallelSweep) -> tuple[int, float, float, int]:
+class LightColumns:
+    """The columns of lights over a box of voxels, whose memory lights with columns of one shape use in turn."""
+
+    def __init__(self, shape: Shape) -> None:
+        self._shape = shape
+        self._columns: dict[tuple[int, ...], Any] = {}
+
+    def parallel(self, voxels: Any, sweep: ParallelSweep, travel: int) -> Any:
+        """Sums over voxels along the columns of a parallel light, one way or the other along its axis."""
+        columns = self._of_shape(*(n + (axis != sweep.axis) for axis, n in enumerate(self._shape)))
+        light.accumulate_columns(voxels, columns, sweep.axis, travel, *sweep.slope, sweep.first)
+        return columns
+
+    def point(self, medium: Any, sweep: PointSweep, face: Face) -> Any:
+        """Optical depths along the columns through a face of a point light."""
+        columns = self._of_shape(face.planes, face.columns_b[1], face.columns_c[1])
+        light.accumulate_rays(medium, columns, *face_rays(sweep, face), sweep.voxel_size)
+        return columns
+
+    def _of_shape(self, *shape: int) -> Any:
+        if shape not in self._columns:
+            self._columns[shape] = taichi.zeros(shape)
+        return self._columns[shape]
+
+
+def energy(sweep: ParallelSweep | PointSweep) -> Any:
+    """The energy of a light in three channels, as kernels take it."""
+    return taichi.vector(np.resize(sweep.energy, 3))
+
+
+def slopes(sweep: ParallelSweep) -> tuple[int, float, float, int]:
+    """The columns of a parallel light, as kernels take them."""
     return sweep.axis, *sweep.slope, sweep.first
 
 
-def _rays(sweep: PointSweep, face: Face) -> tuple[Any, ...]:
+def face_rays(sweep: PointSweep, face: Face) -> tuple[Any, ...]:
+    """The columns through a face of a point light, as kernels take them."""
     begin = np.array([face.columns_b[0], face.columns_c[0]])
     return face.axis, face.travel, face.first, face.far, taichi.vector(begin), taichi.vector(sweep.position)

@@ -8,14 +8,11 @@ nothing is atomic.
 
 import taichi as ti
 
-from smokelift.render.gpu.light_kernels import affine, cell, hat, mask3, ndarray3, ndarray4, planar
-
-ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
-planes_type = ti.types.ndarray(dtype=ti.i32, ndim=3)
+from smokelift.render.gpu.light_kernels import affine, cell, hat, integers3, ndarray2, ndarray3, ndarray4, planar
 
 
 @ti.kernel
-def pack(density: ndarray3, marked: mask3, medium: ndarray4, extinction: ti.f32):
+def pack(density: ndarray3, marked: integers3, medium: ndarray4, extinction: ti.f32):
     """Extinction of the marked voxels from their density."""
     for i, j, k in ti.ndrange(*marked.shape):
         if marked[i, j, k] != 0:
@@ -47,7 +44,7 @@ def march(
     medium: ndarray4,
     lines: ndarray3,
     length: ndarray2,
-    planes: planes_type,
+    planes: integers3,
     scattered: ndarray3,
     depth: ndarray2,
     record: ndarray4,
@@ -100,7 +97,7 @@ def march(
 def march_adjoint(
     record: ndarray4,
     length: ndarray2,
-    planes: planes_type,
+    planes: integers3,
     depth: ndarray2,
     scattered_gradient: ndarray3,
     transmittance_gradient: ndarray2,
@@ -133,9 +130,9 @@ def march_adjoint(
 def gather_gradient(
     record: ndarray4,
     lines: ndarray3,
-    planes: planes_type,
+    planes: integers3,
     to_pixel: affine,
-    near: mask3,
+    near: integers3,
     gradient: ndarray4,
     axis: ti.template(),
     channels: ti.template(),
@@ -143,7 +140,7 @@ def gather_gradient(
 ):
     """Derivatives by the voxels from those by the samples, for rays of one axis.
 
-    ``near`` marks the voxels that a sample in smoke can touch: those that may hold smoke, and their neighbours.
+    ``near`` marks the voxels that a sample in smoke can touch: those that may hold smoke, and their neighbors.
     A voxel collects the samples of its plane whose bilinear footprint covers it: those in the pixels' bounding box
     of its footprint.
     """
@@ -163,7 +160,7 @@ def gather_gradient(
                 w = ti.max(p[2], 1e-6)
                 low_x, high_x = ti.min(low_x, p[0] / w), ti.max(high_x, p[0] / w)
                 low_y, high_y = ti.min(low_y, p[1] / w), ti.max(high_y, p[1] / w)
-            # pixel centres lie at halves; a hundredth of a pixel is for rounding
+            # pixel centers lie at halves; a hundredth of a pixel is for rounding
             first_column = ti.floor(ti.min(ti.max(low_x - 0.51, -1.0), columns + 1.0), ti.i32)
             first_row = ti.floor(ti.min(ti.max(low_y - 0.51, -1.0), rows + 1.0), ti.i32)
             last_column = ti.min(columns - 1, ti.ceil(ti.max(ti.min(high_x - 0.49, columns + 1.0), -2.0), ti.i32))
@@ -186,7 +183,7 @@ def gather_gradient(
 
 
 @ti.kernel
-def unpack(gradient: ndarray4, marked: mask3, result: ndarray3, extinction: ti.f32):
+def unpack(gradient: ndarray4, marked: integers3, result: ndarray3, extinction: ti.f32):
     """Derivative by the density of the marked voxels."""
     for i, j, k in ti.ndrange(*marked.shape):
         result[i, j, k] = extinction * gradient[i + 1, j + 1, k + 1, 0] if marked[i, j, k] != 0 else 0.0

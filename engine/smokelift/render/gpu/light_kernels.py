@@ -15,9 +15,10 @@ import taichi as ti
 
 from smokelift.render.light_sweeps import CLOSEST
 
+ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
 ndarray3 = ti.types.ndarray(dtype=ti.f32, ndim=3)
 ndarray4 = ti.types.ndarray(dtype=ti.f32, ndim=4)
-mask3 = ti.types.ndarray(dtype=ti.i32, ndim=3)
+integers3 = ti.types.ndarray(dtype=ti.i32, ndim=3)
 vec3 = ti.types.vector(3, ti.f32)
 vec2 = ti.types.vector(2, ti.f32)
 affine = ti.types.matrix(3, 4, ti.f32)
@@ -64,7 +65,7 @@ def _first_channel(voxels: ti.template(), axis: ti.template(), k, i, j):
 
 @ti.func
 def phase(index, to_eye, travel, anisotropy, albedo):
-    """Albedo x Henyey-Greenstein, 1/sr, towards the camera; ``travel`` need not be normalised."""
+    """Albedo x Henyey-Greenstein, 1/sr, towards the camera; ``travel`` need not be normalized."""
     out = ti.Vector([0.0, 0.0, 0.0])
     for row in ti.static(range(3)):
         out[row] = to_eye[row, 0] * index[0] + to_eye[row, 1] * index[1] + to_eye[row, 2] * index[2] + to_eye[row, 3]
@@ -146,7 +147,7 @@ def parallel_at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slop
 @ti.kernel
 def scatter_parallel(
     columns: ndarray3,
-    near: mask3,
+    near: integers3,
     source: ndarray4,
     result: ndarray4,
     axis: ti.template(),
@@ -179,7 +180,7 @@ def scatter_parallel(
 @ti.kernel
 def add_parallel_shadow(
     columns: ndarray3,
-    near: mask3,
+    near: integers3,
     gradient: ndarray4,
     axis: ti.template(),
     slope_b: ti.f32,
@@ -276,7 +277,7 @@ def accumulate_rays(
 @ti.kernel
 def scatter_point(
     columns: ndarray3,
-    near: mask3,
+    near: integers3,
     source: ndarray4,
     result: ndarray4,
     axis: ti.template(),
@@ -345,7 +346,7 @@ def gather_rays(
 @ti.kernel
 def add_point_shadow(
     columns: ndarray3,
-    near: mask3,
+    near: integers3,
     gradient: ndarray4,
     axis: ti.template(),
     travel: ti.i32,
