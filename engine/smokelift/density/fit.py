@@ -28,7 +28,7 @@ from smokelift.extraction import extract_element, usual_source
 from smokelift.footage.given_background import backdrop_colour, background_picture
 from smokelift.footage.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
-from smokelift.render.blas import products_on_one_thread
+from smokelift.render.device import products_on_one_thread
 from smokelift.scene import CompleteScene, Domain, Scene, completed
 from smokelift.scene.domain import box_around
 
