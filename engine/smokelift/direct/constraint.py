@@ -21,14 +21,17 @@ from smokelift.transport import Array, Faces, StaggeredGrid, without_divergence
 
 FaceMasks = tuple[Mask, Mask, Mask]
 
+TOLERANCE = 1e-3
+"""Gradient over the first one at which the iteration ends."""
+
 
 def project_with_given_faces(
-    field: StaggeredGrid, given: FaceMasks, wanted: Faces, *, tolerance: float = 1e-3, limit: int = 60
+    field: StaggeredGrid, given: FaceMasks, wanted: Faces, *, limit: int = 60
 ) -> StaggeredGrid:
     """The nearest field without divergence that has the values wanted on the given faces; others do not count.
 
-    Where no field without divergence has them, the nearest are taken. The iteration ends at a tolerance relative to the
-    first gradient, or after `limit` rounds.
+    Where no field without divergence has them, the nearest are taken. The iteration ends at a `TOLERANCE` relative to
+    the first gradient, or after `limit` rounds.
     """
     weights = [_half_on_sides(len(mask.shape), mask.shape[axis], axis) for axis, mask in enumerate(given)]
 
@@ -44,7 +47,7 @@ def project_with_given_faces(
     solution = projected(list(field.faces))
     residual = projected(restricted([v - u for v, u in zip(wanted, solution, strict=True)]))
     squared = product(residual, residual)
-    goal, search = tolerance**2 * squared, residual
+    goal, search = TOLERANCE**2 * squared, residual
     for _ in range(limit):
         if squared <= goal:
             break

@@ -9,7 +9,6 @@
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
-from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.device import DeviceError, start
 from smokelift.render.image import render, render_gradient
 from smokelift.render.optics import Optics, scene_optics, scene_renderer
@@ -19,7 +18,6 @@ __all__ = [
     "DeviceError",
     "Image",
     "Optics",
-    "RaySupport",
     "Renderer",
     "Volume",
     "render",

@@ -7,7 +7,7 @@ light comes from above or below, y and z change places: the voxels are copied in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,36 +18,10 @@ from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 from smokelift.render.plan import RenderPlan
 
 
-@dataclass(frozen=True, eq=False)
-class RaySupport:
-    """Where a camera's rays meet the voxels that may hold smoke, and the rays as far as such voxels are around them.
-
-    It takes as long to find as a picture, so that renderers of the same camera, domain, support and lights share it.
-    """
-
-    support: _core.Support
-    rays: _core.Rays
-
-    @staticmethod
-    def of(plan: RenderPlan) -> RaySupport:
-        """Find it for a plan."""
-        support = _core.Support(plan.marked)
-        rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
-        if not plan.everywhere:
-            x, y, z = plan.shape
-            mask = _core.zeros((x + 2, y + 2, z + 2, 1))
-            mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
-            rays.clip(support, mask)
-        return RaySupport(support, rays)
-
-
 class CpuBackend:
-    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colors of them.
+    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colors of them."""
 
-    `ray_support` is that of another backend, or found anew.
-    """
-
-    def __init__(self, plan: RenderPlan, ray_support: RaySupport | None = None) -> None:
+    def __init__(self, plan: RenderPlan) -> None:
         self._axes = (0, 1, 2)
         lights = plan.lighting.lights
         parallel = [light for light in lights if isinstance(light, ParallelSweep)]
@@ -58,8 +32,12 @@ class CpuBackend:
         self._plan = plan
         channels = plan.lighting.channels
         x, y, z = plan.shape
-        self.ray_support = ray_support or RaySupport.of(plan)
-        self._support, self._rays = self.ray_support.support, self.ray_support.rays
+        self._support = _core.Support(plan.marked)
+        self._rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
+        if not plan.everywhere:  # rays go as far as voxels that may hold smoke are around them
+            mask = _core.zeros((x + 2, y + 2, z + 2, 1))
+            mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
+            self._rays.clip(self._support, mask)
         # what no sweep touches is never given memory
         self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
         self._gradient: Array | None = None

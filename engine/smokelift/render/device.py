@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import scipy.linalg  # noqa: F401  its OpenBLAS is another than NumPy's, and is limited only if it is loaded
 from threadpoolctl import ThreadpoolController
 
-from smokelift.render.cpu_backend import CpuBackend, RaySupport
+from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.plan import RenderPlan
 
 if TYPE_CHECKING:
@@ -88,10 +88,10 @@ def start(device: DeviceName = "auto") -> str:
     return _running
 
 
-def backend(plan: RenderPlan, ray_support: RaySupport | None = None) -> CpuBackend | GpuBackend:
-    """What renders a plan on the device of this process; a GPU needs no `RaySupport`."""
+def backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
+    """What renders a plan on the device of this process."""
     if start() == "cpu":
-        return CpuBackend(plan, ray_support)
+        return CpuBackend(plan)
     on_gpu: GpuBackend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
     return on_gpu
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.given_background import background_picture
-from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.environment import environment_lights
 from smokelift.render.environment_count import environment_count
 from smokelift.render.renderer import Image, Renderer
@@ -45,17 +44,9 @@ class Optics:
     lights: tuple[FiniteLight, ...]
     scattering: Scattering
 
-    def renderer(
-        self,
-        camera: Camera,
-        background: Image,
-        support: NDArray[np.bool_] | None = None,
-        ray_support: RaySupport | None = None,
-    ) -> Renderer:
+    def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
-        return Renderer(
-            camera, self.domain, self.medium, self.lights, background, self.scattering, support, ray_support
-        )
+        return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
 
     def unshadowed_source(self) -> NDArray[np.float64]:
         """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.

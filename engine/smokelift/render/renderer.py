@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.device import products_on_one_thread
 from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
@@ -42,8 +41,6 @@ class Renderer:
     support : (nx, ny, nz) bool, optional
         Voxels that may hold smoke: what the density says elsewhere does not count, the gradient is zero there, and
         the work follows their number.
-    ray_support
-        Of another renderer with the same camera, domain, support and lights, so that it is not found again.
 
     Raises
     ------
@@ -60,14 +57,13 @@ class Renderer:
         background: Image,
         scattering: Scattering = "single",
         support: NDArray[np.bool_] | None = None,
-        ray_support: RaySupport | None = None,
     ) -> None:
         self.camera, self.domain, self.medium = camera, domain, medium
         plan = plan_render(camera, domain, medium, lights, scattering, support)
         self._background = np.asarray(background, np.float32)
         sent = np.asarray(plan.lighting.color, np.float32)
         self._color = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
-        self._backend = device.backend(plan, ray_support)
+        self._backend = device.backend(plan)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
@@ -89,11 +85,6 @@ class Renderer:
         with products_on_one_thread():
             colored = scattered @ self._color
         return np.asarray(colored + self.transmittance[..., None] * self._background)
-
-    @property
-    def ray_support(self) -> RaySupport | None:
-        """What another renderer of the same camera, domain, support and lights can take over; None on a GPU."""
-        return self._backend.ray_support
 
     @property
     def absorbs_only(self) -> bool:

@@ -240,18 +240,3 @@ def test_a_point_light_inside_the_domain_is_refused():
     lamp = PointLight((0.7, 0.6, 0.8), (1, 1, 1))
     with pytest.raises(ValueError):
         Renderer(make_camera((0.3, -2.0, 0.9)), DOMAIN, Medium(), (lamp,), np.zeros(3))
-
-
-def test_thinner_smoke_is_seen_along_the_same_rays(density):
-    """A renderer that takes over where another one's rays meet the voxels renders as one that looks for itself."""
-    camera, support = make_camera(EYES["along a diagonal"]), density > 0.3
-    thick = Renderer(camera, DOMAIN, Medium(5.0), (), np.ones(3), "absorption", support)
-    thick.image(density)
-    thin = Renderer(camera, DOMAIN, Medium(2.0), (), np.ones(3), "absorption", support, thick.ray_support)
-    alone = Renderer(camera, DOMAIN, Medium(2.0), (), np.ones(3), "absorption", support)
-    picture = thin.image(density, keep_record=True)
-    assert (picture == alone.image(density, keep_record=True)).all()
-    assert picture.min() < 0.9
-    assert (thin.gradient(picture) == alone.gradient(picture)).all()
-    other = Renderer(camera, DOMAIN, Medium(2.0), (), np.ones(3), "absorption", density > 1.0)
-    assert (other.image(density) != picture).any()

@@ -20,8 +20,6 @@ from smokelift.render.plan import RenderPlan
 class GpuBackend:
     """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colors of them."""
 
-    ray_support = None
-
     def __init__(self, plan: RenderPlan) -> None:
         self._plan = plan
         self._channels = plan.lighting.channels
