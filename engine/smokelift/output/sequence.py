@@ -19,7 +19,7 @@ from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from_dict
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
-USUAL_FPS = 24.0
+DEFAULT_FPS = 24.0
 """Frames a second of a sequence whose scene does not say the clip's."""
 
 
@@ -27,7 +27,8 @@ USUAL_FPS = 24.0
 class Sequence:
     """A finished or growing sequence on disk; made by :meth:`open`.
 
-    Its methods raise a SequenceError if there is no frame of a number, or its file is missing or damaged.
+    Its methods raise a SequenceError if there is no frame of a number, or its file is missing, damaged, or not the one
+    that was written.
 
     Attributes
     ----------
@@ -99,22 +100,16 @@ class Sequence:
 
     @property
     def fps(self) -> float:
-        """Frames a second: those of the clip, or `USUAL_FPS` where the scene does not say them."""
+        """Frames a second: those of the clip, or `DEFAULT_FPS` where the scene does not say them."""
         clip = self.scene.clip
-        return (clip.fps if clip is not None else None) or USUAL_FPS
+        return (clip.fps if clip is not None else None) or DEFAULT_FPS
 
     def file_number(self, number: int) -> int:
         """Return the number in the names of a frame's files."""
         return number + self.start_number - 1
 
     def box(self, number: int) -> Domain:
-        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame.
-        """
+        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing."""
         self._check(number)
         return self._boxes[int(number)]
 
@@ -123,13 +118,7 @@ class Sequence:
         return replace(self, scene=replace(self.scene, domain=box))
 
     def density(self, number: int) -> Array:
-        """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, its file is missing or damaged, or a density is negative.
-        """
+        """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one."""
         density = self._read(number, ("density",))["density"]
         if density.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds negative densities; write it again")
@@ -139,11 +128,6 @@ class Sequence:
         """Return the emission of fire in a frame, shape (nx, ny, nz); None where the clip or the file has none.
 
         It is radiance per meter, of the color ``scene.medium.flame_color``.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, its file is missing or damaged, or an emission is negative.
         """
         self._check(number)
         if self.scene.medium.flame_color is None:  # the clip shows no fire: the file need not be read again
@@ -158,11 +142,6 @@ class Sequence:
 
         It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centres beside a face, zero
         further than two voxels from smoke and not free of divergence.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
         """
         arrays = self._read(number, VELOCITY)
         if "velocity" in arrays:
@@ -176,22 +155,12 @@ class Sequence:
 
         These are the values of an OpenVDB file as it holds them; those of :meth:`velocity` are smoothed by the way to
         faces and back.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
         """
         arrays = self._read(number, VELOCITY)
         return arrays["velocity"] if "velocity" in arrays else self.velocity(number).centres()
 
     def files(self, number: int) -> Mapping[str, Path]:
         """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or a file is not the one that was written.
         """
         self._check(number)
         paths = {kind: frame_path(self.directory, self.file_number(number), kind) for kind in ("vdb", "npz")}
@@ -216,22 +185,11 @@ class Sequence:
         -------
         (rows, columns, 3) float32
             Linear radiance before the background that :class:`Viewer` describes.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
         """
         return Viewer(self.scene, camera).image(number, self.density(number), self.flame(number))
 
     def figures(self, number: int) -> Mapping[str, Any]:
-        """Return what was noted about a frame.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame.
-        """
+        """Return what was noted about a frame."""
         self._check(number)
         return self._figures[str(number)]
 
