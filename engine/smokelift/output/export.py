@@ -1,4 +1,4 @@
-"""Writes what others need of a sequence: OpenVDB files that are as small as the picture allows, a proxy and a USD file.
+"""Writes what others need of a sequence: OpenVDB files as small as the picture allows, a USD file, and proxies.
 
 What is left out or rounded does not show in a picture of 8 bits:
 
@@ -29,10 +29,9 @@ from smokelift.output.archive import FLAME
 from smokelift.output.files import INDEX, atomic_path, frame_path, proxy_path
 from smokelift.output.host import HOSTS, Host, HostName
 from smokelift.output.index import SequenceError
-from smokelift.output.proxy_files import write_proxy
 from smokelift.output.sequence import Sequence
 from smokelift.output.usd import UsdVolume, light_properties, usd_text
-from smokelift.output.vdb import vdb_module, write_vdb
+from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
 from smokelift.scene import Domain, Medium
 from smokelift.transport import Array
 
@@ -275,6 +274,23 @@ class _Export:
             "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},
             "provenance": [dict(part) for part in sequence.provenance],
         }
+
+
+def write_proxies(sequence: Sequence) -> Iterator[int]:
+    """Write the coarse copies of all frames of a sequence into its directory, and yield their numbers.
+
+    It raises SequenceError if there are no frames, or a file cannot be read or written, and VdbUnavailable.
+    """
+    vdb_module()
+    if not sequence.frames:
+        raise SequenceError(f"{sequence.directory}: has no finished frame to make a proxy of yet.")
+    for number in sequence.frames:
+        path = proxy_path(sequence.directory, sequence.file_number(number))
+        try:
+            write_proxy(path, sequence.density(number), sequence.scene.domain, flame=sequence.flame(number))
+        except OSError as error:
+            raise SequenceError(f"{path}: cannot be written: {error}") from error
+        yield number
 
 
 def density_step(domain: Domain, extinction: float) -> float:

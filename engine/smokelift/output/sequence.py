@@ -160,8 +160,7 @@ class Sequence:
         return arrays["velocity"] if "velocity" in arrays else self.velocity(number).centres()
 
     def files(self, number: int) -> Mapping[str, Path]:
-        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``.
-        """
+        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``."""
         self._check(number)
         paths = {kind: frame_path(self.directory, self.file_number(number), kind) for kind in ("vdb", "npz")}
         there = {kind: path for kind, path in paths.items() if path.is_file()}

@@ -30,7 +30,7 @@ from smokelift.output.archive import FLAME
 from smokelift.output.files import atomic_path
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
-from smokelift.transport import StaggeredGrid, at_centres, faces_in
+from smokelift.transport import StaggeredGrid, at_centres, block_means, faces_in
 from smokelift.transport.grid import finite
 
 VELOCITY_MARGIN = 2
@@ -38,6 +38,13 @@ VELOCITY_MARGIN = 2
 
 SLAB = 64
 """Voxels along x whose velocity is written at once, as many as eight leaves of OpenVDB's tree hold."""
+
+PROXY_TIMES = 4
+"""How many times as large the voxels of a proxy are, a coarse copy that viewports read in the place of large files."""
+
+MIN_PROXY_VOXELS = 4_000_000
+"""Voxels of a box from which on a run writes proxies. Blender reads a frame of 41 million, a quarter of them smoke, in
+1.2 s (`benchmarks/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
 
 SETTINGS = "smokelift_settings"
 """Name of the grid metadata that holds the settings as JSON."""
@@ -176,6 +183,25 @@ def write_vdb(
         except RuntimeError as error:
             raise OSError(f"{path}: cannot be written: {error}") from error
         _ensure_written(aside)
+
+
+def write_proxy(
+    path: Path,
+    density: Array,
+    domain: Domain,
+    times: int = PROXY_TIMES,
+    flame: Array | None = None,
+    lattice: Domain | None = None,
+) -> None:
+    """Write the coarse copy of a frame: its density, and its emission where it has one, (nx, ny, nz) each.
+
+    The voxels of the copy are `times` as large as those of the domain. A `lattice` as in `write_vdb` begins a multiple
+    of `times` voxels before the domain, if it is not the same. It raises VdbUnavailable, and OSError if the file cannot
+    be written.
+    """
+    fire = None if flame is None else block_means(flame, times)
+    coarse_lattice = None if lattice is None else lattice.coarser(times)
+    write_vdb(path, block_means(density, times), None, domain.coarser(times), flame=fire, lattice=coarse_lattice)
 
 
 def checked_volume(values: npt.ArrayLike, shape: tuple[int, int, int], name: str) -> Array:

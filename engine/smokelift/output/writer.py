@@ -43,9 +43,8 @@ from smokelift.output.index import (
     plain,
 )
 from smokelift.output.lock import Lock
-from smokelift.output.proxy_files import MIN_PROXY_VOXELS, write_proxy
 from smokelift.output.resume import ResumeState
-from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
+from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, checked_volume, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
 from smokelift.transport import Array, Faces, Velocity, require_same_shape
 

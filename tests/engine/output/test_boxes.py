@@ -7,10 +7,9 @@ import pytest
 from small_sequence import needs_vdb
 
 from smokelift.output import vdb
-from smokelift.output.export import ExportSettings, export_sequence
+from smokelift.output.export import ExportSettings, export_sequence, write_proxies
 from smokelift.output.files import INDEX
 from smokelift.output.index import SequenceError
-from smokelift.output.proxy_files import TIMES, write_proxies
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -68,7 +67,7 @@ def test_files_share_one_transform_and_proxies_and_exports_one_box(tmp_path):
     assert list(write_proxies(made)) == [1, 2]
     coarse = [vdb.vdb_module().read(str(tmp_path / "out" / f"proxy_000{n}.vdb"), "density") for n in (1, 2)]
     assert coarse[0].transform == coarse[1].transform
-    assert coarse[0].evalActiveVoxelBoundingBox()[0] == (8 // TIMES, 0, 0)
+    assert coarse[0].evalActiveVoxelBoundingBox()[0] == (8 // vdb.PROXY_TIMES, 0, 0)
     list(export_sequence(made, tmp_path / "export", ExportSettings()))
     rho = vdb.read_grid(tmp_path / "export" / "smoke_0001.vdb", "density", GROWN)
     np.testing.assert_array_equal(rho[DOMAIN.slices_in(GROWN)], frame(DOMAIN)[0])

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
 
-from smokelift.output import proxy_files, vdb, writer
+from smokelift.output import vdb, writer
+from smokelift.output.export import write_proxies
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Domain
@@ -42,8 +43,8 @@ def test_a_small_sequence_has_none_until_they_are_made(tmp_path: Path, start: in
     write(tmp_path, [1, 2], start_number=start)
     before = {name: (tmp_path / name).read_bytes() for name in names(tmp_path)}
     assert not any(name.startswith("proxy") for name in before)
-    assert list(proxy_files.write_proxies(Sequence.open(tmp_path))) == [1, 2]
+    assert list(write_proxies(Sequence.open(tmp_path))) == [1, 2]
     assert {name: (tmp_path / name).read_bytes() for name in before} == before
-    coarse = np.zeros([-(-n // proxy_files.TIMES) for n in SCENE.domain.resolution], np.float32)
+    coarse = np.zeros([-(-n // vdb.PROXY_TIMES) for n in SCENE.domain.resolution], np.float32)
     vdb.vdb_module().read(str(tmp_path / f"proxy_{start + 1:04d}.vdb"), gridname="density").copyToArray(coarse)
-    assert coarse.sum() * proxy_files.TIMES**3 == pytest.approx(Sequence.open(tmp_path).density(2).sum(), rel=1e-2)
+    assert coarse.sum() * vdb.PROXY_TIMES**3 == pytest.approx(Sequence.open(tmp_path).density(2).sum(), rel=1e-2)

@@ -7,10 +7,14 @@ import argparse
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import Finding
-from smokelift.output.proxy_files import MIN_PROXY_VOXELS, TIMES, write_proxies
+from smokelift.output.export import write_proxies
 from smokelift.output.sequence import Sequence
+from smokelift.output.vdb import MIN_PROXY_VOXELS, PROXY_TIMES
 
-HELP = f"write coarse copies of a sequence's frames for viewports, with voxels {TIMES} times as large, beside its files"
+HELP = (
+    f"write coarse copies of a sequence's frames for viewports, with voxels {PROXY_TIMES} times as large, beside its "
+    "files"
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
