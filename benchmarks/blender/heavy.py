@@ -20,8 +20,7 @@ from scipy import ndimage
 import addon
 from addon import proxy, volume
 from addon.take import Take
-from smokelift.output.proxy_files import write_proxy
-from smokelift.output.vdb import write_vdb
+from smokelift.output.vdb import write_proxy, write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import smoke
 

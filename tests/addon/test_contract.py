@@ -24,7 +24,7 @@ from smokelift.footage.image_sequence import numbered_pictures
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.files import INDEX, frame_path, proxy_path
-from smokelift.output.proxy_files import MIN_PROXY_VOXELS
+from smokelift.output.vdb import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 from smokelift_command import BAD_INPUT, CANCELLED, DONE

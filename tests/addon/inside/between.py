@@ -10,8 +10,7 @@ import pytest
 from addon import between, proxy, volume
 from addon.take import Take
 from conftest import rendered
-from smokelift.output.proxy_files import write_proxy
-from smokelift.output.vdb import vdb_module, write_vdb
+from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE, add_camera, smoke
 

@@ -9,7 +9,7 @@ import pytest
 from addon import proxy, volume
 from addon.take import Take
 from conftest import FRAMES, changed, made, rendered
-from smokelift.output.proxy_files import write_proxy
+from smokelift.output.vdb import write_proxy
 from smokelift.scene import Domain
 from tests.example_shot import add_camera, smoke
 
