@@ -7,7 +7,7 @@ incomplete historical data to infer the present state of the atmosphere", 1969).
 around it, so that eddies come in on every scale that the clip shows.
 
 The buoyancy is the one whose velocity moves the smoke up as the clip does: each frame is carried on for a step, and
-compared with the next one in the picture. What rises there is the pattern of the smoke, not its centre of mass, which
+compared with the next one in the picture. What rises there is the pattern of the smoke, not its center of mass, which
 sinks where a head dissolves while the base is fed. A velocity's change from one frame to the next does not show the
 buoyancy, since estimates err by more than that (docs/experiments/continuation.md).
 """

@@ -35,7 +35,7 @@ FADE_POWER = 2.0
 """Power of the distance to such a side that is left of the smoke: its value and its slope end at zero."""
 
 AT_SIDE = np.float32(0.5)
-"""Voxels from the surface at which smoke is gone to a voxel's centre, at least."""
+"""Voxels from the surface at which smoke is gone to a voxel's center, at least."""
 
 BUMPS = 0.6
 """Fraction of that length by which the surface has bumps at which the smoke is gone."""

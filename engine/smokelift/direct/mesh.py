@@ -32,12 +32,12 @@ ORDERS = [1, 2, 0], [2, 0, 1], [0, 1, 2]
 
 
 class Crossings(NamedTuple):
-    """Where triangles cross columns of voxels' centres.
+    """Where triangles cross columns of voxels' centers.
 
     Attributes
     ----------
     column, face, side, triangle : (k,)
-        Number of the column; the face between two centres in it; 1 or -1 for the side the triangle is crossed from;
+        Number of the column; the face between two centers in it; 1 or -1 for the side the triangle is crossed from;
         number of the triangle.
     weights : (k, 3)
         Of the triangle's corners at the crossing.
@@ -93,7 +93,7 @@ class Mesh:
         return (a, b, c), (d, e, f)
 
     def voxels(self, domain: Domain) -> Mask:
-        """The voxels whose centres it encloses, shape (nx, ny, nz).
+        """The voxels whose centers it encloses, shape (nx, ny, nz).
 
         Raises
         ------
@@ -103,7 +103,7 @@ class Mesh:
         return enclosed(self.crossings(domain), domain)
 
     def crossings(self, domain: Domain) -> list[Crossings]:
-        """Where it crosses the columns of voxels' centres along x, y and z."""
+        """Where it crosses the columns of voxels' centers along x, y and z."""
         places = (self.triangles.astype(np.float64) - domain.min) / domain.voxel_size - 0.5
         return [_crossings(places[:, :, order], tuple(domain.shape[d] for d in order)) for order in ORDERS]
 
@@ -114,7 +114,7 @@ class Mesh:
 
 
 def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
-    """The voxels around whose centres a surface winds, by the majority of the axes; ValueError if it is open."""
+    """The voxels around whose centers a surface winds, by the majority of the axes; ValueError if it is open."""
     votes, crossed = np.zeros(domain.shape, np.int8), False
     for order, found in zip(ORDERS, crossings, strict=True):
         shape = tuple(domain.shape[d] for d in order)
@@ -131,7 +131,7 @@ def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
 
 
 def _crossings(places: Doubles, shape: tuple[int, ...]) -> Crossings:
-    """Where triangles (n, 3, 3), in voxels from the centre of the first, cross columns along the last axis."""
+    """Where triangles (n, 3, 3), in voxels from the center of the first, cross columns along the last axis."""
     limit = np.array(shape[:2]) - 1
     low = np.clip(np.ceil(places[:, :, :2].min(axis=1)), 0, limit + 1).astype(np.int64)
     high = np.clip(np.floor(places[:, :, :2].max(axis=1)), -1, limit).astype(np.int64)

@@ -81,7 +81,7 @@ class MovingMesh:
         """The voxels that it encloses after a step, and how fast it has moved there in m/s, on all faces.
 
         On a face between a voxel inside and one outside, the speed is that of the surface where it crosses the line
-        between their centres; on others it is that of the nearest such face. A mesh that is open is refused by a
+        between their centers; on others it is that of the nearest such face. A mesh that is open is refused by a
         ValueError.
         """
         before, now = self.at(step - 1).triangles, self.at(step).triangles

@@ -35,7 +35,7 @@ def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
 def retime_sequence(
     sequence: Sequence, out: str | Path, speeds: tuple[float, ...], *, npz: bool = False, resume: bool = False
 ) -> Iterator[Written]:
-    """Write a sequence at another speed: frames between the clip's own are interpolated from both neighbours.
+    """Write a sequence at another speed: frames between the clip's own are interpolated from both neighbors.
 
     Velocities are scaled with the speed: at half the speed they are half of the smoke's.
 

@@ -33,7 +33,7 @@ class SmokeState:
     Attributes
     ----------
     density : (nx, ny, nz) float32
-        At voxel centres.
+        At voxel centers.
     velocity
         Without divergence, in m/s; it has carried the frame before to this one.
     flame : (nx, ny, nz) float32, optional

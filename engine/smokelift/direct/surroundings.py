@@ -24,13 +24,13 @@ RISE = 0.5
 
 @dataclass(frozen=True)
 class Ball:
-    """A round obstacle or, moving, a fan: its centre and radius in meters."""
+    """A round obstacle or, moving, a fan: its center and radius in meters."""
 
     centre: Vector
     radius: float
 
     def voxels(self, domain: Domain) -> Mask:
-        """The voxels whose centres lie in it, shape (nx, ny, nz)."""
+        """The voxels whose centers lie in it, shape (nx, ny, nz)."""
         x, y, z = domain.offsets(self.centre)
         inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
         return inside
@@ -49,7 +49,7 @@ class BoxObstacle:
     high: Vector
 
     def voxels(self, domain: Domain) -> Mask:
-        """The voxels whose centres lie in it, shape (nx, ny, nz)."""
+        """The voxels whose centers lie in it, shape (nx, ny, nz)."""
         above, below = domain.offsets(self.low), domain.offsets(self.high)
         x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
         inside: Mask = x & y & z

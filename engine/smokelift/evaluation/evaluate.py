@@ -137,7 +137,7 @@ def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:
     wanted = np.array(truth.shape) * truth.voxel_size
     if not np.allclose(box, wanted, rtol=0.01):
         raise ValueError(
-            f"{path}: is a box of {_metres(wanted)}, but the sequence's is {_metres(box)}; reconstruct with the "
+            f"{path}: is a box of {_meters(wanted)}, but the sequence's is {_meters(box)}; reconstruct with the "
             "truth's box as [domain] in the scene file."
         )
     fps = sequence.scene.clip.fps if sequence.scene.clip else None
@@ -147,7 +147,7 @@ def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:
         )
 
 
-def _metres(size: npt.NDArray[np.float64]) -> str:
+def _meters(size: npt.NDArray[np.float64]) -> str:
     return " x ".join(f"{length:.3g}" for length in size) + " m"
 
 

@@ -140,7 +140,7 @@ class Sequence:
     def velocity(self, number: int) -> Velocity:
         """Return the velocity of a frame in m/s, with the walls of the scene.
 
-        It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centres beside a face, zero
+        It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centers beside a face, zero
         further than two voxels from smoke and not free of divergence.
         """
         arrays = self._read(number, VELOCITY)
@@ -151,7 +151,7 @@ class Sequence:
         return Velocity((x, y, z), self.scene.domain.voxel_size, self.scene.closed)
 
     def velocity_at_centres(self, number: int) -> Array:
-        """Return the velocity of a frame in m/s at voxel centres, shape (nx, ny, nz, 3).
+        """Return the velocity of a frame in m/s at voxel centers, shape (nx, ny, nz, 3).
 
         These are the values of an OpenVDB file as it holds them; those of :meth:`velocity` are smoothed by the way to
         faces and back.

@@ -1,12 +1,12 @@
 """OpenVDB files as Blender expects them: a fog volume `density` and a vector grid `velocity` in m/s.
 
-Where a clip shows fire, a fog volume `flame` holds its emission, radiance per metre, in one channel.
+Where a clip shows fire, a fog volume `flame` holds its emission, radiance per meter, in one channel.
 
 There is no standalone package of OpenVDB for Python. The vdb extra installs bpy, whose wheel contains one in a folder
 that is not on `sys.path`. bpy itself is never imported.
 
 OpenVDB puts the value of voxel (i, j, k) at its integer coordinates, so the transform sends (i, j, k) to the
-voxel's centre, `min + (i + 1/2) h`.
+voxel's center, `min + (i + 1/2) h`.
 """
 
 from __future__ import annotations
@@ -120,11 +120,11 @@ def write_vdb(
     density : (nx, ny, nz)
         Not negative.
     velocity
-        m/s, on faces or at voxel centres, shape (nx, ny, nz, 3); None for a file of the density alone.
+        m/s, on faces or at voxel centers, shape (nx, ny, nz, 3); None for a file of the density alone.
     metadata
         Settings to keep with the density grid, as JSON can hold them.
     flame : (nx, ny, nz), optional
-        Emission, radiance per metre, not negative; None for a file without that grid.
+        Emission, radiance per meter, not negative; None for a file without that grid.
     velocity_name
         Name of the grid of the velocity.
     facts

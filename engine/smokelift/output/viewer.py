@@ -48,11 +48,11 @@ class Viewer:
             renderer = self._optics.renderer(self._camera.at(frame), self._behind(frame))
             self._renderers = {frame: renderer}
         image = self._renderers[frame].image(density)
-        colour = self._scene.medium.flame_color
-        if flame is None or colour is None:
+        color = self._scene.medium.flame_color
+        if flame is None or color is None:
             return image
         light = emitted(flame, density, self._camera.at(frame), self._optics)
-        return np.asarray(image + light[..., None] * np.array(colour, np.float32))
+        return np.asarray(image + light[..., None] * np.array(color, np.float32))
 
     def background(self, number: int) -> Image:
         """What is behind the smoke in a frame, from 1; linear radiance (rows, columns, 3) or (3,)."""

@@ -188,7 +188,7 @@ class SequenceWriter:
         figures
             Numbers and text about the frame by name. Numbers that are not finite become null.
         flame : (nx, ny, nz), optional
-            Emission of fire, radiance per metre, not negative; None where there can be none.
+            Emission of fire, radiance per meter, not negative; None where there can be none.
         box
             Of the frame, with voxels in line with the scene's domain; by default that. It is kept in the figures.
         ready

@@ -40,7 +40,7 @@ class DiffuseLight:
         self._shares = shares.astype(np.float32).repeat(FIELDS)[:, None, None, None]
         size = min(max(round(max(plan.domain.resolution) / BLOCKS), MIN_BLOCK), MAX_BLOCK)
         self._edge = size * plan.domain.voxel_size
-        # blocks lie alike in the domain whatever the box; their centres reach around all voxels of the box
+        # blocks lie alike in the domain whatever the box; their centers reach around all voxels of the box
         corner, count = np.array(plan.corner), np.array(plan.shape)
         first = np.floor((corner + 0.5) / size - 0.5).astype(int)
         last = np.floor((corner + count - 0.5) / size - 0.5).astype(int) + 1

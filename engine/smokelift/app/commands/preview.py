@@ -8,9 +8,8 @@ from dataclasses import replace
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
-from smokelift.output.files import CONTACT_SHEET, ORBIT, PICTURES, PREVIEW, STRIP
-from smokelift.output.framing import frame_smoke
-from smokelift.output.preview import write_contact_sheet, write_orbit, write_preview, write_strip
+from smokelift.output.files import PICTURES
+from smokelift.output.preview import write_previews
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 
@@ -31,11 +30,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     device.start(options.device)
     out = options.out or sequence.directory
     out.mkdir(parents=True, exist_ok=True)
-    framing = frame_smoke(sequence)
     with Clip.open(replace(sequence.scene.clip, mask=None)) as clip:  # as it was filmed
-        write_contact_sheet(out / CONTACT_SHEET, sequence, clip, framing)
-        write_orbit(out / ORBIT, sequence, clip, framing)
-        write_strip(out / STRIP, sequence, clip, framing)
-        write_preview(out / PREVIEW, sequence, clip, framing)
+        write_previews(out, sequence, clip)
     files = [str(out / name) for name in PICTURES]
     say.finish(f"{', '.join(files[:-1])} and {files[-1]} written.", {"files": files})

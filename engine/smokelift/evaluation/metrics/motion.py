@@ -50,7 +50,7 @@ def velocity_error(
 def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayLike | None = None) -> float:
     """Return the mean |div u| in 1/s of a velocity at voxel centers, measured at the corners between eight voxels.
 
-    Where velocities at the centres are means of opposite faces, that is the mean over the eight voxels of the
+    Where velocities at the centers are means of opposite faces, that is the mean over the eight voxels of the
     divergence on their faces: zero if that is. Central differences would be small for a smooth flow only.
 
     Parameters
