@@ -4,7 +4,6 @@ from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continu
 from smokelift.direct.fitting import coarse, fit_simulation, spun_up
 from smokelift.direct.looping import default_overlap, loop_length, loop_sequence, steady_part
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.direct.new_sequence import open_source
 from smokelift.direct.retiming import playback, retime_sequence
 from smokelift.direct.simulation import Simulation
@@ -21,7 +20,6 @@ __all__ = [
     "Continuation",
     "Fan",
     "Mesh",
-    "MovingMesh",
     "Simulation",
     "SmokeState",
     "Turbulence",

@@ -1,4 +1,4 @@
-"""Obstacles of any shape: a surface of triangles, and the voxels that it encloses.
+"""Obstacles of any shape: a surface of triangles, still or moving, the voxels that it encloses, and its speed there.
 
 A voxel is enclosed if the surface winds around it. That is counted along the columns of voxels of each axis; a column
 in which the crossings do not balance passes through a hole of the surface and says nothing, and the others decide by
@@ -8,16 +8,19 @@ majority. So parts may overlap, and a few holes do no harm (after Nooruddin and 
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles, Mask
 from smokelift.scene import Domain
 from smokelift.scene.checks import LARGEST, Vector
+from smokelift.transport import Array, Faces
 
 Integers = npt.NDArray[np.int64]
 
@@ -52,68 +55,130 @@ class Crossings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A surface of triangles (n, 3, 3), corners in meters, as an obstacle.
+    """A closed surface of triangles as an obstacle, at one place or, as it moves and bends, at one after another.
 
-    Which way they turn does not matter, as long as it is the same over each part.
+    Which way the triangles turn does not matter, as long as it is the same over each part.
+
+    Attributes
+    ----------
+    places : (k, n, 3, 3)
+        Corners in meters, at the frame that the smoke starts from and at every frame after it; it stays at the last
+        one. Of a mesh that stands still, (n, 3, 3) is enough.
     """
 
-    triangles: npt.NDArray[np.float32]
+    places: npt.NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "places", self.places.reshape(-1, *self.places.shape[-3:]))
 
     @staticmethod
     def read(path: Path) -> Mesh:
-        """Read a binary STL file, in meters, Z up.
+        """Read a binary STL file, in meters, Z up, or numbered ones from a pattern ``crate_####.stl`` (a # is a digit).
 
         Raises
         ------
         ValueError
-            With the path, if it cannot be read, is damaged or of another kind.
+            With the path, if one cannot be read, is damaged or of another kind, or their numbers of triangles differ.
         """
-        if not path.is_file():
-            raise ValueError(f"{path}: is no file; give the path of a binary STL file.")
-        try:
-            with path.open("rb") as file:
-                count = int.from_bytes(file.read(HEADER)[-4:], "little")
-                whole = HEADER + count * RECORD.itemsize
-                content = file.read() if path.stat().st_size == whole else b""
-        except OSError as error:
-            raise ValueError(f"{path}: cannot be read ({error.strerror}).") from error
-        if not content:
+        is_pattern = "#" in path.name and not path.is_file()
+        places = [_read_stl(file) for file in (_numbered(path) if is_pattern else [path])]
+        counts = [len(place) for place in places]
+        if min(counts) < max(counts):
             raise ValueError(
-                f"{path}: is no binary STL file with triangles, or damaged; export the mesh as binary STL."
+                f"{path}: a mesh that moves has {min(counts)} to {max(counts)} triangles, but has to keep their "
+                "number; leave out what changes it, or export it at one moment."
             )
-        triangles = np.frombuffer(content, RECORD)["corners"]
-        if not (np.abs(triangles) <= LARGEST).all():
-            raise ValueError(f"{path}: has corners that are no numbers up to {LARGEST:g} m; export the mesh again.")
-        return Mesh(triangles)
+        return Mesh(np.stack(places))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has more than one place."""
+        return len(self.places) > 1
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """The corners in meters of the box around it."""
-        corners = self.triangles.reshape(-1, 3)
+        """The corners in meters of the box around all its places."""
+        corners = self.places.reshape(-1, 3)
         (a, b, c), (d, e, f) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         return (a, b, c), (d, e, f)
 
-    def voxels(self, domain: Domain) -> Mask:
-        """The voxels whose centers it encloses, shape (nx, ny, nz).
+    def voxels(self, domain: Domain, step: int = 0) -> Mask:
+        """The voxels whose centers it encloses after a step, shape (nx, ny, nz).
 
         Raises
         ------
         ValueError
             If it is open, such as a plane, so that it encloses nothing.
         """
-        return enclosed(self.crossings(domain), domain)
+        return _enclosed(_all_crossings(self._at(step), domain), domain)
 
-    def crossings(self, domain: Domain) -> list[Crossings]:
-        """Where it crosses the columns of voxels' centers along x, y and z."""
-        places = (self.triangles.astype(np.float64) - domain.min) / domain.voxel_size - 0.5
-        return [_crossings(places[:, :, order], tuple(domain.shape[d] for d in order)) for order in ORDERS]
+    def solid(self, domain: Domain, step: int, dt: float) -> tuple[Mask, Faces]:
+        """The voxels that it encloses after a step, and how fast it has moved there in m/s, on all faces.
+
+        On a face between a voxel inside and one outside, the speed is that of the surface where it crosses the line
+        between their centers; on others it is that of the nearest such face. A mesh that is open is refused by a
+        ValueError.
+        """
+        before, now = self._at(step - 1), self._at(step)
+        speeds = (now.astype(np.float64) - before) / dt
+        crossings = _all_crossings(now, domain)
+        x, y, z = (_on_faces(found, speeds[:, :, axis], domain, axis) for axis, found in enumerate(crossings))
+        return _enclosed(crossings, domain), (x, y, z)
 
     def fingerprint(self) -> dict[str, Any]:
-        """Number of triangles and checksum: what distinguishes it from another in the settings of a sequence."""
-        content = np.ascontiguousarray(self.triangles, "<f4").tobytes()
-        return {"triangles": len(self.triangles), "checksum": hashlib.sha256(content).hexdigest()}
+        """What distinguishes it from another in the settings of a sequence: how much it has, and a checksum."""
+        checksums = [hashlib.sha256(np.ascontiguousarray(place, "<f4").tobytes()).hexdigest() for place in self.places]
+        triangles = self.places.shape[1]
+        if not self.moves:
+            return {"triangles": triangles, "checksum": checksums[0]}
+        whole = hashlib.sha256("".join(checksums).encode()).hexdigest()
+        return {"frames": len(checksums), "triangles": triangles, "checksum": whole}
+
+    def _at(self, step: int) -> npt.NDArray[np.float32]:
+        place: npt.NDArray[np.float32] = self.places[min(step, len(self.places) - 1)]
+        return place
 
 
-def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
+def _numbered(path: Path) -> list[Path]:
+    """The files of a pattern by their numbers, one for each from the first to the last."""
+    named = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
+    if named is None or not path.parent.is_dir():
+        raise ValueError(f"{path}: is no file, and no pattern crate_####.stl of numbered files; give one of them.")
+    prefix, hashes, suffix = named.groups()
+    pattern = re.compile(re.escape(prefix) + rf"(\d{{{len(hashes)},}})" + re.escape(suffix))
+    matches = ((pattern.fullmatch(file.name), file) for file in path.parent.iterdir())
+    found = {int(match[1]): file for match, file in matches if match}
+    if not found:
+        raise ValueError(f"{path}: there are no such files; number them as the frames are.")
+    numbers = range(min(found), max(found) + 1)
+    return [found.get(n, path.with_name(f"{prefix}{n:0{len(hashes)}d}{suffix}")) for n in numbers]
+
+
+def _read_stl(path: Path) -> npt.NDArray[np.float32]:
+    """The triangles (n, 3, 3) of a file."""
+    if not path.is_file():
+        raise ValueError(f"{path}: is no file; give the path of a binary STL file.")
+    try:
+        with path.open("rb") as file:
+            count = int.from_bytes(file.read(HEADER)[-4:], "little")
+            whole = HEADER + count * RECORD.itemsize
+            content = file.read() if path.stat().st_size == whole else b""
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror}).") from error
+    if not content:
+        raise ValueError(f"{path}: is no binary STL file with triangles, or damaged; export the mesh as binary STL.")
+    triangles = np.frombuffer(content, RECORD)["corners"]
+    if not (np.abs(triangles) <= LARGEST).all():
+        raise ValueError(f"{path}: has corners that are no numbers up to {LARGEST:g} m; export the mesh again.")
+    return triangles
+
+
+def _all_crossings(triangles: npt.NDArray[np.float32], domain: Domain) -> list[Crossings]:
+    """Where triangles cross the columns of voxels' centers along x, y and z."""
+    places = (triangles.astype(np.float64) - domain.min) / domain.voxel_size - 0.5
+    return [_crossings(places[:, :, order], tuple(domain.shape[d] for d in order)) for order in ORDERS]
+
+
+def _enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
     """The voxels around whose centers a surface winds, by the majority of the axes; ValueError if it is open."""
     votes, crossed = np.zeros(domain.shape, np.int8), False
     for order, found in zip(ORDERS, crossings, strict=True):
@@ -128,6 +193,19 @@ def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
     if crossed and not enclosed.any():
         raise ValueError("the mesh of an obstacle is open and encloses nothing; close it, or give it a thickness.")
     return enclosed
+
+
+def _on_faces(crossings: Crossings, speeds: np.ndarray[Any, Any], domain: Domain, axis: int) -> Array:
+    """One component of the speeds of corners (n, 3), on the faces across its axis."""
+    across = [domain.shape[d] for d in ORDERS[axis][:2]]
+    faces = np.full((across[0] * across[1], domain.shape[axis] + 1), np.nan, np.float32)
+    faces[crossings.column, crossings.face] = (crossings.weights * speeds[crossings.triangle]).sum(axis=1)
+    values = faces.reshape(*across, -1).transpose(np.argsort(ORDERS[axis]))
+    unknown = np.isnan(values)
+    if unknown.all():
+        return np.zeros_like(values)
+    nearest = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    return np.ascontiguousarray(values[tuple(nearest)])
 
 
 def _crossings(places: Doubles, shape: tuple[int, ...]) -> Crossings:

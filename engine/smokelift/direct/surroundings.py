@@ -12,7 +12,6 @@ import numpy as np
 from smokelift.checks.array_types import Mask
 from smokelift.direct.constraint import FaceMasks, faces_between, faces_of, project_with_given_faces
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
@@ -60,7 +59,7 @@ class BoxObstacle:
         return self.low, self.high
 
 
-Obstacle = Ball | BoxObstacle | Mesh | MovingMesh
+Obstacle = Ball | BoxObstacle | Mesh
 
 
 class Solid(NamedTuple):
@@ -113,7 +112,7 @@ class Obstacles:
             return None
         solid = Solid(self._still, None)
         for thing in self.things:
-            if isinstance(thing, MovingMesh):
+            if isinstance(thing, Mesh) and thing.moves:
                 solid = _with(solid, *thing.solid(self.domain, step, dt))
         if solid.voxels.all():
             raise ValueError("the obstacles fill the whole box; make them smaller.")
@@ -124,7 +123,7 @@ class Obstacles:
         """The voxels of what does not move."""
         still: Mask = np.zeros(self.domain.shape, bool)
         for thing in self.things:
-            if not isinstance(thing, MovingMesh):
+            if not (isinstance(thing, Mesh) and thing.moves):
                 still |= thing.voxels(self.domain)
         return still
 
@@ -143,20 +142,20 @@ def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> Non
     """
     low, high = thing.bounds()
     within = all(c <= a and b <= d for a, b, c, d in zip(low, high, domain.min, domain.max, strict=True))
-    if isinstance(thing, MovingMesh):
-        here = any(_overlap(place, domain) for place in thing.places)
+    if isinstance(thing, Mesh) and thing.moves:
+        here = any(_overlap(Mesh(place).bounds(), domain) for place in thing.places)
     else:
         here = bool(thing.voxels(domain).any())
-    if not here and (within or not _overlap(thing, reach)):
+    if not here and (within or not _overlap(thing.bounds(), reach)):
         raise ValueError(
             f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m, nor of what the box can grow "
             "to; move it in, make it larger, or give the box more room."
         )
 
 
-def _overlap(thing: Obstacle, box: Box) -> bool:
-    """Whether a thing reaches into a box, as far as its own bounds tell."""
-    low, high = thing.bounds()
+def _overlap(bounds: tuple[Vector, Vector], box: Box) -> bool:
+    """Whether a thing reaches into a box, as far as its bounds tell."""
+    low, high = bounds
     return all(a < d and b > c for a, b, c, d in zip(low, high, box.min, box.max, strict=True))
 
 

@@ -77,7 +77,7 @@ def test_an_stl_file_is_read_as_it_was_written(tmp_path):
     triangles = cube((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1))
     path = tmp_path / "cube.stl"
     written(path, triangles)
-    np.testing.assert_array_equal(Mesh.read(path).triangles, triangles)
+    np.testing.assert_array_equal(Mesh.read(path).places, triangles[None])
     whole = path.read_bytes()
     for content in (b"", b"solid cube\nendsolid", whole[:-1], whole + b"x", whole[:HEADER], bytes(HEADER)):
         path.write_bytes(content)

@@ -6,7 +6,6 @@ import argparse
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 from smokelift.app.options import add_directed_options, finite_number, named_path, require_new
 from smokelift.app.progress import Reporter, say_sequence
@@ -20,7 +19,6 @@ from smokelift.direct import (
     Continuation,
     Fan,
     Mesh,
-    MovingMesh,
     Turbulence,
     continue_sequence,
     open_source,
@@ -186,16 +184,12 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         wind=tuple(options.wind),
         turbulences=tuple(_turbulence(*values) for values in options.turbulence),
         fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
-        obstacles=(*balls, *boxes, *map(_mesh, options.mesh)),
+        obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
         closed=tuple(side for side in SIDES if side in options.closed),
         room=options.room,
         buoyancy=options.buoyancy,
         dissipation=options.dissipation,
     )
-
-
-def _mesh(path: Path) -> Mesh | MovingMesh:
-    return MovingMesh.read(path) if "#" in path.name and not path.is_file() else Mesh.read(path)
 
 
 def _turbulence(speed: float, size: float, seed: float) -> Turbulence:
