@@ -15,7 +15,7 @@ from benchmarks.direct.clips import true_moment
 from benchmarks.direct.continuation import tile
 from benchmarks.truth.scenes import BOX_MIN, BOX_SIZE
 from smokelift.checks.array_types import Mask
-from smokelift.direct import Ball, Mesh, MovingMesh, Turbulence, fit_simulation, spun_up
+from smokelift.direct import Ball, Mesh, Turbulence, fit_simulation, spun_up
 from smokelift.direct.surroundings import Obstacles, Surroundings
 from smokelift.output.images import write_sheet
 from smokelift.scene import Domain
@@ -75,7 +75,7 @@ def main() -> None:
     write_sheet(options.picture, rows, tuple(cases), [f"+{step}" for step in shown])
 
 
-def through(middle: npt.NDArray[np.float64], frames: int) -> MovingMesh:
+def through(middle: npt.NDArray[np.float64], frames: int) -> Mesh:
     """Return a ball that crosses the box from -x to +x through a point."""
     turns, heights = np.pi * (1 + 5**0.5) * np.arange(POINTS), 1 - (2 * np.arange(POINTS) + 1) / POINTS
     level = np.sqrt(1 - heights**2)
@@ -84,9 +84,8 @@ def through(middle: npt.NDArray[np.float64], frames: int) -> MovingMesh:
     inward = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0
     corners[inward] = corners[inward, ::-1]
     ways = np.linspace(-WAY / 2, WAY / 2, frames + 1)
-    return MovingMesh(
-        tuple(Mesh((middle + np.array([way, 0, 0]) + RADIUS * corners).astype(np.float32)) for way in ways)
-    )
+    places = np.stack([middle + np.array([way, 0, 0]) + RADIUS * corners for way in ways])
+    return Mesh(places.astype(np.float32))
 
 
 def drawn(density: Array, solid: Mask | None, white: float) -> npt.NDArray[np.uint8]:
