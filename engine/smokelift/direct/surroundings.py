@@ -108,8 +108,6 @@ class Obstacles:
 
     def at(self, step: int, dt: float) -> Solid | None:
         """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
-        if not self.things:
-            return None
         solid = Solid(self._still, None)
         for thing in self.things:
             if isinstance(thing, Mesh) and thing.moves:

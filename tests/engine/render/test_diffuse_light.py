@@ -1,4 +1,4 @@
-"""Scattering of all orders: the same sums in float64, conservation of energy, the derivative by finite differences."""
+"""Scattering of all orders: the same sums in float64, conservation of energy, the derivative by a complex step."""
 
 from dataclasses import replace
 

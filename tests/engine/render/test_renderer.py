@@ -1,4 +1,4 @@
-"""The renderer: its image against the same sums in float64, its derivative against finite differences."""
+"""The renderer: its image against the same sums in float64, its derivative against a complex step through them."""
 
 from dataclasses import replace
 
@@ -93,44 +93,25 @@ def test_image_of_every_light_equals_the_sums_in_double_precision(density, wall,
 
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
 @pytest.mark.parametrize("depth", [0.1, 3, 30])
-def test_gradient_equals_finite_differences(density, wall, kind, depth):
-    check_gradient(density, wall, [make_camera(EYES["along a diagonal"], kind)], depth, (SUN,))
+def test_gradient_equals_a_complex_step(density, wall, kind, depth):
+    check_gradient(density, wall, make_camera(EYES["along a diagonal"], kind), depth, (SUN,))
 
 
 @pytest.mark.parametrize("lights", list(LIGHTS.values())[1:], ids=list(LIGHTS.keys())[1:])
-def test_gradient_of_every_light_equals_finite_differences(density, wall, lights):
+def test_gradient_of_every_light_equals_a_complex_step(density, wall, lights):
     """At one optical depth; `test_renderer_stability` has parallel and point light at all."""
-    check_gradient(density, wall, [make_camera(EYES["from below"])], 3, lights)
+    check_gradient(density, wall, make_camera(EYES["from below"]), 3, lights)
 
 
-def check_gradient(density, wall, cameras, depth, lights):
-    """Central differences where two pictures can resolve them, a complex step everywhere."""
-    medium = medium_of_depth(density, depth)
-    scene = Scene(domain=DOMAIN, medium=medium, lights=lights, background=Background(color=(0.3, 0.2, 0.4)))
-    targets = [np.roll(wall, number, 0) for number in range(len(cameras))]
-    gradient = render_gradient(density, scene, targets, cameras)[1]
-    base = density.astype(np.float64)
-
-    def loss(values):
-        return sum(
-            np.sum((reference.render(values, view, DOMAIN, medium, lights, np.array((0.3, 0.2, 0.4))) - target) ** 2)
-            for view, target in zip(cameras, targets, strict=True)
-        )
-
-    camera, resolved = cameras[0], 0
+def check_gradient(density, wall, camera, depth, lights):
+    medium, behind = medium_of_depth(density, depth), (0.3, 0.2, 0.4)
+    scene = Scene(domain=DOMAIN, medium=medium, lights=lights, background=Background(color=behind))
+    gradient = render_gradient(density, scene, wall, camera)[1]
     for voxel in voxels_of_three_kinds(density, camera, medium):
-        complex_base = base.astype(complex)
-        complex_base[voxel] += 1e-30j
-        exact = loss(complex_base).imag / 1e-30
-        assert gradient[voxel] == pytest.approx(exact, rel=1e-3, abs=0)
-        step = 1e-3 * base[voxel]
-        up, down = base.copy(), base.copy()
-        up[voxel] += step
-        down[voxel] -= step
-        if abs(exact) > 1e-6:
-            resolved += 1
-            assert gradient[voxel] == pytest.approx((loss(up) - loss(down)) / (2 * step), rel=1e-3, abs=0)
-    assert resolved >= 5
+        changed = density.astype(complex)
+        changed[voxel] += 1e-30j
+        image = reference.render(changed, camera, DOMAIN, medium, lights, np.array(behind))
+        assert gradient[voxel] == pytest.approx(np.sum((image - wall) ** 2).imag / 1e-30, rel=1e-3, abs=0)
 
 
 @pytest.mark.parametrize("scattering", ["multiple", *MODELS])
@@ -148,7 +129,7 @@ def test_a_fourth_channel_shows_the_transmittance(density, wall, scattering):
 
 
 @pytest.mark.parametrize("scattering", MODELS)
-def test_gradient_of_four_channels_equals_finite_differences(density, wall, scattering):
+def test_gradient_of_four_channels_equals_a_complex_step(density, wall, scattering):
     camera, medium = make_camera(EYES["along a diagonal"]), medium_of_depth(density, 3)
     background = np.array((0.3, 0.2, 0.4, 0.9), np.float32)
     target = np.dstack([wall, wall.mean(-1)])
