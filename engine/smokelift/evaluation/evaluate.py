@@ -37,7 +37,7 @@ class Evaluation:
     truth: Truth | None
 
     def write_picture(self, path: Path) -> None:
-        """Write a late moment from all around, above the truth's where it is known, with its scores, as a PNG."""
+        """Write a late frame from all around, above the truth's where it is known, with its scores, as a PNG."""
         sequence = self.sequence
         number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
         rows = {}

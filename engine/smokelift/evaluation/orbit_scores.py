@@ -30,7 +30,7 @@ pictures that far from each other have next to no detail in common."""
 FLICKER_AZIMUTHS = (45, 75, 105, 135)
 """Azimuths at which three consecutive frames are compared."""
 
-MOMENTS, FIRST_FRAMES = 6, 4
+SCORED_FRAMES, FIRST_FRAMES = 6, 4
 """Frames that are scored, spread over the clip, and the first ones, which have hardly any before them to start from
 and are left out."""
 
@@ -59,19 +59,19 @@ def orbit_scores(
     where there is nothing to say.
     """
     orbit = Orbit(scene, lights_turn=truth is None)
-    moments = _moments(count)
+    frames = _scored_frames(count)
     found: dict[str, list[list[float | None]]] = {name: [] for name in ("patches", "texture", "edges", "halo")}
     own: dict[str, list[list[float | None]]] = {"patches": [], "texture": []}
     fronts: list[PatchStatistics] = []
     shapes, true_shapes = OrbitShapes(orbit.table), OrbitShapes(orbit.table)
-    for moment in moments:
-        smoke = density(moment)
+    for frame in frames:
+        smoke = density(frame)
         shapes.add(smoke)
         pictures = _pictures(orbit, smoke, AZIMUTHS)
         if truth is None:
             true = _pictures(orbit, smoke, (0,))
         else:
-            true_smoke = truth(moment)
+            true_smoke = truth(frame)
             true_shapes.add(true_smoke)
             true = _pictures(orbit, true_smoke, AZIMUTHS)
         references = [PatchStatistics.of(picture) for picture in true]
@@ -96,7 +96,7 @@ def orbit_scores(
         **{name: finite_mean(values) for name, values in by_azimuth.items()},
         "patches_worst": max(known, default=None),
         **{f"{name}_own": finite_mean(_means(values)) for name, values in own.items()},
-        "flicker": _relative_flicker(orbit, moments, count, density, truth),
+        "flicker": _relative_flicker(orbit, frames, count, density, truth),
         "azimuths": list(AZIMUTHS),
         **{f"{name}_by_azimuth": by_azimuth[name] for name in ("patches", "texture", "edges")},
         "patches_own_by_azimuth": None if truth is None else _means(own["patches"]),
@@ -109,26 +109,26 @@ def orbit_scores(
 def _add(
     figures: dict[str, list[list[float | None]]], found: list[PatchStatistics], references: list[PatchStatistics]
 ) -> None:
-    """Add the distances of a moment's pictures."""
+    """Add the distances of a frame's pictures."""
     pairs = list(zip(found, references, strict=True))
     figures["patches"].append([one.distance(reference) for one, reference in pairs])
     figures["texture"].append([one.texture_distance(reference) for one, reference in pairs])
 
 
-def _moments(count: int) -> list[int]:
+def _scored_frames(count: int) -> list[int]:
     first = FIRST_FRAMES if count > 2 * FIRST_FRAMES else 0
-    spread = np.linspace(first, count - 1, min(MOMENTS, count - first))
-    return sorted({round(float(moment)) for moment in spread})
+    spread = np.linspace(first, count - 1, min(SCORED_FRAMES, count - first))
+    return sorted({round(float(frame)) for frame in spread})
 
 
 def _relative_flicker(
-    orbit: Orbit, moments: list[int], count: int, density: Densities, truth: Densities | None
+    orbit: Orbit, frames: list[int], count: int, density: Densities, truth: Densities | None
 ) -> float | None:
-    """Flicker over that of the reference, each the mean over moments and azimuths."""
+    """Flicker over that of the reference, each the mean over frames and azimuths."""
     if count < 3:
         return None
     found, reference = [], []
-    for middle in np.unique(np.clip(moments, 1, count - 2)).tolist():
+    for middle in np.unique(np.clip(frames, 1, count - 2)).tolist():
         around = range(middle - 1, middle + 2)
         densities = [density(frame) for frame in around]
         found.append(_flicker(orbit, densities, FLICKER_AZIMUTHS))
@@ -165,6 +165,6 @@ def _ratio(value: float, reference: float) -> float | None:
     return value / reference if reference > 0 else None
 
 
-def _means(moments: list[list[float | None]]) -> list[float | None]:
-    """Means over the moments of what there is at each azimuth."""
-    return [finite_mean(values) for values in zip(*moments, strict=True)]
+def _means(frames: list[list[float | None]]) -> list[float | None]:
+    """Means over the frames of what there is at each azimuth."""
+    return [finite_mean(values) for values in zip(*frames, strict=True)]

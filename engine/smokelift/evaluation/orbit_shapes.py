@@ -29,21 +29,21 @@ BANDS = 6
 
 
 class OrbitShapes:
-    """Collects the shapes of moments."""
+    """Collects the shapes of frames."""
 
     def __init__(self, table: Turntable) -> None:
         self._table = table
         self._found: list[list[RayShapes | None]] = []
 
     def add(self, density: Volume) -> None:
-        """Add a moment, (nx, ny, nz)."""
+        """Add a frame, (nx, ny, nz)."""
         upright = self._table.upright(density)
         self._found.append([RayShapes.of(_turned(upright, self._table, degrees)) for degrees in SHAPE_AZIMUTHS])
 
     def figures(self, ending: str = "") -> dict[str, Any]:
         """`SHAPES` along the camera's rays, by azimuth, and depth over width by height, their names with an ending."""
         by_azimuth = {name: [_mean(shapes, name) for shapes in zip(*self._found, strict=True)] for name in SHAPES}
-        front = [moment[0] for moment in self._found]
+        front = [frame[0] for frame in self._found]
         return {
             **{f"{name}{ending}": values[0] for name, values in by_azimuth.items()},
             **{f"{name}{ending}_by_azimuth": values for name, values in by_azimuth.items()},

@@ -268,8 +268,8 @@ class SequenceWriter:
             self.state = self._last_state(there)
             last = self.state.number if self.state is not None else -1
             frames = {number: figures for number, figures in frames.items() if int(number) <= last}
-        kept = {self._path(int(number), kind).name for number in frames for kind in ("vdb", "npz")}
-        checksums = {name: digits for name, digits in there.checksums.items() if name in kept}
+        written = {self._path(int(number), kind).name for number in frames for kind in ("vdb", "npz")}
+        checksums = {name: digits for name, digits in there.checksums.items() if name in written}
         self._index = replace(self._index, frames=frames, checksums=checksums, complete=there.complete)
         self._check_files()
 

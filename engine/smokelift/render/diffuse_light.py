@@ -36,8 +36,8 @@ class DiffuseLight:
         # gray smoke scatters all channels alike, whatever colors they are
         whole = slice(0, FIELDS * plan.lighting.channels)
         self._alike = [(self._albedo, whole)] if plan.medium.is_grey else _channels(albedos)
-        shares = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo
-        self._shares = shares.astype(np.float32).repeat(FIELDS)[:, None, None, None]
+        relative = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo
+        self._relative_albedos = relative.astype(np.float32).repeat(FIELDS)[:, None, None, None]
         size = min(max(round(max(plan.domain.resolution) / BLOCKS), MIN_BLOCK), MAX_BLOCK)
         self._edge = size * plan.domain.voxel_size
         # blocks lie alike in the domain whatever the box; their centers reach around all voxels of the box
@@ -64,7 +64,7 @@ class DiffuseLight:
         if self._means is None or self._radiance is None:
             raise RuntimeError("No diffuse light has been added.")
         self._interpolate(self._radiance, -self._albedo, medium)
-        radiance_gradient = self._shares * _core.interpolate_adjoint(
+        radiance_gradient = self._relative_albedos * _core.interpolate_adjoint(
             gradient, self._support, self._albedo, self._blocks
         )
         means_gradient = np.zeros_like(self._means)
@@ -78,8 +78,8 @@ class DiffuseLight:
         _core.average_adjoint(medium, self._support, self._blocks, means_gradient, gradient)
 
     def _interpolate(self, radiance: Array, factor: float, medium: Array) -> None:
-        """Add a multiple of what the voxels scatter of the blocks' radiance, each channel by its share."""
-        _core.add_interpolated(self._shares * radiance, factor, self._blocks, medium, self._support)
+        """Add a multiple of what the voxels scatter of the blocks' radiance, each channel by its relative albedo."""
+        _core.add_interpolated(self._relative_albedos * radiance, factor, self._blocks, medium, self._support)
 
 
 def _channels(albedos: Sequence[float]) -> list[tuple[float, slice]]:

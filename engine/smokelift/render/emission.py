@@ -81,17 +81,17 @@ def _samples(
                 if not here.size:
                     continue
                 b, c = (lines[here, n] + lines[here, n + 1] * k for n in (0, 2))
-                voxels, shares = [], []
+                voxels, weights = [], []
                 for i, near_b in _neighbors(b, shape[b_axis]):
                     for j, near_c in _neighbors(c, shape[c_axis]):
                         voxels.append(k * strides[axis] + i * strides[b_axis] + j * strides[c_axis])
-                        shares.append(near_b * near_c)
-                places, share = np.array(voxels), np.array(shares)
-                depth = extinction * length[here] * (share * smoke[places]).sum(0)
+                        weights.append(near_b * near_c)
+                places, weight = np.array(voxels), np.array(weights)
+                depth = extinction * length[here] * (weight * smoke[places]).sum(0)
                 step = clear[here] * length[here] * -np.expm1(-depth) / np.where(depth > 0, depth, 1)
                 step = np.where(depth > 0, step, clear[here] * length[here])
                 clear[here] *= np.exp(-depth)
-                yield here, places, share * step
+                yield here, places, weight * step
 
 
 def _neighbors(place: NDArray[np.float32], count: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float32]]]:

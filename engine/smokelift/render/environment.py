@@ -113,8 +113,8 @@ class EnvironmentCells:
         # cells of one row, or of mirrored halves, lie equally far along the axis but for rounding
         order = np.argsort(np.rint(along / ROUNDING), kind="stable")
         weight, moment = weight[order], (weight[:, None] * direction)[order]
-        kept = _concentration(weight, moment)[:-1] + _concentration(weight[::-1], moment[::-1])[-2::-1]
-        cut = _first_largest(kept) + 1
+        concentration = _concentration(weight, moment)[:-1] + _concentration(weight[::-1], moment[::-1])[-2::-1]
+        cut = _first_largest(concentration) + 1
         return [stratum[order[:cut]], stratum[order[cut:]]]
 
 

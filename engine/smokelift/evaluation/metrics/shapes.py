@@ -25,7 +25,7 @@ FAINT_RAY, FAINT_ROW = 0.1, 0.02
 
 @dataclass(frozen=True, eq=False)
 class RayShapes:
-    """The shape of one moment's smoke along parallel level rays; all means count by smoke.
+    """The shape of one frame's smoke along parallel level rays; all means count by smoke.
 
     Attributes
     ----------
