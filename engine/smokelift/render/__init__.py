@@ -1,7 +1,7 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
     Scene -> Optics     domain, medium, lights, scattering           optics
-      lights            all as directional and point lights          optics, environment, environment_count
+      lights            all as directional and point lights          optics, environment
     Optics -> Renderer  one camera before one background             renderer
       RenderPlan        rays and light sweeps in voxel coordinates   plan, camera_rays, light_sweeps
       Backend           light to every voxel, then along the rays    device: cpu_backend (cpp/) or gpu/ (Taichi)

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.given_background import background_picture
-from smokelift.render.environment import environment_lights
-from smokelift.render.environment_count import environment_count
+from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.renderer import Image, Renderer
 from smokelift.scene import (
     Camera,

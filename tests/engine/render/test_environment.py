@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from smokelift.footage.images import ImageError
 from smokelift.output.images import write_image
 from smokelift.render import Renderer
-from smokelift.render.environment import environment_lights
-from smokelift.render.environment_count import environment_count
+from smokelift.render.environment import environment_count, environment_lights
 from smokelift.scene import Camera, Domain, EnvironmentLight, Medium
 from tests.engine.render.environments import sky, soft_lamps, texels
 
