@@ -27,8 +27,7 @@ from benchmarks.errors import relative_error
 from benchmarks.tables import markdown
 from smokelift.output.images import write_image
 from smokelift.render import Renderer
-from smokelift.render.environment import environment_lights
-from smokelift.render.environment_count import environment_count
+from smokelift.render.environment import environment_count, environment_lights
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium, PointLight
 
 Array = npt.NDArray[np.floating[Any]]
