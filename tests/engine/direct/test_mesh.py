@@ -1,11 +1,19 @@
-"""Meshes as obstacles: which voxels they enclose, and the files they come from."""
+"""Meshes as obstacles, still and moving: which voxels they enclose, how fast they are, and the files they come from."""
 
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, BoxObstacle, Mesh
+from smokelift.direct import Ball, BoxObstacle, Continuation, Mesh, continue_sequence, open_source
+from smokelift.direct.constraint import faces_between
 from smokelift.direct.mesh import HEADER, RECORD
-from tests.engine.direct.rising import DOMAIN
+from smokelift.direct.simulation import Physics
+from smokelift.direct.surroundings import Obstacles, Surroundings, require_place
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from smokelift.transport import divergence
+from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free, write_plume
+
+H = DOMAIN.voxel_size
 
 CUBE = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4)]
 CUBE += [(1, 5, 7), (1, 7, 3)]
@@ -89,3 +97,89 @@ def test_an_stl_file_is_read_as_it_was_written(tmp_path):
     for missing in (tmp_path, tmp_path / "none.stl"):
         with pytest.raises(ValueError):
             Mesh.read(missing)
+
+
+def along_x(triangles: np.ndarray, speed: float, frames: int) -> Mesh:
+    """A mesh that goes along x."""
+    way = speed * DT * np.arange(frames + 1)
+    return Mesh(np.stack([triangles + np.array([x, 0, 0]) for x in way]).astype(np.float32))
+
+
+def test_the_surface_has_the_speed_of_its_corners():
+    start = cube((-0.5, -0.3, 0.6), (0.5, 0.3, 1.4)).astype(float)
+    turn = 0.02
+    matrix = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    voxels, (x, y, z) = Mesh(np.stack([start, start @ matrix.T])).solid(DOMAIN, 1, DT)
+    outer = faces_between(voxels)
+    rate = turn / DT
+    across = np.arange(16) * H + H / 2 - 1
+    np.testing.assert_allclose(x[outer[0]], np.broadcast_to(-rate * across[:, None], x.shape)[outer[0]], atol=0.01)
+    np.testing.assert_allclose(y[outer[1]], np.broadcast_to(rate * across[:, None, None], y.shape)[outer[1]], atol=0.01)
+    assert not z[outer[2]].any()
+    _, (x, y, z) = along_x(start, 0.7, 3).solid(DOMAIN, 2, DT)
+    np.testing.assert_allclose(x, 0.7, rtol=1e-4)
+    assert not y.any()
+    assert not z.any()
+    _, (x, _, _) = along_x(start, 0.7, 3).solid(DOMAIN, 4, DT)  # it has come to rest
+    assert not x.any()
+
+
+def test_a_ball_pushes_still_smoke_before_it():
+    """Nothing goes through its faces but with it, no smoke is lost, and the air has no divergence."""
+    moving = along_x(ball((-0.55, 0.0, 1.5), 0.3), 0.8, 12)
+    obstacles = Obstacles(DOMAIN, (moving,))
+    start = at_rest(blob((0.0, 0.0, 1.5), 0.2))
+    states = course(free(Physics(0.0, 0.0), Surroundings(obstacles=obstacles)), start, 12)
+    for step, state in enumerate(states[1:], 1):
+        solid = obstacles.at(step, DT)
+        for mask, component, wanted in zip(
+            faces_between(solid.voxels), state.velocity.faces, solid.velocity, strict=True
+        ):
+            np.testing.assert_array_equal(component[mask], wanted[mask])
+        assert not state.density[solid.voxels].any()
+        assert np.abs(divergence(state.velocity))[~solid.voxels].max() * H < 0.02 * 0.8
+    before, after = states[0].density, states[-1].density
+    assert after.sum() == pytest.approx(before.sum(), rel=0.02)
+    places = np.arange(16) * H + H / 2 - 1
+    # the ball's front comes from 0.25 m before the middle of the smoke to 0.15 m behind it
+    assert abs(np.average(places, weights=before.sum(axis=(1, 2)))) < 0.01
+    assert np.average(places, weights=after.sum(axis=(1, 2))) > 0.06
+
+
+def test_numbered_files_are_one_obstacle(tmp_path):
+    """A run that goes on has to have the same; what does not belong together is refused in one sentence."""
+    moving = along_x(cube((-0.9, -0.3, 1.2), (-0.4, 0.3, 1.7)), 2.0, 3)
+    pattern = tmp_path / "crate_####.stl"
+    with pytest.raises(ValueError):
+        Mesh.read(pattern)
+    for number, place in enumerate(moving.places, 9):
+        written(tmp_path / f"crate_{number:04d}.stl", place)
+    read = Mesh.read(pattern)
+    np.testing.assert_array_equal(read.places, moving.places)
+    write_plume(tmp_path / "source")
+    source, out = open_source(tmp_path / "source"), tmp_path / "out"
+    for number, figures in continue_sequence(source, out, Continuation(3, obstacles=(read,)), npz=True):
+        assert number <= 10 or figures["divergence"] < 0.02
+        if number == 12:
+            break
+    still = Continuation(3, obstacles=(Mesh(moving.places[:1]),))
+    with pytest.raises(SequenceError):
+        next(continue_sequence(source, out, still, npz=True, resume=True))
+    assert len(list(continue_sequence(source, out, Continuation(3, obstacles=(read,)), npz=True, resume=True))) == 1
+    made = Sequence.open(out)
+    for step in (1, 2, 3):
+        assert not made.density(10 + step)[moving.voxels(made.scene.domain, step)].any()
+    (tmp_path / "crate_0010.stl").unlink()
+    with pytest.raises(ValueError):
+        Mesh.read(pattern)
+    written(tmp_path / "crate_0010.stl", moving.places[1, :-1])
+    with pytest.raises(ValueError):
+        Mesh.read(pattern)
+
+
+def test_a_mesh_that_never_reaches_the_box_is_refused():
+    far = cube((5.0, -0.3, 1.2), (5.5, 0.3, 1.7))
+    with pytest.raises(ValueError):
+        require_place("obstacle", along_x(far, 0.1, 5), DOMAIN, DOMAIN)
+    require_place("obstacle", along_x(far, 0.1, 5), DOMAIN, DOMAIN.grown((0, 0, 0), (40, 0, 0)))
+    assert Obstacles(DOMAIN, (along_x(far, -24.0, 5),)).at(1, DT) is None
