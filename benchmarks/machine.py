@@ -1,16 +1,17 @@
-"""The machine that a benchmark runs on: what it is, how fast it copies memory and solves a Poisson equation."""
+"""The machine that a benchmark runs on: what it is, and time in seconds and in Poisson solves of the same grid."""
 
 from __future__ import annotations
 
 import os
 import platform
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime
+from contextlib import suppress
+from datetime import date
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import psutil
@@ -22,46 +23,37 @@ from smokelift.report.cost import peak_memory
 COPY_THREADS = 2
 """Threads that copy memory: enough to fill the bus of a desktop processor."""
 
+SHAPES = ((64, 64, 96), (128, 128, 192), (256, 256, 288))
+"""The resolutions of the paper's table 2."""
+
+UNTIMED = 2
+"""Frames that do not count: the first two come together, and compilers work before them."""
+
 POISSON_THREADS = 2
 """Threads of a Poisson solve: those of the machine that the published tables were measured on."""
 
-
-def provenance(libraries: Iterable[str]) -> dict[str, Any]:
-    """Return ``date``, ``machine`` and ``versions``, with which all results begin."""
-    return {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe(),
-        "versions": versions(libraries),
-    }
+Frame = TypeVar("Frame")
 
 
-def describe() -> dict[str, Any]:
-    """Return processor, cores that may be used, memory and systems."""
-    return {
-        "processor": _processor(),
-        "cores": len(psutil.Process().cpu_affinity()) if hasattr(psutil.Process, "cpu_affinity") else os.cpu_count(),
-        "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
-        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "python": platform.python_version(),
-    }
-
-
-def versions(libraries: Iterable[str]) -> dict[str, str]:
-    """Return our version and those of the libraries that are installed."""
+def provenance(*libraries: str) -> str:
+    """Return two lines that say on what machine, when and with what of these libraries results are measured."""
     found = {"smokelift": smokelift.__version__}
     for name in libraries:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
+    versions = ", ".join(f"{name} {version}" for name, version in found.items())
+    return f"{processor()}, {date.today().isoformat()}\n{versions}"
 
 
-def provenance_text(results: dict[str, Any], where: str = "") -> str:
-    """Return two lines that say on what machine, when and with what libraries results were measured."""
-    computer = results["machine"]
-    libraries = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
-    return f"{computer['processor']}, {computer['cores']} cores{where}, {results['date']}\n{libraries}"
+def processor() -> str:
+    """Return the processor's name and how many of its cores may be used."""
+    cores = len(psutil.Process().cpu_affinity()) if hasattr(psutil.Process, "cpu_affinity") else os.cpu_count()
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{(models or [platform.processor() or platform.machine()])[0]}, {cores} cores"
 
 
 def copy_milliseconds(size: int) -> float:
@@ -100,9 +92,47 @@ def peak_mib() -> float | None:
     return None if peak is None else peak / 2**20
 
 
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+class FrameTimes:
+    """Times of a run's frames. Between them a Poisson solve is timed, because the machine may be busy.
+
+    Parameters
+    ----------
+    shape
+        Voxels along x, y and z.
+    clock
+        Returns the time now (s): what a user waits, or `time.process_time`, which counts the work of all cores and is
+        the same beside other work.
+    """
+
+    def __init__(self, shape: tuple[int, int, int], clock: Callable[[], float] = time.perf_counter) -> None:
+        self._shape, self._clock = shape, clock
+        self._seconds: list[float] = []
+        self._units: list[float] = []
+
+    def before(self, action: Callable[[Frame], object]) -> Callable[[Frame], None]:
+        """Return what to call with each frame once it is made: it times the making from now on, but not the action."""
+        began = self._clock()
+
+        def timed(frame: Frame) -> None:
+            nonlocal began
+            self._seconds.append(self._clock() - began)
+            self._units.append(poisson_seconds(self._shape, self._clock))
+            action(frame)
+            began = self._clock()
+
+        return timed
+
+    @property
+    def seconds(self) -> float:
+        """A frame (s), the median."""
+        return median(self._seconds)
+
+    @property
+    def solves(self) -> float:
+        """A frame in Poisson solves."""
+        return self.seconds / median(self._units)
+
+
+def median(values: list[float]) -> float:
+    """Return the median over the frames that count; over all, if there are no others."""
+    return float(np.median(values[UNTIMED:] or values))

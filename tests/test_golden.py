@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.extraction.compose import BakedSmoke, Composed
+from benchmarks.baked import FRONT, Baked
+from benchmarks.extraction.compose import Composed
 from benchmarks.extraction.score import score_element, seen_element
 from smokelift import Clip, Frame, Scene, Settings, metrics, reconstruct
 from smokelift.evaluation.frame_means import VolumeMeans, finite_mean
@@ -122,13 +123,13 @@ def _against_front(_: GoldenShot, scene: CompleteScene, frames: list[Frame]) -> 
 def _against_truth(shot: GoldenShot, scene: CompleteScene, frames: list[Frame]) -> Figures:
     """Measure beside the truth; the orbit on the grid of the reconstruction, where it costs an eighth."""
     first, last = shot.frames
-    truth, smoke = Truth.load(shot.folder / "truth.npz"), BakedSmoke.load(shot.folder, last + 1)
+    truth, smoke = Truth.load(shot.folder / "truth.npz"), Baked.load(shot.folder, last + 1, FRONT)
     volumes = VolumeMeans(truth)
     for number, frame in enumerate(frames, first):
         volumes.add(number, frame.density, frame.velocity.centres())
     means = volumes.figures()
-    plate = np.broadcast_to(background_picture(scene), (*smoke.front.radiance.shape[1:], 3))
-    true = Composed(smoke.front.radiance, smoke.front.transmittance, plate).frames(range(first, last + 1))
+    plate = np.broadcast_to(background_picture(scene), (*smoke.front.shape, 3))
+    true = Composed(smoke.front, plate).at(range(first, last + 1))
     element = score_element(*seen_element(scene, [frame.density for frame in frames]), true)
     around = orbit_scores(
         scene,

@@ -15,7 +15,6 @@ import messages
 import notebook
 import scene_reference
 import smokelift
-from benchmarks.command import bench_parser
 from smokelift.app.cli import command_parser
 from smokelift.scene import Scene, SceneError, scene_from_dict
 
@@ -51,17 +50,16 @@ def mentions(page: Path) -> Iterator[list[str]]:
 
 
 def parse(words: list[str]) -> None:
-    """Parse the words after the program as the command line does, or as the benchmarks after `python -m benchmarks`."""
-    parser, given = (bench_parser(), words[3:]) if words[0] == "python" else (command_parser(), words[1:])
+    """Parse the words after the program as the command line does."""
     try:
-        parser.parse_args(given)
+        command_parser().parse_args(words[1:])
     except SystemExit as refused:
         pytest.fail(f"refused: {' '.join(words)}: {refused}")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_commands_of_a_page_are_taken(page: Path) -> None:
-    for line in (*commands(page, "smokelift"), *commands(page, "python -m benchmarks")):
+    for line in commands(page, "smokelift"):
         parse(shlex.split(line))
 
 

@@ -28,8 +28,8 @@ from benchmarks.accuracy.runs import SMEAR
 from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
 from benchmarks.accuracy.score import score
 from benchmarks.accuracy.sheets import Row, strip_rows, write_orbits
-from benchmarks.machine import describe
-from smokelift.output.images import write_sheet
+from benchmarks.machine import processor
+from smokelift.output.sheet import write_sheet
 
 PLAUSIBLE_AND_SMOOTH = ("balanced", "balanced:detail=0")
 """The default, whose detail in depth is made up, and the answer without it, which is the nearer one in PSNR."""
@@ -64,8 +64,7 @@ def main() -> None:
     def folder(known: KnownScene, run: str) -> Path:
         return out / "runs" / known.scene_path.parent.name / run
 
-    computer = describe()
-    where = {"machine": f"{computer['processor']}, {computer['cores']} cores", "date": date.today().isoformat()}
+    where = {"machine": processor(), "date": date.today().isoformat()}
     rows = []
     strips: list[Row] = []
     for done, known in enumerate(scenes, 1):  # written after every scene: the next may take an hour

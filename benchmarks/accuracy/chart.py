@@ -16,7 +16,6 @@ import numpy as np
 
 from benchmarks.accuracy.label_placement import place_labels
 from benchmarks.accuracy.measured_runs import ERRORS, Run, Runs, read_runs
-from benchmarks.charts import require_matplotlib
 
 SECONDS = "seconds"
 
@@ -52,12 +51,11 @@ def chart(runs: Runs) -> Any:
     Raises
     ------
     ValueError
-        If matplotlib is not installed, or no run has both a time and an error.
+        If no run has both a time and an error.
     """
     shown = [panel for panel in PANELS if any(_at(run, panel) is not None for run in runs.runs)]
     if not any(across == SECONDS for across, _ in shown):
         raise ValueError("No run has both a time and an error; there is nothing to draw.")
-    require_matplotlib()
     from matplotlib.figure import Figure
 
     columns = min(len(shown), 2)

@@ -81,7 +81,7 @@ def capture_columns(views: list[str]) -> list[Column]:
 
 def markdown(rows: list[Row], shown: list[Column]) -> str:
     """Return a table of some runs."""
-    cells = [[row["scene"], row["run"], *(_cell(row, names, form) for _, names, form in shown)] for row in rows]
+    cells = [[row["scene"], row["run"], *(tables.cell(row, names, form) for _, names, form in shown)] for row in rows]
     return tables.markdown(["scene", "run", *(heading for heading, _, _ in shown)], cells)
 
 
@@ -133,10 +133,3 @@ def _means(rows: list[Row]) -> list[Row]:
                 mean[name] = float(np.mean(values))
         found.append(mean)
     return found
-
-
-def _cell(row: Row, names: list[str], form: str) -> str:
-    values = [row.get(name) for name in names]
-    if all(value is None for value in values):
-        return ""
-    return " / ".join("-" if value is None else f"{value:{form}}" for value in values)

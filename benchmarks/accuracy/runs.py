@@ -23,7 +23,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from benchmarks.accuracy.ablations import leave_out, smear
-from benchmarks.accuracy.scenes import VIEWS, BakedViews, camera_of
+from benchmarks.accuracy.scenes import baked_scene
+from benchmarks.baked import VIEWS, camera_of
 from smokelift import ClipSource, Scene, Settings
 from smokelift.density import DensitySettings, GradientFit, ViewSet
 from smokelift.output.images import write_image
@@ -74,9 +75,9 @@ def further_view(name: str, scene_path: Path, last: int, folder: Path) -> View:
     path = scene_path.with_name(f"{VIEWS.get(name, name)}.toml")
     source = Scene.load(path).clip
     if source is None:
-        seen = BakedViews.load(scene_path.parent)
+        known = baked_scene(scene_path.parent, last + 1)
         for number in range(last + 1):
-            write_image(folder / f"{name}_{number:04d}.png", seen.seen(name, number))
+            write_image(folder / f"{name}_{number:04d}.png", known.seen(name, number))
         source = ClipSource(folder / f"{name}_####.png")
     return View(camera_of(path), source)
 

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.baked import FRONT, Baked, camera_of
 from smokelift import Camera, Clip, Scene
 from smokelift.density.upright_plane import view_frame
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import Picture, area_average
+from smokelift.footage.images import area_average
 from smokelift.render import Image
 from smokelift.scene.projection import project_points, ray_through_pixels
-
-VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
-"""Cameras of a baked scene by their angle about the vertical (degrees), and the names of their files."""
 
 REAL_SIZE = (270, 480)
 """Columns and rows at which pictures of the ScalarFlow capture are compared."""
@@ -28,50 +26,6 @@ REAL_FRAMES = range(10, 111, 10)
 REGISTRATION = {"camera00": (-12, 18), "camera01": (52, 18), "camera03": (11, -12), "camera04": (11, -18)}
 """(Rows, columns) of 1920 x 1080 by which FluidNexus (2025) moves the recorded pictures of the ScalarFlow capture down
 and to the right, because the published calibration is off by so much."""
-
-
-@dataclass(frozen=True, eq=False)
-class BakedViews:
-    """What the cameras of a baked scene see of its smoke alone: the files of `benchmarks.truth.picture`.
-
-    Attributes
-    ----------
-    cameras
-        By the keys of `VIEWS`.
-    pictures
-        Linear grey radiance before black, float16 [frame, row, column].
-    transmittances
-        The share of the background's light that gets through, as large.
-    """
-
-    cameras: dict[str, Camera]
-    pictures: dict[str, npt.NDArray[np.float16]]
-    transmittances: dict[str, npt.NDArray[np.float16]]
-
-    @staticmethod
-    def load(folder: Path) -> BakedViews:
-        """Read all cameras and their pictures."""
-        pictures, transmittances = {}, {}
-        for view, name in VIEWS.items():
-            with np.load(folder / f"{name}.npz") as file:
-                pictures[view], transmittances[view] = file["image"], file["transmittance"]
-        cameras = {view: camera_of(folder / f"{name}.toml") for view, name in VIEWS.items()}
-        return BakedViews(cameras, pictures, transmittances)
-
-    def seen(self, view: str, frame: int) -> Image:
-        """Return the picture of a camera in a frame, linear (rows, columns, 3)."""
-        return np.repeat(self.pictures[view][frame][..., None].astype(np.float32), 3, axis=-1)
-
-    def averaged(self, size: tuple[int, int], frames: Sequence[int]) -> tuple[dict[str, Picture], dict[str, Picture]]:
-        """Return radiance and transmittance of every camera, (frames, rows, columns), at another size."""
-        radiance, transmittance = (
-            {
-                view: np.stack([area_average(each[frame].astype(np.float32), *size) for frame in frames])
-                for view, each in pictures.items()
-            }
-            for pictures in (self.pictures, self.transmittances)
-        )
-        return radiance, transmittance
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +60,18 @@ class KnownScene:
     truth: Truth | None
 
 
-def baked_scene(folder: Path, frames: int) -> KnownScene:
+def baked_scene(folder: Path, frames: int | None = None) -> KnownScene:
     """Return a scene of `benchmarks.truth.picture`, at most so many frames from its first."""
-    truth, views = Truth.load(folder / "truth.npz"), BakedViews.load(folder)
-    span = range(min(frames, truth.frames))
+    truth, baked = Truth.load(folder / "truth.npz"), Baked.load(folder, frames)
+    span = range(len(baked))
+
+    def seen(view: str, frame: int) -> Image:
+        return np.repeat(baked.views[view].radiance[frame][..., None], 3, axis=-1)
 
     def billboard(_: str, frame: int, __: float) -> Image:
-        return views.seen("0", frame)
+        return seen(FRONT, frame)
 
-    return KnownScene(folder.name, folder / "scene.toml", span, span, views.cameras, views.seen, billboard, truth)
+    return KnownScene(folder.name, folder / "scene.toml", span, span, baked.cameras, seen, billboard, truth)
 
 
 def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
@@ -152,14 +109,6 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
     name = f"{folder.name}, {'registered' if registered else 'as calibrated'}"
     frames = range(REAL_FRAMES[-1] + 1)
     return KnownScene(name, folder / "scene.toml", frames, REAL_FRAMES, cameras, seen, billboard, None)
-
-
-def camera_of(path: Path) -> Camera:
-    """Return the camera of a scene file."""
-    camera = Scene.load(path).camera
-    if camera is None:
-        raise ValueError(f"{path}: has no [camera].")
-    return camera
 
 
 def moved(picture: Image, down: int, right: int) -> Image:

@@ -15,6 +15,7 @@ from scipy import ndimage
 from benchmarks.accuracy.exposure import best_gain
 from benchmarks.accuracy.runs import billboard_depth, run_name, run_views
 from benchmarks.accuracy.scenes import KnownScene
+from benchmarks.baked import BLACK
 from benchmarks.process import run_module
 from smokelift import Scene
 from smokelift.evaluation import metrics
@@ -26,8 +27,8 @@ from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array
 
-FRONT, SIDE = "0", "90"
-"""The input's view, and the one in which a wrong distribution along the rays shows most."""
+SIDE = "90"
+"""The view in which a wrong distribution along the rays shows most."""
 
 BILLBOARDS = ("billboard", "blurred")
 """The input picture in every view, as it is and blurred."""
@@ -38,8 +39,6 @@ BASELINES = (*BILLBOARDS, "truth", "black")
 BLUR = 1 / 120
 """Standard deviation of the blurred billboard's Gaussian, as a share of a picture's longer side. Of 1, 2, 3 and 4 / 120
 it is the best for camera 00 of the ScalarFlow capture, with and without a gain."""
-
-BLACK = np.zeros(3, np.float32)
 
 VIEW_FIGURES = ("psnr", "ssim")
 ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "texture", "texture_own", "edges", "halo", "flicker")

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.accuracy.scenes import KnownScene
-from benchmarks.accuracy.score import BLACK, SIDE, around, known_densities
-from smokelift.evaluation.orbit import Orbit, orbit_curves, orbit_tiles, write_orbit_page
+from benchmarks.accuracy.score import SIDE, around, known_densities
+from benchmarks.baked import BLACK
+from smokelift.evaluation.orbit import Orbit
+from smokelift.evaluation.orbit_page import orbit_curves, orbit_tiles, write_orbit_page
 from smokelift.evaluation.orbit_scores import AZIMUTHS
 from smokelift.footage.images import area_average
 from smokelift.output.images import Tile, eight_bit

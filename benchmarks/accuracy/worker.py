@@ -21,8 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.accuracy.runs import SMEAR, further_view, run_method, run_settings, run_views, smeared
-from benchmarks.machine import peak_mib
-from benchmarks.timing import FrameTimes
+from benchmarks.machine import FrameTimes, peak_mib
 from smokelift import Clip, Reconstruction, Scene, Settings, prepare_shot
 from smokelift.render import Volume
 

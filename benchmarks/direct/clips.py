@@ -1,18 +1,14 @@
 """Known smoke and reconstructions of it, as moments."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.scenes import KnownScene
-from benchmarks.accuracy.score import BLACK, KnownDensities, known_densities
-from smokelift.direct import SmokeState, complete_velocity
+from smokelift.direct import Moment, complete_velocity
 from smokelift.evaluation import metrics
-from smokelift.evaluation.frame_means import PictureMeans
-from smokelift.evaluation.truth import Truth, resampled
-from smokelift.render import scene_renderer
+from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array, Velocity, on_faces
 
 
@@ -28,18 +24,6 @@ def reconstructed_moment(folder: Path, truth: Truth, frame: int) -> SmokeState:
         density, centres = (file[name].astype(np.float32) for name in ("density", "velocity"))
     voxel_size = truth.voxel_size * truth.shape[0] / density.shape[0]
     return SmokeState(density, complete_velocity(Velocity(on_faces(centres), voxel_size, truth.closed)))
-
-
-def picture_psnr(known: KnownScene, densities: Sequence[Array], frames: Sequence[int], run: str, folder: Path) -> float:
-    """Return the PSNR (dB) of densities in the views that are not the input's, over some frames of a scene."""
-    about: KnownDensities | None = known_densities(known, run, folder)
-    assert about is not None
-    means = PictureMeans()
-    for view, camera in list(known.cameras.items())[1:]:
-        renderer = scene_renderer(about.scene, camera, BLACK)
-        for frame, density in zip(frames, densities, strict=True):
-            means.add(renderer.image(density), known.seen(view, frame))
-    return float(means.figures()["psnr"])
 
 
 def density_error(found: Array, true: Array) -> float:

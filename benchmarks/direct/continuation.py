@@ -17,7 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
-from benchmarks.direct.clips import density_error, picture_psnr, reconstructed_moment, true_moment
+from benchmarks.accuracy.score import known_densities
+from benchmarks.direct.clips import density_error, reconstructed_moment, true_moment
+from benchmarks.measure import view_figures
 from benchmarks.tables import markdown
 from smokelift.direct import SmokeState, coarse, fit_simulation, spun_up
 from smokelift.direct.continuation import FITTED_FRAMES
@@ -106,10 +108,14 @@ def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list
         moments = [reconstructed_moment(folder, truth, frame) for frame in shown]
     really = rise([truth.velocity(frame - 1) for frame in frames], truth.density(cut - 1), truth.dt)
     run, at = ("truth", Path()) if folder is None else (RUN, folder)
+    about = known_densities(known, run, at)
+    assert about is not None
     fitted = with_dissolving_heads(moments, truth.dt, heads)
     for how, found, physics in ways(moments, len(frames), truth.dt, fitted):
         errors = [density_error(m.density, truth.density(f)) for m, f in zip(found, frames, strict=True)]
-        views = picture_psnr(known, [m.density for m in found[::3]], frames[::3], run, at)
+        new = dict(list(known.cameras.items())[1:])
+        at_frame = {frame: moment.density for frame, moment in zip(frames, found, strict=True)}
+        views = view_figures(about.scene, at_frame.__getitem__, new, known.seen, frames[::3])["psnr_new"]
         share = truth.density(cut).size / found[-1].density.size
         mass = share * found[-1].density.sum(dtype=float) / truth.density(frames[-1]).sum(dtype=float)
         figures = [f"{np.mean(errors):.2f}", f"{errors[-1]:.2f}", f"{views:.1f}", f"{mass:.2f}"]
@@ -150,13 +156,13 @@ def main() -> None:
     options = parser.parse_args()
     rows: list[list[str]] = []
     for scene in options.scenes:
-        known = baked_scene(scene, 10**6)
+        known = baked_scene(scene)
         rows += table(known, None, options.heads)
         if options.runs and (folder := options.runs / scene.name / RUN).is_dir():
             rows += table(known, folder, options.heads)
     print(markdown(HEADER, rows), flush=True)
     if options.picture:
-        picture(baked_scene(options.scenes[0], 10**6), options.picture)
+        picture(baked_scene(options.scenes[0]), options.picture)
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("picture", type=Path)
     parser.add_argument("--frames", type=int, default=48)
     options = parser.parse_args()
-    truth = baked_scene(options.scene, 10**6).truth
+    truth = baked_scene(options.scene).truth
     if truth is None:
         parser.error(f"{options.scene}: has no truth.npz")
     x0, y0, z0 = BOX_MIN

@@ -4,7 +4,7 @@
 - ``spoiled``: what a camera, a codec and a wrong description do to a take of it
 - ``smoke``: other smoke: thicker, darker, forward scattering, entering, splitting
 - ``table``: every disturbance with its strengths
-- ``measure``: reconstructs a take and scores it
+- ``whole_run``: reconstructs a take and scores it
 - ``calls``: single calls of the fit and of the velocity
 - ``report``: the CSV, the charts, the table of the page
 

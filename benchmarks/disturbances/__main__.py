@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from benchmarks import charts
 from benchmarks.disturbances.known import Known
 from benchmarks.disturbances.report import Results, draw, table
 from benchmarks.disturbances.spoiled import MOMENTS
 from benchmarks.disturbances.table import DISTURBANCES
 from smokelift.render import device
-from smokelift.setup.settings import METHODS, MethodName
+from smokelift.setup.settings import METHODS
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -28,32 +27,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--only", nargs="+", choices=DISTURBANCES, default=list(DISTURBANCES), metavar="DISTURBANCE")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
     options = parser.parse_args(arguments)
-    charts.require_matplotlib()
-    options.out.mkdir(parents=True, exist_ok=True)
+    import matplotlib  # noqa: F401  (missing, it is missed now, not after hours)
+
     device.start("cpu")
     results = Results(options.out / "stability.csv")
     asked = [
-        (name, strength, folder.name, method)
+        (strength not in (disturbance.undisturbed, *disturbance.common), name, strength, folder, method)
         for folder in options.scenes
-        for name in options.only
+        for name, disturbance in DISTURBANCES.items()
+        if name in options.only
         for method in options.methods
-        for strength in DISTURBANCES[name].strengths
+        for strength in disturbance.strengths
     ]
-    folders = {folder.name: folder for folder in options.scenes}
-    known = lru_cache(maxsize=1)(lambda scene: Known.load(folders[scene], MOMENTS))
-    for key in sorted(asked, key=_rank):
-        if key not in results:
-            name, strength, scene, method = key
-            results.add(key, DISTURBANCES[name].measure(known(scene), strength, method))
+    known = lru_cache(maxsize=1)(Known.read)
+    for _, name, strength, folder, method in sorted(asked, key=lambda row: row[0]):
+        key = results.key(name, strength, folder.name, method)
+        if results.find(key) is None:
+            results.add(key, DISTURBANCES[name].measure(known(folder, MOMENTS), strength, method))
     (options.out / "stability.md").write_text(table(results) + "\n")
     draw(results, "psnr_new", "new views, dB beside undisturbed", options.out / "stability_views.png")
     draw(results, "velocity_error", "velocity error", options.out / "stability_velocity.png")
-
-
-def _rank(key: tuple[str, float, str, MethodName]) -> bool:
-    """What is measured first: the strengths that people meet, and what they are compared with."""
-    disturbance = DISTURBANCES[key[0]]
-    return key[1] not in (disturbance.undisturbed, *disturbance.common)
 
 
 if __name__ == "__main__":

@@ -4,18 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.background.clips import filmed
-from benchmarks.disturbances.known import BLACK, FRONT, GRID, Known
-from benchmarks.disturbances.measure import Figures
-from benchmarks.disturbances.spoiled import FIRST, plain
-from smokelift import Settings
+from benchmarks.disturbances.known import GRID, Known
+from benchmarks.disturbances.spoiled import FIRST, taken
+from benchmarks.disturbances.whole_run import seen_in, smooth
+from benchmarks.filming import filmed
+from benchmarks.measure import Figures, view_figures
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
-from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values, finite_mean
-from smokelift.evaluation.metrics import psnr, velocity_error
-from smokelift.evaluation.truth import resampled
+from smokelift.evaluation.frame_means import SMOKE_SHARE
+from smokelift.evaluation.metrics import velocity_error
+from smokelift.evaluation.resampling import resampled
 from smokelift.pipeline import Method, compose
-from smokelift.render import scene_renderer
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import MethodName
 from smokelift.transport import Velocity, advect, project
@@ -31,7 +30,7 @@ def motion(known: Known, voxels: float, method: MethodName) -> Figures:
     flow = flow.with_faces(np.float32(voxels / way) * component for component in flow.faces)
     after = advect(density, flow, 1 / known.fps)
     pair = DensityPair(density, after, 1 / known.fps, flow.voxel_size)
-    found = compose(_settings(method)).velocity_estimator.estimate(pair)
+    found = compose(smooth(method)).velocity_estimator.estimate(pair)
     counted = after > SMOKE_SHARE * after.max()
     return {"velocity_error": velocity_error(found.centres(), flow.centres(), counted)[0]}
 
@@ -43,7 +42,7 @@ def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
     so the paper's own are made of them here, such that both agree where the factor is 1.
     """
     before, after = (np.float32(factor) * known.density(moment) for moment in (FIRST, FIRST + 1))
-    estimator = compose(_settings(method)).velocity_estimator
+    estimator = compose(smooth(method)).velocity_estimator
     if isinstance(estimator, PaperVelocity):
         smoothness, kinetic = (weight / factor**2 for weight in (estimator.smoothness, estimator.kinetic))
         estimator = replace(estimator, smoothness=smoothness, kinetic=kinetic)
@@ -54,24 +53,14 @@ def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
 
 def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
     """The fit of one frame, started from the true density times a factor."""
-    take = plain(known.at([FIRST]))
-    clip = filmed(take.pictures, "clip")
-    shot = prepare_shot(clip, take.given, _settings(method))
+    take = taken(known.at([FIRST]))
+    shot = prepare_shot(filmed(take.pictures), take.given, smooth(method))
     composed: Method = compose(shot.settings)
     views = ViewSet.of(shot.observe(0), shot.optics, 0)
     depth = composed.depth_prior.of_clip(shot).estimate(views)
     start = np.float32(factor) * resampled(known.densities[FIRST], GRID)
     density = composed.density_fit.fit(views, depth, start).density
-    found: Figures = {}
-    for view, camera in known.cameras.items():
-        shown = scene_renderer(shot.scene, camera, BLACK).image(density)[..., :1]
-        found[f"psnr_{view}"] = psnr(eight_bit_values(shown), eight_bit_values(take.known.radiance[view][0][..., None]))
-    found["psnr_new"] = finite_mean(float(found[f"psnr_{view}"] or np.nan) for view in known.cameras if view != FRONT)
-    return found
-
-
-def _settings(method: MethodName) -> Settings:
-    return replace(Settings.preset(method=method), detail=0.0)
+    return view_figures(shot.scene, lambda _: density, known.cameras, seen_in(take), [0])
 
 
 def _on_faces(known: Known) -> Velocity:

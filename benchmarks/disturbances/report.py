@@ -1,6 +1,5 @@
-"""What was measured: the CSV that grows row by row, the strengths from which accuracy is lost, charts and table."""
+"""What was measured: the strengths from which accuracy is lost, charts and table."""
 
-import csv
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -9,32 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import charts, tables
-from benchmarks.disturbances.measure import Figures
+from benchmarks import tables
 from benchmarks.disturbances.table import DISTURBANCES
 from smokelift.checks.array_types import Doubles
 from smokelift.setup.settings import METHODS
 
-Key = tuple[str, float, str, str]
-"""Disturbance, strength, scene, method."""
-
-KEYS = ("disturbance", "strength", "scene", "method")
-FIGURES = (
-    "psnr_0", "psnr_20", "psnr_45", "psnr_90", "psnr_new", "density_error", "mass_ratio", "velocity_error", "refused",
-)  # fmt: skip
-
 LOSS = 1.0
 """dB in new views from which accuracy counts as lost."""
 
-COLOURS = {"default": "tab:blue", "paper": "tab:orange"}
+COLORS = {"default": "tab:blue", "paper": "tab:orange"}
 NAMES = {"default": "Smokelift", "paper": "the paper's method"}
 COLUMNS = 4
 HIGHEST = 4.0
 """Largest error that a chart shows."""
 
+HEADER = (
+    "disturbance", "measured", "1 dB lost from", "people meet", "there: mean (dB)", "worst (dB)",
+    "the paper's method: mean (dB)", "worst (dB)",
+)  # fmt: skip
 
-class Results:
-    """Figures by their keys, on disk after every one.
+
+class Results(tables.Rows):
+    """Figures by disturbance, strength, scene and method.
 
     Parameters
     ----------
@@ -43,54 +38,39 @@ class Results:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._rows: dict[Key, dict[str, str]] = {}
-        if not path.exists():
-            with path.open("w", newline="") as file:
-                csv.writer(file).writerow((*KEYS, *FIGURES))
-        with path.open(newline="") as file:
-            for row in csv.DictReader(file):
-                self._rows[row["disturbance"], float(row["strength"]), row["scene"], row["method"]] = row
+        views = ("psnr_0", "psnr_20", "psnr_45", "psnr_90", "psnr_new")
+        volumes = ("density_error", "mass_ratio", "velocity_error")
+        super().__init__(path, ("disturbance", "strength", "scene", "method"), (*views, *volumes, "refused"))
 
-    def __contains__(self, key: Key) -> bool:
-        return _stored(key) in self._rows
+    @staticmethod
+    def key(name: str, strength: float, scene: str, method: str) -> tuple[str, ...]:
+        """Return the key of a row, with the strength as it is in a file."""
+        return name, str(float(f"{strength:.6g}")), scene, method
 
-    def add(self, key: Key, figures: Figures) -> None:
-        """Write the figures of a key."""
-        values = {name: figures.get(name) for name in FIGURES}
-        cells = {name: f"{value:.5g}" if isinstance(value, float) else value or "" for name, value in values.items()}
-        with self._path.open("a", newline="") as file:
-            csv.writer(file).writerow([*_stored(key), *cells.values()])
-        self._rows[_stored(key)] = cells
-
-    def refusal(self, key: Key) -> str:
-        """Return the sentence that a run ended with; empty if it did not."""
-        return self._rows.get(_stored(key), {}).get("refused", "")
+    def refused(self, name: str, strength: float, method: str) -> bool:
+        """Whether the engine refused any of the scenes."""
+        found = (self.find(self.key(name, strength, scene, method)) for scene in self.scenes(name, method))
+        return any(row is not None and row["refused"] for row in found)
 
     def scenes(self, name: str, method: str) -> list[str]:
         """Return the scenes on which a method was measured under a disturbance, and the default undisturbed."""
         rest = DISTURBANCES[name].undisturbed
-        measured = dict.fromkeys(scene for n, _, scene, m in self._rows if (n, m) == (name, method))
-        return [scene for scene in measured if (name, rest, scene, METHODS[0]) in self]
-
-    def value(self, key: Key, figure: str) -> float:
-        """Return a figure; NaN if it was not measured."""
-        return float(self._rows.get(_stored(key), {}).get(figure) or math.nan)
+        measured = dict.fromkeys(scene for n, _, scene, m in self.keys if (n, m) == (name, method))
+        return [scene for scene in measured if self.find(self.key(name, rest, scene, METHODS[0])) is not None]
 
     def values(self, name: str, strength: float, method: str, figure: str) -> Doubles:
-        """Return a figure of every scene."""
-        return np.array([self.value((name, strength, scene, method), figure) for scene in self.scenes(name, method)])
+        """Return a figure of every scene; NaN where it was not measured."""
+        return self._values(name, strength, method, figure, self.scenes(name, method))
 
     def changes(self, name: str, strength: float, method: str) -> Doubles:
         """Return the new views' PSNR of every scene less that of the default undisturbed (dB)."""
-        rest = DISTURBANCES[name].undisturbed
-        undisturbed = [self.value((name, rest, scene, METHODS[0]), "psnr_new") for scene in self.scenes(name, method)]
-        return np.subtract(self.values(name, strength, method, "psnr_new"), undisturbed)
+        rest, scenes = DISTURBANCES[name].undisturbed, self.scenes(name, method)
+        undisturbed = self._values(name, rest, METHODS[0], "psnr_new", scenes)
+        return np.subtract(self._values(name, strength, method, "psnr_new", scenes), undisturbed)
 
-
-def _stored(key: Key) -> Key:
-    """Return a key with the strength as it is in a file."""
-    return key[0], float(f"{key[1]:.6g}"), *key[2:]
+    def _values(self, name: str, strength: float, method: str, figure: str, scenes: Sequence[str]) -> Doubles:
+        rows = [self.find(self.key(name, strength, scene, method)) or {} for scene in scenes]
+        return np.array([math.nan if row.get(figure) is None else row[figure] for row in rows], np.float64)
 
 
 def losing(strengths: Sequence[float], changes: Sequence[float], undisturbed: float, logarithmic: bool) -> list[float]:
@@ -112,9 +92,9 @@ def losing(strengths: Sequence[float], changes: Sequence[float], undisturbed: fl
     for order in (range(middle, -1, -1), range(middle, len(strengths))):
         for near, far in pairwise(order):
             if changes[far] < -LOSS <= changes[near]:
-                share = (changes[near] + LOSS) / (changes[near] - changes[far])
+                part = (changes[near] + LOSS) / (changes[near] - changes[far])
                 a, b = ((math.log(x) if logarithmic else x) for x in (strengths[near], strengths[far]))
-                at = a + share * (b - a)
+                at = a + part * (b - a)
                 found.append(math.exp(at) if logarithmic else at)
                 break
     return found
@@ -160,9 +140,9 @@ def draw(results: Results, figure: str, label: str, path: Path) -> None:
         _panel(plot, results, name, lines, figure)
     for plot in axes[::COLUMNS]:
         plot.set_ylabel(label, fontsize=7)
-    handles = [axes[0].plot([], [], color=COLOURS[method], label=NAMES[method])[0] for method in METHODS]
+    handles = [axes[0].plot([], [], color=COLORS[method], label=NAMES[method])[0] for method in METHODS]
     axes[0].legend(handles=handles, fontsize=7)
-    charts.save(sheet, path, dpi=75)
+    sheet.savefig(path, dpi=75, format="png")
 
 
 def _panel(plot: Any, results: Results, name: str, lines: dict[str, Doubles], figure: str) -> None:
@@ -170,15 +150,15 @@ def _panel(plot: Any, results: Results, name: str, lines: dict[str, Doubles], fi
     disturbance = DISTURBANCES[name]
     at = np.arange(len(disturbance.strengths)) if disturbance.labels else np.array(disturbance.strengths)
     for method, each in lines.items():
-        colour = COLOURS[method]
+        color = COLORS[method]
         for line in each:
             there = ~np.isnan(line)
-            plot.plot(at[there], line[there], color=colour, marker=".", markersize=4, linewidth=0.7)
+            plot.plot(at[there], line[there], color=color, marker=".", markersize=4, linewidth=0.7)
         whole = each.mean(axis=0)
         there = ~np.isnan(whole)
-        plot.plot(at[there], whole[there], color=colour, linewidth=2.2)
-        refused = [x for x, s in zip(at, disturbance.strengths, strict=True) if _refused(results, name, s, method)]
-        plot.plot(refused, [0.03] * len(refused), "x", color=colour, transform=plot.get_xaxis_transform())
+        plot.plot(at[there], whole[there], color=color, linewidth=2.2)
+        refused = [x for x, s in zip(at, disturbance.strengths, strict=True) if results.refused(name, s, method)]
+        plot.plot(refused, [0.03] * len(refused), "x", color=color, transform=plot.get_xaxis_transform())
     if disturbance.logarithmic:
         plot.set_xscale("log")
         plot.minorticks_off()
@@ -212,10 +192,6 @@ def _lost(results: Results, name: str) -> list[float]:
     return losing(strengths, changes, disturbance.undisturbed, disturbance.logarithmic)
 
 
-def _refused(results: Results, name: str, strength: float, method: str) -> bool:
-    return any(results.refusal((name, strength, scene, method)) for scene in results.scenes(name, method))
-
-
 def table(results: Results) -> str:
     """Return the page's table: a line a disturbance, with the strengths from which accuracy is lost."""
     lines = []
@@ -231,17 +207,7 @@ def table(results: Results) -> str:
             for method in METHODS:
                 line += ["", ""] if strength is None else _mean_and_worst(results.changes(name, strength, method))
             lines.append(line)
-    head = [
-        "disturbance",
-        "measured",
-        "1 dB lost from",
-        "people meet",
-        "there: mean (dB)",
-        "worst (dB)",
-        "the paper's method: mean (dB)",
-        "worst (dB)",
-    ]
-    return tables.markdown(head, lines)
+    return tables.markdown(HEADER, lines)
 
 
 def _mean_and_worst(changes: Doubles) -> list[str]:

@@ -8,15 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.disturbances.known import FRONT, Known, Take
-from benchmarks.disturbances.spoiled import GREY, LENGTH, before_grey, plain, usual
+from benchmarks.baked import Seen
+from benchmarks.disturbances.known import Known, Take
+from benchmarks.disturbances.spoiled import GRAY, LENGTH, taken, usual
 from smokelift.transport import Array
 
 BRIGHTEST = 0.6
 """Linear radiance of the brightest pixel in front."""
 
 SLIDE, SPLIT = 1 / 8, 1 / 16
-"""Shares of the box's width that smoke slides in a frame, three voxels of the small grid, and that its halves do."""
+"""Fractions of the box's width that smoke slides in a frame, three voxels of the small grid, and that its halves do."""
 
 THICK = 0.5
 """Density of a box that is full, relative to the smoke's largest."""
@@ -29,37 +30,34 @@ def optical_depth(known: Known, depth: float) -> Take:
     voxel = (part.domain.max[2] - part.domain.min[2]) / z
     now = part.medium.extinction * voxel * float(part.densities.sum(axis=2).max())
     medium = replace(part.medium, extinction=part.medium.extinction * depth / now)
-    return plain(exposed(replace(part, scene=replace(part.scene, medium=medium))))
+    return taken(exposed(replace(part, scene=replace(part.scene, medium=medium))))
 
 
 def anisotropy(known: Known, mean_cosine: float) -> Take:
     """Smoke that scatters forward (up to 1) or backward (down to -1)."""
     part = usual(known)
     medium = replace(part.medium, anisotropy=mean_cosine)
-    return plain(exposed(replace(part, scene=replace(part.scene, medium=medium))))
+    return taken(exposed(replace(part, scene=replace(part.scene, medium=medium))))
 
 
-def albedo(known: Known, share: float) -> Take:
-    """Smoke that scatters a share of the light that it stops, before a grey background, which is given."""
+def albedo(known: Known, fraction: float) -> Take:
+    """Smoke that scatters a fraction of the light that it stops, before a gray background, which is given."""
     part = usual(known)
-    part = replace(part, scene=replace(part.scene, medium=replace(part.medium, albedo=share))).pictured()
-    return replace(before_grey(part, GREY), behind=GREY)
+    part = replace(part, scene=replace(part.scene, medium=replace(part.medium, albedo=fraction))).pictured()
+    return replace(taken(part, GRAY), behind=GRAY)
 
 
 def event(known: Known, number: float) -> Take:
     """Smoke that does what `EVENTS` has under a number."""
-    return plain(exposed(list(EVENTS.values())[int(number)](usual(known))))
+    return taken(exposed(list(EVENTS.values())[int(number)](usual(known))))
 
 
 def exposed(known: Known) -> Known:
     """Return it pictured in a light that makes the brightest pixel in front as bright as `BRIGHTEST`."""
     pictured = known.pictured()
-    gain = BRIGHTEST / float(pictured.radiance[FRONT].max())
-    return replace(
-        pictured,
-        scene=replace(known.scene, lights=(known.light.scaled(gain),)),
-        radiance={view: np.float32(gain) * pictures for view, pictures in pictured.radiance.items()},
-    )
+    gain = np.float32(BRIGHTEST) / pictured.front.radiance.max()
+    views = {view: Seen(gain * seen.radiance, seen.transmittance) for view, seen in pictured.views.items()}
+    return replace(pictured, scene=replace(known.scene, lights=(known.light.scaled(float(gain)),)), views=views)
 
 
 def _stands(known: Known) -> Known:

@@ -1,16 +1,19 @@
 """What a camera, a codec, an editor and a wrong description do to a take, by a strength."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from benchmarks.background.clips import backdrop, compressed, noisy
-from benchmarks.disturbances.known import FRONT, SIZE, Known, Take
-from smokelift import Background, Scene
-from smokelift.footage.images import Picture, linear_to_srgb
-from smokelift.scene import Domain, Medium
+from benchmarks.baked import BLACK, FRONT, Seen
+from benchmarks.disturbances.known import Known, Take
+from benchmarks.filming import compressed, crushed, exposed, flickering, noisy
+from smokelift import Background
+from smokelift.footage.images import Picture
+from smokelift.scene import Domain
 
 FIRST, LENGTH = 14, 6
 """The moments of a clip that nothing disturbs: its first, and how many."""
@@ -18,11 +21,11 @@ FIRST, LENGTH = 14, 6
 MOMENTS = FIRST + LENGTH
 """Moments of a scene that the disturbances choose from."""
 
-GREY = 0.18
-"""Linear radiance of a grey background: a photographer's grey card."""
+GRAY = 0.18
+"""Linear radiance of a gray background: a photographer's gray card."""
 
 SMOKE = 0.05
-"""Share of the brightest radiance from which a pixel is smoke."""
+"""Fraction of the brightest radiance from which a pixel is smoke."""
 
 GRIDS: dict[str, tuple[float, tuple[int, int, int]]] = {
     "one voxel": (36, (1, 1, 1)),
@@ -38,156 +41,142 @@ GRIDS: dict[str, tuple[float, tuple[int, int, int]]] = {
 """Boxes about the middle of the scene's: voxels of so many of its own, and how many along x, y, z."""
 
 
-def plain(known: Known) -> Take:
-    """The take that nothing disturbs, of all moments of what is given, before black."""
-    return before(known, backdrop(SIZE[::-1], 0))
+def taken(
+    known: Known,
+    gray: float = 0.0,
+    gains: npt.ArrayLike = 1.0,
+    spoil: Callable[[Picture], Picture] = lambda encoded: encoded,
+    **given: Any,
+) -> Take:
+    """Film all moments before a linear gray, which is given.
 
-
-def before(known: Known, plate: Picture, gains: npt.ArrayLike = 1.0) -> Take:
-    """A take before a linear plate (rows, columns, 3), which is given; each frame with a gain of its own, or one."""
-    seen = known.radiance[FRONT][..., None] + known.transmittance[FRONT][..., None] * plate
-    linear = seen * np.asarray(gains, np.float32).reshape(-1, 1, 1, 1)
-    return Take(known, known.scene, np.clip(linear_to_srgb(linear), 0, 1))
-
-
-def before_grey(known: Known, radiance: float, gains: npt.ArrayLike = 1.0) -> Take:
-    """A take before a linear grey that is given."""
-    take = before(known, backdrop(SIZE[::-1], radiance), gains)
-    return replace(take, given=replace(take.given, background=Background(color=(radiance,) * 3)))
+    Parameters
+    ----------
+    known, gray
+        What is filmed, and what stands behind it.
+    gains
+        Exposure: one gain, or one a frame.
+    spoil
+        What becomes of the sRGB pictures.
+    **given
+        Fields in which the description differs from what is known.
+    """
+    pictures = np.clip(exposed(known.front.before(np.full(3, gray)), gains), 0, 1)
+    scene = replace(known.scene, **{"background": Background(color=(gray,) * 3), **given})
+    return Take(known, scene, np.clip(spoil(pictures), 0, 1))
 
 
 def usual(known: Known) -> Known:
-    """The moments of a clip that nothing disturbs."""
+    """Return the moments of a clip that nothing disturbs."""
     return known.at(range(FIRST, FIRST + LENGTH))
 
 
-def noise(known: Known, share: float) -> Take:
-    """White noise, independent in every pixel and channel, of a share of the 8-bit range."""
-    take = plain(usual(known))
-    return replace(take, pictures=np.clip(noisy(take.pictures, share), 0, 1))
+def noise(known: Known, deviation: float) -> Take:
+    """White noise, independent in every pixel and channel; white is 1."""
+    return taken(usual(known), spoil=lambda encoded: noisy(encoded, deviation))
 
 
 def compression(known: Known, crf: float) -> Take:
     """H.264 at a constant rate factor; none below 0."""
-    take = plain(usual(known))
-    return take if crf < 0 else replace(take, pictures=compressed(take.pictures, int(crf)))
+    return taken(usual(known), spoil=lambda encoded: encoded if crf < 0 else compressed(encoded, int(crf)))
 
 
-def flicker(known: Known, share: float) -> Take:
-    """Exposure that goes up and down by a share from frame to frame, before black."""
-    return before(usual(known), backdrop(SIZE[::-1], 0), _flickering(share))
+def flicker(known: Known, fraction: float) -> Take:
+    """Exposure that goes up and down by a fraction from frame to frame, before black."""
+    return taken(usual(known), gains=flickering(LENGTH, fraction))
 
 
-def flicker_before_grey(known: Known, share: float) -> Take:
-    """A take that flickers before a grey background, which shows the exposure."""
-    return before_grey(usual(known), GREY, _flickering(share))
+def flicker_before_gray(known: Known, fraction: float) -> Take:
+    """A take that flickers before a gray background, which shows the exposure."""
+    return taken(usual(known), GRAY, flickering(LENGTH, fraction))
 
 
 def blur(known: Known, voxels: float) -> Take:
     """Pictures out of focus: a Gaussian with a standard deviation in voxels of the small grid."""
-    take = plain(usual(known))
-    sigma = voxels * _pixels_a_voxel(known)
-    linear = ndimage.gaussian_filter(known.radiance[FRONT][FIRST : FIRST + LENGTH], (0, sigma, sigma))
-    return replace(take, pictures=np.clip(linear_to_srgb(np.repeat(linear[..., None], 3, -1)), 0, 1))
-
-
-def saturation(known: Known, share: float) -> Take:
-    """An exposure at which a share of the smoke's pixels is white; the light is given as strong as it seems."""
     part = usual(known)
-    seen = part.radiance[FRONT]
-    gain = 1 / float(np.quantile(seen[seen > SMOKE * seen.max()], 1 - share)) if share else 1.0
-    return replace(before(part, backdrop(SIZE[::-1], 0), gain), given=_lit(part, gain), gain=gain)
+    camera = known.cameras[FRONT]
+    distance = float(np.linalg.norm(np.array(camera.matrix)[:3, 3] - known.domain.centre))
+    sigma = voxels * camera.fx * known.domain.voxel_size / distance
+    seen = Seen(ndimage.gaussian_filter(part.front.radiance, (0, sigma, sigma)), part.front.transmittance)
+    return replace(taken(part), pictures=np.clip(exposed(seen.before(BLACK)), 0, 1))
+
+
+def saturation(known: Known, fraction: float) -> Take:
+    """An exposure at which a fraction of the smoke's pixels is white; the light is given as strong as it seems."""
+    part = usual(known)
+    gain = 1 / _brightness(part, 1 - fraction) if fraction else 1.0
+    return replace(taken(part, gains=gain, lights=(known.light.scaled(gain),)), gain=gain)
 
 
 def crushing(known: Known, level: float) -> Take:
-    """Black that is lifted by an editor: sRGB values below a level become 0, the rest is stretched."""
-    take = plain(usual(known))
-    return replace(take, pictures=np.clip((take.pictures - level) / (1 - level), 0, 1))
+    """Black that an editor crushes: sRGB values below a level become 0, the rest is stretched."""
+    return taken(usual(known), spoil=lambda encoded: crushed(encoded, level))
 
 
-def bright_background(known: Known, share: float) -> Take:
-    """A grey background with a share of the radiance of the smoke's brightest pixels; its colour is given."""
+def bright_background(known: Known, fraction: float) -> Take:
+    """A gray background with a fraction of the radiance of the smoke's brightest pixels; its color is given."""
     part = usual(known)
-    seen = part.radiance[FRONT]
-    grey = share * float(np.quantile(seen[seen > SMOKE * seen.max()], 0.95))
-    return before_grey(part, grey)
+    return taken(part, fraction * _brightness(part, 0.95))
 
 
 def grid(known: Known, number: float) -> Take:
     """A description with the box and the voxels that `GRIDS` has under a number."""
-    take = plain(usual(known))
     coarser, shape = list(GRIDS.values())[int(number)]
     half = np.array(shape) * coarser * known.domain.voxel_size / 2
     middle = np.array(known.domain.centre)
-    box = Domain(tuple(middle - half), tuple(middle + half), shape)
-    return replace(take, given=replace(take.given, domain=box))
+    return taken(usual(known), domain=Domain(tuple(middle - half), tuple(middle + half), shape))
 
 
-def missing(known: Known, share: float) -> Take:
+def missing(known: Known, fraction: float) -> Take:
     """Every n-th frame is missing, and nothing says so."""
     frames = range(FIRST, FIRST + LENGTH)
-    return plain(known.at([frame for k, frame in enumerate(frames, 1) if not share or k % round(1 / share)]))
+    return taken(known.at([frame for k, frame in enumerate(frames, 1) if not fraction or k % round(1 / fraction)]))
 
 
-def doubled(known: Known, share: float) -> Take:
+def doubled(known: Known, fraction: float) -> Take:
     """Every n-th frame is there twice, and nothing says so."""
     frames = range(FIRST, FIRST + LENGTH)
-    twice = [1 + (bool(share) and k % round(1 / share) == 0) for k in range(1, LENGTH + 1)]
-    return plain(known.at(np.repeat(frames, twice).tolist()))
+    twice = [1 + (bool(fraction) and k % round(1 / fraction) == 0) for k in range(1, LENGTH + 1)]
+    return taken(known.at(np.repeat(frames, twice).tolist()))
 
 
 def cut(known: Known, frames: float) -> Take:
     """Half of the clip shows the smoke so many frames earlier; only what follows the cut counts."""
     half = LENGTH // 2
     earlier = [FIRST - int(frames) + k for k in range(half)]
-    return replace(plain(known.at([*earlier, *range(FIRST + half, FIRST + LENGTH)])), scored=half)
+    return replace(taken(known.at([*earlier, *range(FIRST + half, FIRST + LENGTH)])), scored=half)
 
 
 def clip_length(known: Known, frames: float) -> Take:
     """A clip of so many frames; only its last counts, which is the same for all lengths."""
     last = FIRST + LENGTH
-    return replace(plain(known.at(range(last - int(frames), last))), scored=int(frames) - 1)
+    return replace(taken(known.at(range(last - int(frames), last))), scored=int(frames) - 1)
 
 
 def wrong_light(known: Known, degrees: float) -> Take:
     """A description whose light is turned about the vertical."""
-    take = plain(usual(known))
     x, y, z = known.light.direction
     turn = np.radians(degrees)
     turned = (x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z)
-    return replace(take, given=replace(take.given, lights=(replace(known.light, direction=turned),)))
+    return taken(usual(known), lights=(replace(known.light, direction=turned),))
 
 
 def wrong_extinction(known: Known, factor: float) -> Take:
     """A description with another extinction."""
-    return _told_medium(known, replace(known.medium, extinction=factor * known.medium.extinction))
+    return taken(usual(known), medium=replace(known.medium, extinction=factor * known.medium.extinction))
 
 
 def wrong_albedo(known: Known, factor: float) -> Take:
     """A description with another albedo, 1 at most."""
-    return _told_medium(known, replace(known.medium, albedo=min(factor * known.medium.albedo, 1.0)))
+    return taken(usual(known), medium=replace(known.medium, albedo=min(factor * known.medium.albedo, 1.0)))
 
 
 def wrong_anisotropy(known: Known, anisotropy: float) -> Take:
     """A description with another anisotropy; the smoke's is 0."""
-    return _told_medium(known, replace(known.medium, anisotropy=anisotropy))
+    return taken(usual(known), medium=replace(known.medium, anisotropy=anisotropy))
 
 
-def _told_medium(known: Known, medium: Medium) -> Take:
-    take = plain(usual(known))
-    return replace(take, given=replace(take.given, medium=medium))
-
-
-def _lit(known: Known, gain: float) -> Scene:
-    return replace(known.scene, lights=(known.light.scaled(gain),))
-
-
-def _flickering(share: float) -> npt.NDArray[np.float64]:
-    return 1 + share * (-1.0) ** np.arange(LENGTH)
-
-
-def _pixels_a_voxel(known: Known) -> float:
-    """How wide a voxel is in the middle of the picture."""
-    camera, domain = known.cameras[FRONT], known.domain
-    away = np.linalg.norm(np.array(camera.matrix)[:3, 3] - domain.centre)
-    return float(camera.fx * domain.voxel_size / away)
+def _brightness(known: Known, quantile: float) -> float:
+    """Return a quantile of the radiance of the smoke's pixels in front."""
+    seen = known.front.radiance
+    return float(np.quantile(seen[seen > SMOKE * seen.max()], quantile))

@@ -6,7 +6,8 @@ from functools import partial
 
 from benchmarks.disturbances import calls, smoke, spoiled
 from benchmarks.disturbances.known import Known, Take
-from benchmarks.disturbances.measure import Figures, whole_run
+from benchmarks.disturbances.whole_run import whole_run
+from benchmarks.measure import Figures
 from smokelift.setup.settings import MethodName
 
 Measure = Callable[[Known, float, MethodName], Figures]
@@ -73,7 +74,7 @@ DISTURBANCES: dict[str, Disturbance] = {
         spoiled.flicker, "Exposure flickers, black behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
     "flicker-grey": _disturbed(
-        spoiled.flicker_before_grey, "Exposure flickers, grey behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
+        spoiled.flicker_before_gray, "Exposure flickers, gray behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
     "missing": _disturbed(spoiled.missing, "Frames missing", "share", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)),
     "doubled": _disturbed(spoiled.doubled, "Frames doubled", "share", (0, 1 / 6, 1 / 3, 1 / 2, 1)),
@@ -88,7 +89,7 @@ DISTURBANCES: dict[str, Disturbance] = {
         smoke.optical_depth, "Optical depth", "of the thickest column", (0.001, 0.01, 0.1, 1, 5, 20, 100), 1,
         logarithmic=True,
     ),
-    "albedo": _disturbed(smoke.albedo, "Albedo, grey behind", "", (0, 0.25, 0.5, 0.75, 1), 0.75),
+    "albedo": _disturbed(smoke.albedo, "Albedo, gray behind", "", (0, 0.25, 0.5, 0.75, 1), 0.75),
     "anisotropy": _disturbed(smoke.anisotropy, "Anisotropy", "mean cosine", (-0.9, -0.5, 0, 0.5, 0.9)),
     "event": _disturbed(
         smoke.event, "What the smoke does", "", tuple(float(k) for k in range(len(smoke.EVENTS))),

@@ -9,31 +9,40 @@ picture (given), a frame of the clip without smoke (frame), or nothing (unknown)
 are only composed. Camera, box, medium and lights are given. With --black the same smoke before black follows, from
 which nothing has to be separated.
 
-OUT/SCENE-PLATE gets what `compose.compose` writes, and a sequence for each that is known. Rows are printed and added to
-OUT/rows.csv; what is there already is neither composed, reconstructed nor scored again, so each state of the code has
-an OUT of its own. `score.py` says what the figures mean: T rms, imprint, mass, mass up to optical depth 3, the fraction
-of the faint tail that is kept, PSNR inside the smoke at the clip's pixels, PSNR of new views at 20, 45 and 90 degrees.
+OUT/SCENE-PLATE gets what `compose.compose` writes. Rows are printed and added to OUT/rows.csv; what is there already is
+neither composed, reconstructed nor scored again, so each state of the code has an OUT of its own. `score.py` says what
+the figures mean: T rms, imprint, mass, mass up to optical depth 3, the fraction of the faint tail that is kept, PSNR
+inside the smoke at the clip's pixels, PSNR of new views at 20, 45 and 90 degrees.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.extraction.compose import CRF, GIVEN, KNOWN, BakedSmoke, Filming, compose, folder_name
-from benchmarks.extraction.plates import BLACK, PAINTED, PHOTOGRAPHS, plate_name
-from benchmarks.extraction.rows import HEADER, Row, Rows, cells
+from benchmarks.baked import Baked
+from benchmarks.extraction.compose import CRF, GIVEN, KNOWN, Composed, Filming, compose, folder_name
 from benchmarks.extraction.score import score_densities
-from benchmarks.process import run_module, why_it_ended
-from benchmarks.tables import markdown
-from smokelift import Sequence as SmokeSequence
-from smokelift.scene import completed
+from benchmarks.measure import Figures, reconstructed
+from benchmarks.plates import PAINTED, PHOTOGRAPHS, plate_name
+from benchmarks.tables import Rows, cell, line, markdown
+from smokelift import Clip, Scene, Settings
 from smokelift.setup.settings import QUALITIES
 
-RESOLUTION = "48,48,72"
+RESOLUTION = "48x48x72"
 """Voxels of the reconstructions: three quarters of the baked scenes', so that no voxel of theirs is one of ours."""
+
+KEYS = ("scene", "plate", "known", "quality", "resolution")
+
+COLUMNS = (
+    ("T rms", "transmittance_error", ".3f"), ("imprint", "imprint", ".2f"), ("mass", "mass", ".2f"),
+    ("mass, depth < 3", "thin_mass", ".2f"), ("tail kept", "tail", ".2f"), ("PSNR inside", "psnr", ".1f"),
+    ("20 / 45 / 90", "psnr_20 psnr_45 psnr_90", ".1f"),
+)  # fmt: skip
+"""Headings, figures and their format."""
+
+FIGURES = (*(name for _, names, _ in COLUMNS for name in names.split()), "radiance_error")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -50,51 +59,51 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--black", action="store_true", help="the same smoke before black, too")
     parser.add_argument("--frames", type=int, default=28, help="of every scene, from its first")
     parser.add_argument("--quality", choices=QUALITIES, default="balanced")
-    parser.add_argument("--resolution", default=RESOLUTION, help="voxels X,Y,Z of the reconstructions, or auto")
+    parser.add_argument("--resolution", default=RESOLUTION, help="voxels of the reconstructions")
     parser.add_argument("--crf", type=int, default=CRF, help="of H.264")
     parser.add_argument("--noise", type=float, default=0.0, help="per cent of the range of sRGB values")
     parser.add_argument("--drift", action="store_true", help="exposure and white balance drift")
     options = parser.parse_args(arguments)
     filming = Filming(options.crf, options.noise / 100, options.drift)
-    rows = Rows.read(options.out / "rows.csv")
+    x, y, z = (int(count) for count in options.resolution.split("x"))
+    settings = Settings.preset(options.quality, resolution=(x, y, z))
+    rows = Rows(options.out / "rows.csv", KEYS, FIGURES)
     wanted = [(plate, known) for plate in options.plates for known in options.known]
-    if options.black and (BLACK, GIVEN) not in wanted:
-        wanted.append((BLACK, GIVEN))
-    print(markdown(HEADER, []), flush=True)
+    if options.black and ("black", GIVEN) not in wanted:
+        wanted.append(("black", GIVEN))
+    print(markdown(["scene", "plate", "known", *(heading for heading, _, _ in COLUMNS)]), flush=True)
     for scene in options.scenes:
-        smoke = BakedSmoke.load(scene, options.frames)
+        smoke = Baked.load(scene, options.frames)
         for plate in options.plates:
             compose(smoke, plate, filming, options.out / folder_name(smoke.name, plate, filming))
         for plate, known in wanted:
-            row = Row(smoke.name, plate_name(plate) + filming.name, known, options.quality, options.resolution)
-            if (found := rows.find(row)) is None:
+            about = (smoke.name, plate_name(plate) + filming.name, known)
+            key = (*about, options.quality, options.resolution)
+            if (figures := rows.find(key)) is None:
                 folder = options.out / folder_name(smoke.name, plate, filming)
-                found = measured(row, smoke, plate, filming, folder)
-                rows.add(found)
-            print(f"| {' | '.join(cells(found))} |", flush=True)
+                figures = measured(smoke, compose(smoke, plate, filming, folder), folder / f"{known}.toml", settings)
+                if "refused" not in figures:  # the next state of the code may not refuse
+                    rows.add(key, figures)
+            print(line([*about, *cells(figures)]), flush=True)
 
 
-def measured(row: Row, smoke: BakedSmoke, plate: str, filming: Filming, folder: Path) -> Row:
-    """Return a row with its figures, or with the sentence in which the engine refused."""
-    composed = compose(smoke, plate, filming, folder)
-    resolution = row.resolution.replace(",", "x")
-    refused = reconstruct(folder / f"{row.known}.toml", folder / f"{row.known}-{row.quality}-{resolution}", row)
-    if refused is not None:
-        return replace(row, refused=refused)
-    sequence = SmokeSequence.open(folder / f"{row.known}-{row.quality}-{resolution}")
-    scene = completed(sequence.scene)
-    figures = score_densities(scene, lambda frame: sequence.density(frame + 1), smoke, composed)
-    return replace(row, figures=figures)
+def measured(smoke: Baked, composed: Composed, path: Path, settings: Settings) -> Figures:
+    """Reconstruct a scene file, and return its figures, or the sentence in which the engine refuses."""
+    described = Scene.load(path)
+    assert described.clip is not None
+    with Clip.open(described.clip) as clip:
+        found = reconstructed(clip, described, settings)
+    if isinstance(found, str):
+        return {"refused": found}
+    scene, frames = found
+    return score_densities(scene, lambda number: frames[number].density, smoke, composed)
 
 
-def reconstruct(scene: Path, out: Path, row: Row) -> str | None:
-    """Reconstruct a scene file by the command line, unless that is done; returns the sentence of a refusal."""
-    if (out / "sequence.json").exists() and SmokeSequence.open(out).complete:
-        return None
-    words = [str(scene), "--out", str(out), "--npz", "--quality", row.quality, "--resolution", row.resolution]
-    resume = ["--resume"] if (out / "sequence.json").exists() else []
-    ended = run_module("smokelift", "reconstruct", *words, *resume)
-    return None if ended.returncode == 0 else why_it_ended(ended)
+def cells(figures: Figures) -> list[str]:
+    """Return the cells of a row."""
+    if "refused" in figures:
+        return [f"refused: {figures['refused']}", *[""] * (len(COLUMNS) - 1)]
+    return [cell(figures, names.split(), form) or "-" for _, names, form in COLUMNS]
 
 
 if __name__ == "__main__":

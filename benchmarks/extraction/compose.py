@@ -8,18 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from benchmarks.accuracy.scenes import VIEWS, camera_of
-from benchmarks.background.clips import FPS, Smoke, drift, eight_bits, exposed, noisy
-from benchmarks.extraction.plates import BLACK, plate, plate_name
+from benchmarks.baked import Baked, Seen
+from benchmarks.filming import FPS, drift, eight_bits, exposed, noisy
+from benchmarks.plates import plate, plate_name
 from benchmarks.truth.clip import write_video
-from smokelift import Background, Camera, ClipSource, Scene
-from smokelift.evaluation.truth import Truth, on_grid
+from smokelift import Background, ClipSource
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
-from smokelift.render import scene_renderer
-from smokelift.scene import completed
 
 GIVEN, FRAME, UNKNOWN = KNOWN = ("given", "frame", "unknown")
 """What a scene file knows of the plate: the picture, a frame of the clip without smoke, or nothing."""
@@ -27,60 +23,11 @@ GIVEN, FRAME, UNKNOWN = KNOWN = ("given", "frame", "unknown")
 CRF = 18
 """Quality of H.264 at which a compressed clip is hard to tell from its original."""
 
-Half = npt.NDArray[np.float16]
-
 WITH_EMPTY_SET = "with_empty_set.mp4"
 """File of the clip that begins with one frame without smoke."""
 
 TRUTH = "element.npz"
 """File of a composed scene with its true element."""
-
-
-@dataclass(frozen=True, eq=False)
-class BakedSmoke:
-    """A scene of `benchmarks.truth.picture` or one that has the same files.
-
-    Attributes
-    ----------
-    name
-        Of the scene.
-    scene
-        Camera, box, medium and lights; no clip and no background.
-    front
-        What the clip's camera sees of the smoke alone.
-    densities : (frames, x, y, z)
-        In the scene's box.
-    cameras, pictures
-        Of the new views by the keys of `VIEWS`; linear grey radiance before black (frames, rows, columns).
-    """
-
-    name: str
-    scene: Scene
-    front: Smoke
-    densities: Half
-    cameras: dict[str, Camera]
-    pictures: dict[str, Half]
-
-    @staticmethod
-    def load(folder: Path, frames: int) -> BakedSmoke:
-        """Read a scene's first frames.
-
-        Where the transmittance of the front is not stored, Smokelift's renderer computes it from the true densities.
-        """
-        densities = Truth.load(folder / "truth.npz").densities[:frames]
-        scene = replace(Scene.load(folder / "scene.toml"), clip=None, background=None)
-        (_, front_name), *others = VIEWS.items()
-        with np.load(folder / f"{front_name}.npz") as file:
-            radiance = file["image"][:frames].astype(np.float32)
-            clear = file["transmittance"][:frames].astype(np.float32) if "transmittance" in file else None
-        if clear is None:
-            clear = _transmittance(scene, densities)
-        pictures = {}
-        for view, name in others:
-            with np.load(folder / f"{name}.npz") as file:
-                pictures[view] = file["image"][:frames]
-        cameras = {view: camera_of(folder / f"{name}.toml") for view, name in others}
-        return BakedSmoke(folder.name, scene, Smoke(radiance, clear), densities, cameras, pictures)
 
 
 @dataclass(frozen=True)
@@ -92,9 +39,9 @@ class Filming:
     crf
         Of H.264; a larger number loses more.
     noise
-        Standard deviation of white noise, a fraction of the range of sRGB values.
+        Standard deviation of white noise in sRGB values; white is 1.
     drifts
-        Whether exposure and white balance drift as `benchmarks.background.clips.drift` says.
+        Whether exposure and white balance drift as `benchmarks.filming.drift` says.
     """
 
     crf: int = CRF
@@ -108,53 +55,38 @@ class Filming:
         noised = f"-noise{100 * self.noise:.3g}" if self.noise else ""
         return compressed + noised + ("-drift" if self.drifts else "")
 
-    def filmed(self, pictures: Picture) -> Picture:
-        """Return linear pictures (frames, rows, columns, 3) as sRGB values with what the camera adds."""
-        count = len(pictures)
-        encoded = exposed(pictures, drift(count) if self.drifts else np.ones(count))
-        return noisy(encoded, self.noise) if self.noise else encoded
+    def write(self, path: Path, pictures: Picture) -> None:
+        """Write linear pictures (frames, rows, columns, 3) as a video, with what the camera adds."""
+        encoded = exposed(pictures, drift(len(pictures)) if self.drifts else 1.0)
+        write_video(path, list(eight_bits(noisy(encoded, self.noise) if self.noise else encoded)), FPS, self.crf)
 
 
 @dataclass(frozen=True, eq=False)
 class Composed:
-    """The true element of a composed clip.
+    """The true element of a composed clip: what is seen of the smoke alone, and the plate (rows, columns, 3)."""
 
-    Attributes
-    ----------
-    radiance, transmittance : (frames, rows, columns)
-        Of the smoke alone; linear and grey, and the fraction of the plate's light that passes.
-    plate : (rows, columns, 3)
-        Linear.
-    """
-
-    radiance: Picture
-    transmittance: Picture
+    seen: Seen
     plate: Picture
 
     @staticmethod
     def load(folder: Path) -> Composed:
         """Read what `compose` wrote."""
         with np.load(folder / TRUTH) as file:
-            return Composed(*(file[name].astype(np.float32) for name in ("radiance", "transmittance", "plate")))
+            radiance, clear, behind = (file[name].astype(np.float32) for name in ("radiance", "transmittance", "plate"))
+        return Composed(Seen(radiance, clear), behind)
 
     def save(self, folder: Path) -> None:
         """Write it; radiance and transmittance are rounded to half precision."""
-        np.savez_compressed(
-            folder / TRUTH,
-            radiance=self.radiance.astype(np.float16),
-            transmittance=self.transmittance.astype(np.float16),
-            plate=self.plate,
-        )
+        halves = {name: getattr(self.seen, name).astype(np.float16) for name in ("radiance", "transmittance")}
+        np.savez_compressed(folder / TRUTH, **halves, plate=self.plate)
 
-    def picture(self, frame: int) -> Picture:
-        """Return what the camera sees in a frame, linear (rows, columns, 3), before it adds anything."""
-        shown = Smoke(self.radiance[frame], self.transmittance[frame]).before(self.plate)
-        return np.asarray(shown, np.float32)
+    def pictures(self) -> Picture:
+        """Return what the camera sees, linear (frames, rows, columns, 3), before it adds anything."""
+        return self.seen.before(self.plate)
 
-    def frames(self, frames: Sequence[int]) -> Composed:
+    def at(self, frames: Sequence[int]) -> Composed:
         """Return some frames of it."""
-        numbers = list(frames)
-        return replace(self, radiance=self.radiance[numbers], transmittance=self.transmittance[numbers])
+        return replace(self, seen=self.seen.at(list(frames)))
 
 
 def folder_name(scene: str, plate_of: str, filming: Filming) -> str:
@@ -162,7 +94,7 @@ def folder_name(scene: str, plate_of: str, filming: Filming) -> str:
     return f"{scene}-{plate_name(plate_of)}{filming.name}"
 
 
-def compose(smoke: BakedSmoke, behind: str, filming: Filming, out: Path) -> Composed:
+def compose(smoke: Baked, behind: str, filming: Filming, out: Path) -> Composed:
     """Put smoke before a plate and write everything into a folder, unless that is done already.
 
     The folder gets clip.mp4, `WITH_EMPTY_SET`, plate.png, the true element as `TRUTH`, and a scene file for each of
@@ -173,7 +105,7 @@ def compose(smoke: BakedSmoke, behind: str, filming: Filming, out: Path) -> Comp
     smoke
         What passes before the plate.
     behind
-        The plate, as `benchmarks.extraction.plates.plate` takes it.
+        The plate, as `benchmarks.plates.plate` takes it.
     filming
         What the camera adds.
     out
@@ -184,41 +116,26 @@ def compose(smoke: BakedSmoke, behind: str, filming: Filming, out: Path) -> Comp
     ValueError
         If the folder has another number of frames, or the plate cannot be read.
     """
-    front = smoke.front
     if out.is_dir():
         composed = Composed.load(out)
-        if len(composed.radiance) != len(front.radiance):
-            raise ValueError(
-                f"{out}: has {len(composed.radiance)} frames, not {len(front.radiance)}; take another OUT."
-            )
+        if (count := len(composed.seen.radiance)) != len(smoke):
+            raise ValueError(f"{out}: has {count} frames, not {len(smoke)}; take another OUT.")
         return composed
-    composed = Composed(front.radiance, front.transmittance, plate(behind, *front.radiance.shape[1:]))
+    composed = Composed(smoke.front, plate(behind, *smoke.front.shape))
     part = out.with_name(f"{out.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
     composed.save(part)
     write_image(part / "plate.png", composed.plate)
-    pictures = filming.filmed(front.before(composed.plate))
-    write_video(part / "clip.mp4", list(eight_bits(pictures)), FPS, filming.crf)
+    pictures = composed.pictures()
+    filming.write(part / "clip.mp4", pictures)
     scene = replace(smoke.scene, clip=ClipSource(part / "clip.mp4"))
-    known = Background(color=(0.0, 0.0, 0.0)) if behind == BLACK else Background(image=part / "plate.png")
+    known = Background(color=(0.0, 0.0, 0.0)) if behind == "black" else Background(image=part / "plate.png")
     replace(scene, background=known).save(part / f"{GIVEN}.toml")
     scene.save(part / f"{UNKNOWN}.toml")
     # the whole clip begins when the set is empty; the part in use does not hold that
-    empty = np.concatenate([composed.plate[None], front.before(composed.plate)])
-    write_video(part / WITH_EMPTY_SET, list(eight_bits(filming.filmed(empty))), FPS, filming.crf)
-    used = ClipSource(part / WITH_EMPTY_SET, frames=(1, len(front.radiance)))
+    filming.write(part / WITH_EMPTY_SET, np.concatenate([composed.plate[None], pictures]))
+    used = ClipSource(part / WITH_EMPTY_SET, frames=(1, len(smoke)))
     replace(scene, clip=used, background=Background(frame=(0,))).save(part / f"{FRAME}.toml")
     part.rename(out)
     return composed
-
-
-def _transmittance(scene: Scene, densities: Half) -> Picture:
-    """Return the fraction of light (frames, rows, columns) that passes densities on the way to a scene's camera."""
-    x, y, z = densities.shape[1:]
-    renderer = scene_renderer(on_grid(completed(scene), (x, y, z)), None, np.zeros(3, np.float32))
-    found = []
-    for density in densities:
-        renderer.image(np.ascontiguousarray(density, np.float32))
-        found.append(renderer.transmittance)
-    return np.stack(found)

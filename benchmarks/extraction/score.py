@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from benchmarks.clean_clip.smoke import optical_mass
-from benchmarks.extraction.compose import BakedSmoke, Composed
-from smokelift.evaluation.frame_means import PictureMeans, finite_mean
+from benchmarks.baked import BLACK, FRONT, Baked
+from benchmarks.extraction.compose import Composed
+from benchmarks.measure import Figures, optical_mass, view_figures
+from smokelift.evaluation.frame_means import finite_mean
 from smokelift.footage.images import Picture, area_average
 from smokelift.render import Volume, scene_renderer
 from smokelift.scene import CompleteScene
-
-Figures = dict[str, float | None]
 
 SMOKE = 0.97
 """Transmittance below which a pixel shows smoke."""
@@ -41,8 +39,6 @@ SCORED = range(8, 1_000_000, 6)
 
 VIEWED = (14, 20, 26)
 """Frames of a clip that are compared in new views."""
-
-BLACK = np.zeros(3, np.float32)
 
 
 def scored_frames(count: int) -> list[int]:
@@ -75,29 +71,30 @@ def score_element(transmittance: npt.ArrayLike, radiance: npt.ArrayLike, truth: 
     clear, light = np.asarray(transmittance, np.float32), np.asarray(radiance, np.float32)
     clear = clear.mean(-1) if clear.ndim == 4 else clear
     light = light if light.ndim == 4 else np.repeat(light[..., None], 3, -1)
-    if clear.shape != light.shape[:3] or len(clear) != len(truth.transmittance):
+    true_clear = truth.seen.transmittance
+    if clear.shape != light.shape[:3] or len(clear) != len(true_clear):
         raise ValueError(
-            f"T {clear.shape}, S {light.shape} and the truth's {truth.transmittance.shape} must have the same frames, "
+            f"T {clear.shape}, S {light.shape} and the truth's {true_clear.shape} must have the same frames, "
             "rows and columns."
         )
     truth = _resized(truth, clear.shape[1:])
-    plate = _detail(truth.plate.mean(-1))
-    frames: list[Figures] = []
-    for number, (t, s, true) in enumerate(zip(clear, light, truth.transmittance, strict=True)):
+    plate, pictures = _detail(truth.plate.mean(-1)), truth.pictures()
+    frames: list[dict[str, float | None]] = []
+    for number, (t, s, true) in enumerate(zip(clear, light, truth.seen.transmittance, strict=True)):
         smoke, wrong = true < SMOKE, t - true
         tail, thin = (true > TAIL[0]) & (true < TAIL[1]), true >= np.exp(-THIN)
-        shown = (s + t[..., None] * truth.plate - truth.picture(number))[smoke]
+        shown = (s + t[..., None] * truth.plate - pictures[number])[smoke]
         frames.append(
             {
                 "transmittance_error": _rms(wrong[smoke]),
-                "radiance_error": _rms((s - truth.radiance[number][..., None])[smoke]),
+                "radiance_error": _rms((s - truth.seen.radiance[number][..., None])[smoke]),
                 "imprint": _correlation(_detail(wrong)[smoke], plate[smoke]),
                 "thin_mass": _ratio(_depth(t)[thin].sum(), _depth(true)[thin].sum()),
                 "tail": _ratio(np.minimum(np.clip(1 - t, 0, 1), 1 - true)[tail].sum(), (1 - true)[tail].sum()),
                 "psnr": float(-10 * np.log10(max(np.square(shown).mean(), 1e-12))) if smoke.any() else None,
             }
         )
-    figures = {name: finite_mean(frame[name] for frame in frames) for name in frames[0]}
+    figures: Figures = {name: finite_mean(frame[name] for frame in frames) for name in frames[0]}
     for name in ("transmittance_error", "radiance_error"):  # root mean squares over all frames
         squares = finite_mean(None if (value := frame[name]) is None else value**2 for frame in frames)
         figures[name] = None if squares is None else squares**0.5
@@ -105,7 +102,7 @@ def score_element(transmittance: npt.ArrayLike, radiance: npt.ArrayLike, truth: 
 
 
 def score_densities(
-    scene: CompleteScene, density: Callable[[int], Volume], smoke: BakedSmoke, composed: Composed
+    scene: CompleteScene, density: Callable[[int], Volume], smoke: Baked, composed: Composed
 ) -> Figures:
     """Compare a reconstruction with the true element, the true volumes, and new views.
 
@@ -126,19 +123,18 @@ def score_densities(
     truth's; ``psnr_20``, ``psnr_45`` and ``psnr_90`` of new views before black (dB, 8-bit sRGB values of whole
     pictures).
     """
-    numbers = scored_frames(len(composed.transmittance))
+    numbers = scored_frames(len(smoke))
     shown = seen_element(scene, [density(number) for number in numbers])
     found = sum(optical_mass(scene, density(number)[None]) for number in numbers)
     true = optical_mass(smoke.scene, smoke.densities[numbers])
-    figures = score_element(*shown, composed.frames(numbers)) | {"mass": _ratio(found, true)}
-    viewed = [number for number in VIEWED if number < len(composed.transmittance)] or numbers[-1:]
-    for view, camera in smoke.cameras.items():
-        renderer, means = scene_renderer(scene, camera, BLACK), PictureMeans()
-        for number in viewed:
-            seen = np.repeat(smoke.pictures[view][number][..., None].astype(np.float32), 3, -1)
-            means.add(renderer.image(density(number)), seen)
-        figures[f"psnr_{view}"] = means.figures()["psnr"]
-    return figures
+    figures = score_element(*shown, composed.at(numbers)) | {"mass": _ratio(found, true)}
+    viewed = [number for number in VIEWED if number < len(smoke)] or numbers[-1:]
+    new = {view: camera for view, camera in smoke.cameras.items() if view != FRONT}
+
+    def seen(view: str, number: int) -> Picture:
+        return np.repeat(smoke.views[view].radiance[number][..., None], 3, -1)
+
+    return figures | view_figures(scene, density, new, seen, viewed)
 
 
 def seen_element(scene: CompleteScene, densities: Iterable[Volume]) -> tuple[Picture, Picture]:
@@ -153,11 +149,7 @@ def _resized(truth: Composed, shape: tuple[int, ...]) -> Composed:
     rows, columns = shape
     if truth.plate.shape[:2] == (rows, columns):
         return truth
-    radiance, clear = (
-        np.stack([area_average(each, columns, rows) for each in pictures])
-        for pictures in (truth.radiance, truth.transmittance)
-    )
-    return replace(truth, radiance=radiance, transmittance=clear, plate=area_average(truth.plate, columns, rows))
+    return Composed(truth.seen.sized((columns, rows)), area_average(truth.plate, columns, rows))
 
 
 def _detail(picture: Picture) -> Picture:

@@ -16,13 +16,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from benchmarks.machine import peak_mib
+from benchmarks.machine import UNTIMED, FrameTimes, median, peak_mib
 from benchmarks.process import run_module, why_it_ended
-from benchmarks.timing import UNTIMED, FrameTimes, median
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
-from smokelift.setup.settings import MethodName, Quality, Settings
+from smokelift.setup.settings import Quality, Settings
 
 CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
 """What a user waits; and the work of all cores, which is the same beside other work."""
@@ -38,7 +37,7 @@ class Job:
         Path of a scene file with a clip.
     size
         Voxels along x, y and z.
-    method, quality, detail
+    quality, detail
         As in `Settings`.
     frames
         How many are timed.
@@ -48,11 +47,10 @@ class Job:
 
     scene: str
     size: tuple[int, int, int]
-    method: MethodName
     quality: Quality
+    detail: float
     frames: int
-    detail: float = 1.0
-    clock: Literal["wall", "processor"] = "wall"
+    clock: Literal["wall", "processor"]
 
 
 @dataclass(frozen=True)
@@ -63,8 +61,6 @@ class Run:
     ----------
     size
         Voxels along x, y and z.
-    method
-        As in `Settings`.
     seconds, seconds_density, seconds_velocity
         A whole frame, its density (the paper's rendering) and its velocity.
     solves
@@ -74,13 +70,12 @@ class Run:
     psnr
         Of the working picture, linear, mean over the frames (dB).
     occupied
-        Share of the voxels that may hold smoke, mean over the frames.
+        Fraction of the voxels that may hold smoke, mean over the frames.
     failure
         Why there are no figures, one sentence; else empty.
     """
 
     size: tuple[int, int, int]
-    method: str
     seconds: float = 0.0
     seconds_density: float = 0.0
     seconds_velocity: float = 0.0
@@ -99,7 +94,7 @@ def run_apart(job: Job, folder: Path) -> Run:
     if result.exists():
         found = json.loads(result.read_text())
         return Run(**{**found, "size": tuple(found["size"])})
-    return Run(job.size, job.method, failure=why_it_ended(ended))
+    return Run(job.size, failure=why_it_ended(ended))
 
 
 def measure(job: Job) -> Run:
@@ -112,10 +107,9 @@ def measure(job: Job) -> Run:
     """
     scene = Scene.load(job.scene)
     if scene.clip is None:
-        raise ValueError(f"{job.scene}: has no [clip]; give the path of the video there.")
-    first = scene.clip.frames[0] if scene.clip.frames is not None else 0
-    source = replace(scene.clip, frames=(first, first + UNTIMED + job.frames - 1))
-    settings = replace(Settings.preset(job.quality, job.method, job.size), detail=job.detail)
+        raise ValueError(f"{job.scene}: has no [clip].")
+    source = replace(scene.clip, frames=(0, UNTIMED + job.frames - 1))
+    settings = replace(Settings.preset(job.quality, resolution=job.size), detail=job.detail)
     times = FrameTimes(job.size, CLOCKS[job.clock])
     with tempfile.TemporaryDirectory() as out, Clip.open(source) as clip:
         figures: list[Mapping[str, Any]] = []
@@ -123,7 +117,6 @@ def measure(job: Job) -> Run:
         run.write(Path(out) / "smoke", on_frame=times.before(lambda frame: figures.append(frame.figures)))
     return Run(
         size=job.size,
-        method=job.method,
         seconds=times.seconds,
         seconds_density=median([found["seconds_density"] for found in figures]),
         seconds_velocity=median([found["seconds_velocity"] for found in figures]),
@@ -141,9 +134,9 @@ def main() -> None:
     try:
         found = measure(job)
     except MemoryError as error:
-        found = Run(job.size, job.method, failure=str(error) or "Out of memory.")
+        found = Run(job.size, failure=str(error) or "Out of memory.")
     except ValueError as error:
-        found = Run(job.size, job.method, failure=str(error))
+        found = Run(job.size, failure=str(error))
     (Path(sys.argv[2]) / "run.json").write_text(json.dumps(asdict(found)))
 
 

@@ -2,7 +2,7 @@
 
 - ``scene``: what everybody renders; ``reference``: its exact image and gradient; ``sampling``: tables for the peers
 - ``peers``: one module a competitor, and one for Smokelift; ``worker`` runs one of them in a process of its own
-- ``run`` runs and compares them all; ``table`` shows the result
+- ``__main__`` runs and compares them all
 - ``stability``, ``agreement`` (with ``mitsuba_pictures``), ``paper_derivative``: commands that write the tables
   of the documentation
 """

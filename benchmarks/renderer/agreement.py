@@ -1,10 +1,11 @@
 """How well the renderer's pictures agree with Mitsuba 3's, as the grid is refined: the tables of docs/renderer.md.
 
-    python -m benchmarks.renderer.agreement --mitsuba /path/to/python [--folder KEPT] [--out agreement.md]
+    python -m benchmarks.renderer.agreement --mitsuba /path/to/python [--folder KEPT]
 
-One field of density, trilinear between the centres of 32^3 voxels, is the truth. Mitsuba renders it as it is
-(`mitsuba_pictures`, in a process of its own, since Mitsuba need not live in the same environment); we sample it
-onto finer grids, and a step shrinks with the voxel.
+One field of density, trilinear between the centers of 32^3 voxels, structured down to two, is the truth. Mitsuba
+renders it as it is (`mitsuba_pictures`, in a process of its own, since Mitsuba need not live in the same environment);
+we sample it onto finer grids, and a step shrinks with the voxel. All figures are relative L2 differences in percent.
+Optical depth is that of the thickest column along an axis. Half an hour on two cores.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -23,8 +25,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from benchmarks.errors import relative_error
 from benchmarks.tables import markdown
+from smokelift.evaluation.metrics import volume_error
 from smokelift.output.images import write_image
 from smokelift.render import Renderer
 from smokelift.render.environment import environment_count, environment_lights
@@ -125,7 +127,7 @@ def prepare(folder: Path, field: Array) -> EnvironmentLight:
 
 def difference(picture: Array, reference: Array) -> float:
     """Return the relative L2 difference in percent."""
-    return 100 * relative_error(picture, reference)
+    return 100 * volume_error(picture, reference)
 
 
 def blocks(picture: Array) -> Array:
@@ -258,68 +260,21 @@ class Comparison:
             cells.append(f"{difference(mean, true):.2f} ({noise:.2f}) at depth {DEPTHS[depth]:g}")
         return ", ".join(cells)
 
-    def page(self) -> str:
-        """All tables as one page of Markdown."""
-        return f"""# Agreement with Mitsuba 3
-
-Made by
-
-    python -m benchmarks.renderer.agreement --mitsuba PYTHON
-
-with the Python of an environment that has Mitsuba (3.9.1 here, with LLVM 19 in DRJIT_LIBLLVM_PATH); it takes about half
-an hour on two cores. Everything below is a relative L2 difference in percent.
-
-The truth is one field of density, trilinear between the centres of {VOXELS}³ voxels, structured down to two of them, in
-a box of 1 m. Mitsuba's perspective camera looks at it obliquely, {SIZE[0]} x {SIZE[1]} pixels. Optical depth is that of
-the thickest column along an axis; albedo {ALBEDO:g}; coloured lights: a parallel one, a point 0.65 m from the box, a
-point 0.2 m from it, and an environment of which both read the same file, turned by {ROTATION:g} degrees. The reference
-integrates single scattering over Mitsuba's own sensor, emitters, phase function and trilinear texture by the midpoint
-rule, every sample on a camera ray with a march to the light. We see the field only as voxels sampled from it, and step
-once a voxel.
-
-## Picture against the reference, as voxel and step shrink
-
-The scattered light alone / the picture before a constant background, where there is smoke. The environment as
-{COUNTS[-1]} parallel lights.
-
-{self.grids()}
-
-## Environment: scattered light by the number of parallel lights
-
-128³ voxels. "Chosen" is what the renderer's own test of convergence takes.
-
-{self.counts()}
-
-## Which side, which term
-
-Directional light, scattered light: the part that comes from seeing the field as samples (Mitsuba's picture of our
-voxels, interpolated trilinearly, against its picture of the field) + the part that is our renderer's (our picture
-against Mitsuba's of the same voxels).
-
-{self.parts()}
-
-## How exact the references are
-
-Columns are optical depth, anisotropy. The step is a fraction of the field's voxel; for the environment it is the number
-of directions of a product rule over the sphere that varies.
-
-{self.convergence()}
-
-`volpath`, single scattering (max_depth 2), against the reference over blocks of {BLOCK} x {BLOCK} pixels: difference,
-in brackets the standard error that its noise alone would give, and the difference of the sums.
-
-{self.path_traced()}
-
-Transmittance, `volpath` before a constant emitter: {self.transmittance()}.
-"""
+    def tables(self) -> Iterator[tuple[str, str]]:
+        """Yield what each table shows, and the table."""
+        yield "Scattered light alone / the picture before a constant background, where there is smoke", self.grids()
+        yield "Environment: scattered light by the number of parallel lights, 128^3 voxels", self.counts()
+        yield "Directional: what the sampling of the field adds + what the rendering of the samples adds", self.parts()
+        yield "How exact the references are; columns are depth, anisotropy", self.convergence()
+        yield "Reference against volpath, single scattering, over blocks (noise), and of the sums", self.path_traced()
+        yield "Transmittance, volpath before a constant emitter", self.transmittance()
 
 
 def main() -> None:
-    """Run Mitsuba's side, then ours, then write the page."""
+    """Run Mitsuba's side, then ours, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mitsuba", default=sys.executable, help="Python of an environment that has Mitsuba")
     parser.add_argument("--folder", type=Path, help="where Mitsuba's pictures are kept; they are used again")
-    parser.add_argument("--out", type=Path, default=Path("agreement.md"))
     options = parser.parse_args()
     field = truth()
     with tempfile.TemporaryDirectory() as temporary:
@@ -330,8 +285,8 @@ def main() -> None:
             module = (options.mitsuba, "-m", "benchmarks.renderer.mitsuba_pictures")
             subprocess.run([*module, str(folder)], env={**os.environ, "PYTHONPATH": str(SOURCE)}, check=True)
         with np.load(folder / "reference.npz") as reference:
-            page = Comparison(field, dict(reference), environment).page()
-    options.out.write_text(page)
+            for about, table in Comparison(field, dict(reference), environment).tables():
+                print(f"{about}\n\n{table}\n", flush=True)
 
 
 if __name__ == "__main__":

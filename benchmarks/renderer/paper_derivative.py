@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.errors import relative_error
 from benchmarks.tables import markdown
 from smokelift.baselines.paper_renderer import PaperRenderer
 from smokelift.checks.array_types import Doubles
+from smokelift.evaluation.metrics import volume_error
 from smokelift.render import Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 from tests.engine import paper_reference, renderer_reference
@@ -70,7 +70,7 @@ def compare(
     found = gradient[tuple(voxels.T)]
     common = slope(np.ones(density.shape))
     return (
-        relative_error(found, expected),
+        volume_error(found, expected),
         float(np.mean(np.sign(found) != np.sign(expected))),
         float(abs(gradient.sum(dtype=np.float64) / common - 1)),
     )

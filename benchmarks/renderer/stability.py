@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.errors import relative_error
 from benchmarks.renderer.reference import image_and_gradient
 from benchmarks.renderer.scene import PLUME, BenchScene, bench_scene, plume
 from benchmarks.tables import markdown
+from smokelift.evaluation.metrics import volume_error
 from smokelift.render import Renderer, Volume
 from smokelift.scene import DirectionalLight, Medium
 
@@ -57,7 +57,7 @@ def row(scene: BenchScene) -> list[str]:
     exact_gradient = np.where(scene.density > 0, exact_gradient, 0)
     steepest = np.argsort(np.abs(exact_gradient), axis=None)[-10:]
     worst = np.abs(gradient.flat[steepest] / exact_gradient.flat[steepest] - 1).max()
-    errors = (relative_error(image, exact_image), relative_error(gradient, exact_gradient), worst)
+    errors = (volume_error(image, exact_image), volume_error(gradient, exact_gradient), worst)
     return [*(f"{error:.1e}" for error in errors), f"{white_room(scene):.4f}"]
 
 

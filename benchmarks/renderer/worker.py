@@ -65,6 +65,11 @@ class Result:
     peak_bytes: int | None = None
     failure: str = ""
 
+    @property
+    def milliseconds(self) -> float:
+        """An iteration, the median."""
+        return 1e3 * float(np.median(self.seconds))
+
 
 def run_apart(peer: str, folder: Path, lights: int = 1, device: DeviceName = "cpu") -> Result:
     """Run a peer in a process of its own, on the scene in a folder; its image and gradient are written there.

@@ -1,6 +1,6 @@
 """The velocity estimate: error against time, and error on known flows.
 
-- ``pairs``: two densities and the motion between them; ``flow`` makes them from a formula
-- ``run`` measures whole estimates; ``table`` shows the result
-- ``accuracy``: estimates on baked scenes; ``poisson``: a Poisson solve beside SciPy's
+- ``__main__``: whole estimates by solver; on ``pairs`` of baked scenes, or those that ``flow`` makes from a formula
+- ``accuracy``: estimates on baked scenes; ``slices`` draws them
+- ``poisson``: a Poisson solve beside SciPy's
 """

@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from benchmarks.errors import relative_error
 from benchmarks.machine import poisson_seconds
 from benchmarks.tables import markdown
 from benchmarks.velocity.pairs import away_from, near_smoke
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.checks.array_types import Array
+from smokelift.evaluation.metrics import volume_error
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import Side
 from smokelift.transport import advect
@@ -75,11 +75,11 @@ def score(truth: Truth, frame: int, found: Velocity, solves: float, step: int = 
     carried = [advect(truth.density(frame), velocity, step * truth.dt) for velocity in (found, truth.velocity(frame))]
     ours, best = (float(np.linalg.norm((c - after)[moving])) for c in carried)
     return Score(
-        relative_error(u, v, moving),
+        volume_error(u, v, moving),
         float(np.sum(u[moving] * v[moving]) / np.linalg.norm(u[moving]) / np.linalg.norm(v[moving])),
         float(speed.mean() / true_speed.mean()),
         float(speed.max() / true_speed.max()),
-        relative_error(u, v, entering) if entering.any() else np.nan,
+        volume_error(u, v, entering) if entering.any() else np.nan,
         ours / best if step == 1 else np.nan,
         solves,
     )

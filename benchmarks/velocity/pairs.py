@@ -50,25 +50,6 @@ def away_from(inlet: Mask) -> Mask:
     return np.asarray(~ndimage.binary_dilation(inlet))
 
 
-def frames_for_pairs(name: str, truth: Truth, count: int) -> list[int]:
-    """Return the first frames of some pairs, spread evenly over a known scene.
-
-    Raises
-    ------
-    ValueError
-        If there are too few frames, or no smoke or no motion in one of them.
-    """
-    last = truth.frames - 1
-    if last <= count:
-        raise ValueError(f"{name}: has {truth.frames} frames; {count} pairs of them need at least {count + 2}.")
-    frames = [round(last * (k + 1) / (count + 1)) for k in range(count)]
-    for frame in frames:
-        smoke = truth.densities[frame : frame + 2].any(axis=(1, 2, 3)).all()
-        if not (smoke and any(component[frame].any() for component in truth.faces)):
-            raise ValueError(f"{name}: frame {frame} has no smoke that moves; give a scene with smoke all along.")
-    return frames
-
-
 def pair_of_truth(truth: Truth, frame: int) -> Pair:
     """Return a frame of a known scene and the next one."""
     return Pair(

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.scenes import KnownScene
-from benchmarks.accuracy.score import BLACK, score
+from benchmarks.accuracy.score import score
 from benchmarks.accuracy.sheets import STRIP_FRAMES, strip_rows, write_orbits
+from benchmarks.baked import BLACK
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import read_image
 from smokelift.render import scene_renderer

@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks import process
 from benchmarks.renderer import peers, reference, worker
+from benchmarks.renderer.__main__ import EXACT
 from benchmarks.renderer.peers import OURS, PEERS, Peer
-from benchmarks.renderer.run import EXACT
 from benchmarks.renderer.scene import bench_scene, plume
 
 SIZE = 9

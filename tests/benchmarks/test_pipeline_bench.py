@@ -1,21 +1,48 @@
-"""``python -m benchmarks pipeline``: what is timed, the table, and what is refused."""
+"""``python -m benchmarks.pipeline``: what a voxel costs, how that grows, and what is timed."""
 
-import json
-from dataclasses import asdict, replace
-from pathlib import Path
+import math
 
 import numpy as np
 import pytest
 
-from benchmarks.command import main
-from benchmarks.pipeline import clip, run
+from benchmarks.machine import UNTIMED
+from benchmarks.pipeline import clip
+from benchmarks.pipeline.__main__ import Law, exponents
 from benchmarks.pipeline.clip import with_grid, write_clip
-from benchmarks.pipeline.table import text
-from benchmarks.pipeline.worker import Job, Run, measure
+from benchmarks.pipeline.worker import Job, Run, run_apart
 from benchmarks.velocity.flow import built_in_densities, built_in_pair
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 
 SHAPE = (16, 16, 24)
+SIZES = ((16, 16, 24), (32, 32, 48), (64, 64, 96))
+
+
+def _runs(memory, seconds):
+    """Runs at two fractions, whose costs are functions of the voxels and the fraction of them that may hold smoke."""
+    pairs = [(size, share) for share in (0.1, 0.4) for size in SIZES]
+    return [
+        Run(
+            size,
+            seconds=seconds(math.prod(size), share),
+            memory_mib=memory(math.prod(size), share),
+            occupied=share,
+        )
+        for size, share in pairs
+    ]
+
+
+def test_a_law_is_found_again():
+    runs = _runs(lambda n, share: 300 + 1e-4 * n + 2e-4 * share * n, lambda n, share: 1.0)
+    law = Law.of(runs, [run.memory_mib or 0.0 for run in runs])
+    assert law.base == pytest.approx(300)
+    assert law.a_voxel == pytest.approx(1e-4)
+    assert law.an_occupied == pytest.approx(2e-4)
+    assert law.most_voxels(300 + 1.2e-4 * 5e6, 0.1) == pytest.approx(5e6)
+
+
+def test_both_slopes_are_found_again():
+    runs = _runs(lambda n, share: 1.0, lambda n, share: 1e-6 * n**1.1 * share**0.3)
+    assert exponents(runs, [run.seconds for run in runs]) == (pytest.approx(1.1), pytest.approx(0.3))
 
 
 @pytest.fixture
@@ -41,84 +68,18 @@ def test_the_box_has_cubes_of_any_number_about_the_same_middle(tmp_path, small_p
 
 
 @pytest.mark.usefixtures("small_pictures")
-def test_a_run_is_timed_in_a_process_of_its_own(tmp_path, capsys):
+def test_a_run_is_timed_in_a_process_of_its_own(tmp_path):
     try:
         vdb_module()
     except VdbUnavailable as missing:
         pytest.skip(str(missing))
-    status = main([*("pipeline", "--sizes", "16x16x24", "--frames", "1"), "--json", str(tmp_path / "found.json")])
-    assert status == 0
-    found = json.loads((tmp_path / "found.json").read_text())
-    assert found["clip"] == "built-in"
-    (only,) = found["runs"]
-    assert only["failure"] == "" and only["size"] == list(SHAPE)
-    assert 0 < only["seconds_density"] + only["seconds_velocity"] <= only["seconds"]
-    assert only["solves"] > 0 and only["psnr"] > 30
-    assert "16x16x24, default" in capsys.readouterr().out
+    with_grid(write_clip(tmp_path, UNTIMED + 1), SHAPE).save(tmp_path / "scene.toml")
+    found = run_apart(Job(str(tmp_path / "scene.toml"), SHAPE, "balanced", 1.0, 1, "wall"), tmp_path)
+    assert found.failure == ""
+    assert 0 < found.seconds_density + found.seconds_velocity <= found.seconds
+    assert found.solves > 0 and found.psnr > 30
 
 
-@pytest.mark.usefixtures("small_pictures")
-def test_the_first_frames_are_not_clocked(tmp_path, monkeypatch):
-    taken: list[tuple[int, int]] = []
-
-    def frames(source, *_):
-        taken.append(source.frames)
-        raise ValueError("enough")
-
-    monkeypatch.setattr("benchmarks.pipeline.worker.Clip.open", frames)
-    scene = with_grid(write_clip(tmp_path, 1), SHAPE)
-    assert scene.clip is not None
-    replace(scene, clip=replace(scene.clip, frames=(3, 9))).save(tmp_path / "scene.toml")
-    with pytest.raises(ValueError, match="enough"):
-        measure(Job(str(tmp_path / "scene.toml"), SHAPE, "default", "balanced", 4))
-    assert taken == [(3, 8)]
-
-
-def test_what_failed_is_said_and_the_others_go_on(tmp_path, monkeypatch):
-    outcomes = iter(
-        [Run((8, 8, 8), "default", failure="Out of memory."), Run((9, 9, 9), "default", 2.0, 1.0, 0.9, 5.0)]
-    )
-    monkeypatch.setattr(run, "run_apart", lambda *_: next(outcomes))
-    monkeypatch.setattr(run, "write_clip", lambda *_: None)
-    monkeypatch.setattr(run, "with_grid", lambda *_: _Unsaved())
-    said: list[str] = []
-    results = run.run(None, [(8, 8, 8), (9, 9, 9)], ["default"], "balanced", 1, said.append, lambda _: None)
-    assert said == ["8x8x8, default: Out of memory.", "9x9x9, default: 2 s a frame, 5 solves"]
-    assert "8x8x8, default: Out of memory." in text(results)
-
-
-class _Unsaved:
-    def save(self, path: Path) -> None: ...
-
-
-def test_the_papers_times_stand_beside_ours():
-    row = asdict(Run((64, 64, 96), "default", 1.5, 0.5, 0.9, 150.0, 400.0, 50.0))
-    results = {
-        "machine": {"processor": "some", "cores": 2},
-        "date": "today",
-        "versions": {},
-        "clip": "built-in",
-        "quality": "fine",
-        "runs": [row],
-    }
-    assert "0.08 / 6.13" in text(results)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (["--methods", "best"], "expected some of default, paper"),
-        (["--frames", "0"], "expected a number of frames"),
-        (["--sizes", "8x8x8"], "none below 16"),
-    ],
-)
-def test_what_cannot_be_timed_is_refused(arguments, expected, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["pipeline", *arguments])
-    assert ended.value.code == 2
-    assert expected in capsys.readouterr().err
-
-
-def test_a_scene_that_is_not_there_is_one_sentence(tmp_path, capsys):
-    assert main(["pipeline", str(tmp_path / "none.toml")]) == 2
-    assert "none.toml" in capsys.readouterr().err
+def test_a_run_that_fails_says_why(tmp_path):
+    found = run_apart(Job(str(tmp_path / "none.toml"), SHAPE, "balanced", 1.0, 1, "wall"), tmp_path)
+    assert "none.toml" in found.failure

@@ -1,9 +1,10 @@
-"""Pictures that stand behind the smoke: four that are painted here, photographs, and any picture file."""
+"""Pictures that stand behind the smoke, linear (rows, columns, 3): painted here, photographs, or any picture file."""
 
 from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from scipy import ndimage
 
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image, srgb_to_linear
 
-BLACK = "black"
-"""The plate that every other one is compared with."""
+BRIGHT = 0.75
+"""Linear radiance of the bright sky."""
 
 BOARD = 18
 """Columns of a board of `planks`."""
@@ -22,46 +23,76 @@ LINE = 12
 
 
 def planks(rows: int, columns: int) -> Picture:
-    """Upright boards of uneven tone with dark joints: hard edges along one axis, (rows, columns, 3)."""
+    """Upright boards of uneven tone with dark joints: hard edges along one axis."""
     random = np.random.default_rng(1)
     y, x = np.mgrid[:rows, :columns]
     tone = random.uniform(0.08, 0.45, columns // BOARD + 2)[x // BOARD]
     grain = 1 + 0.15 * np.sin(y / 7 + 3 * np.sin(x / 5))
-    grey = np.where(x % BOARD < 1, 0.02, tone * grain)
-    return np.asarray(grey[..., None] * np.array([1.2, 0.9, 0.6]), np.float32)
+    gray = np.where(x % BOARD < 1, 0.02, tone * grain)
+    return np.asarray(gray[..., None] * np.array([1.2, 0.9, 0.6]), np.float32)
 
 
 def sky(rows: int, columns: int) -> Picture:
-    """A clear sky that brightens downwards: no detail at all, (rows, columns, 3)."""
+    """A clear sky that brightens downwards: no detail at all."""
     down = np.linspace(0, 1, rows)[:, None, None]
     top, rise = np.array([0.18, 0.33, 0.62]), np.array([0.3, 0.28, 0.1])
     return np.asarray(np.broadcast_to(top + rise * down, (rows, columns, 3)), np.float32)
 
 
 def leaves(rows: int, columns: int) -> Picture:
-    """Green noise of three sizes: soft detail everywhere, (rows, columns, 3)."""
+    """Green noise of three sizes: soft detail everywhere."""
     random = np.random.default_rng(2)
     noise = sum(ndimage.gaussian_filter(random.standard_normal((rows, columns)), size) * size for size in (1, 2, 4))
-    grey = (noise - np.min(noise)) / np.ptp(noise)
-    return np.asarray(np.stack([0.25 * grey**2, 0.1 + 0.5 * grey**2, 0.15 * grey**3], -1), np.float32)
+    gray = (noise - np.min(noise)) / np.ptp(noise)
+    return np.asarray(np.stack([0.25 * gray**2, 0.1 + 0.5 * gray**2, 0.15 * gray**3], -1), np.float32)
 
 
 def page(rows: int, columns: int) -> Picture:
-    """White paper with lines of black print: brighter than most smoke, (rows, columns, 3)."""
+    """White paper with lines of black print: brighter than most smoke."""
     random = np.random.default_rng(3)
-    grey = np.full((rows, columns), 0.85)
+    gray = np.full((rows, columns), 0.85)
     for row in range(10, rows - 10, LINE):
-        grey[row : row + 5] *= np.where(ndimage.uniform_filter1d(random.random(columns), 3) > 0.5, 0.15, 1)
-    return np.repeat(grey[..., None], 3, 2).astype(np.float32)
+        gray[row : row + 5] *= np.where(ndimage.uniform_filter1d(random.random(columns), 3) > 0.5, 0.15, 1)
+    return np.repeat(gray[..., None], 3, 2).astype(np.float32)
 
 
-def black(rows: int, columns: int) -> Picture:
-    """Nothing, (rows, columns, 3)."""
-    return np.zeros((rows, columns, 3), np.float32)
+def clouds(rows: int, columns: int) -> Picture:
+    """A bright sky that darkens upwards, with clouds."""
+    noise = ndimage.gaussian_filter(np.random.default_rng(1).standard_normal((rows, columns)), (4, 10))
+    up = np.linspace(0.75, 1, rows)[:, None]
+    gray = BRIGHT * np.clip(up * (1 + 0.08 * noise / noise.std()), 0, 1.3)
+    return np.asarray(gray[..., None] * np.array([0.85, 0.95, 1.1]), np.float32)
 
+
+def wall(rows: int, columns: int) -> Picture:
+    """Bricks in uneven light, from dark to middling."""
+    random = np.random.default_rng(3)
+    y, x = np.mgrid[:rows, :columns]
+    row = y // 16
+    brick = (x + 18 * (row % 2)) // 36
+    tone = random.uniform(0.6, 1.3, (row.max() + 1, brick.max() + 1))[row, brick]
+    joint = (y % 16 < 2) | ((x + 18 * (row % 2)) % 36 < 2)
+    grain = ndimage.gaussian_filter(random.standard_normal((rows, columns)), 1)
+    light = ndimage.gaussian_filter(random.standard_normal((rows, columns)), 60)
+    gray = np.where(joint, 1.6, tone) * (1 + 0.15 * grain / grain.std()) * (1 + 0.2 * light / light.std())
+    return np.asarray(0.12 * np.clip(gray, 0.05, 4)[..., None] * np.array([1.2, 0.95, 0.8]), np.float32)
+
+
+def backdrop(rows: int, columns: int, color: float | tuple[float, float, float]) -> Picture:
+    """One color everywhere."""
+    return np.broadcast_to(np.asarray(color, np.float32), (rows, columns, 3)).copy()
+
+
+COLORS: dict[str, float | tuple[float, float, float]] = {
+    "black": 0.0,
+    "gray": 0.18,
+    "green": (0.05, 0.4, 0.08),
+    "white": 0.9,
+}
 
 PAINTED: dict[str, Callable[[int, int], Picture]] = {
-    "planks": planks, "sky": sky, "leaves": leaves, "page": page, BLACK: black,
+    "planks": planks, "sky": sky, "leaves": leaves, "page": page, "clouds": clouds, "wall": wall,
+    **{name: partial(backdrop, color=color) for name, color in COLORS.items()},
 }  # fmt: skip
 
 PHOTOGRAPHS = {"coffee": "coffee.png", "rocket": "rocket.jpg"}

@@ -1,0 +1,89 @@
+"""Clips before known backgrounds: what they show, and the figures of a background and of a run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.background.cases import CASES, SMOKES, with_column
+from benchmarks.background.plate_score import score
+from benchmarks.baked import FRONT, Baked
+from benchmarks.measure import optical_mass, view_figures
+from smokelift import Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.plate import known_plate
+from smokelift.scene import completed
+
+COUNT, GRID, SIZE = 40, (8, 8, 12), (32, 48)
+
+
+@pytest.fixture(scope="module")
+def ball() -> Baked:
+    """A ball of smoke that grows, seen from two sides."""
+    x, y, z = np.meshgrid(*((np.arange(n) + 0.5) / n - 0.5 for n in GRID), indexing="ij")
+    grows = 0.05 + 0.05 * np.arange(COUNT)[:, None, None, None] / COUNT
+    cameras = {
+        FRONT: Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=SIZE),
+        "90": Camera.look_at((7, 0, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=SIZE),
+    }
+    scene = Scene(
+        camera=cameras[FRONT],
+        domain=Domain((-1, -1, 0), (1, 1, 3), GRID),
+        medium=Medium(3, 0.8),
+        lights=(DirectionalLight((-0.4, 0.5, -0.8), (8, 8, 8)),),
+        scattering="single",
+    )
+    densities = np.maximum(1 - (x**2 + y**2 + z**2) / grows, 0).astype(np.float32)
+    return Baked("ball", scene, cameras, {}, densities).pictured()
+
+
+def test_a_case_is_compared_with_the_clean_one_of_the_same_smoke() -> None:
+    assert CASES["wall, crf 45"].undisturbed == CASES["wall, given"]
+    assert CASES["black, column"].undisturbed == CASES["black, column, given"]
+    assert CASES["black, medium unknown, colored"].undisturbed == CASES["black, medium unknown"]
+
+
+@pytest.mark.parametrize("name", ["wall, given", "wall, 12 frames", "both ways"])
+def test_a_clip_shows_smoke_before_its_background(ball, name) -> None:
+    case = CASES[name]
+    clip, clean = case.clip(ball.front), case.clean(ball.front)
+    assert len(clip) == len(clean)
+    assert np.abs(linear_to_srgb(clip.frame(8)) - linear_to_srgb(clean[8])).max() < 0.51 / 255
+
+
+@pytest.mark.parametrize("name", [name for name in SMOKES if name not in ("baked", "dark")])
+def test_what_never_leaves_its_pixels_is_there_in_all_frames(ball, name) -> None:
+    clear = SMOKES[name](ball.front).transmittance
+    assert (clear.max(0) < 0.95).mean() > 0.05
+
+
+def test_a_column_adds_mass_and_is_there_in_all_frames(ball) -> None:
+    column = with_column(ball)
+    least = (1 - column.front.transmittance).min(0)
+    assert (least > 0.3).any(axis=1).mean() > 0.75  # in every row that shows the box
+    assert optical_mass(column.scene, column.densities) > 1.2 * optical_mass(ball.scene, ball.densities)
+    assert column.front.radiance[0] != pytest.approx(column.front.radiance[-1], abs=0.01)
+
+
+def test_the_true_background_has_no_error_and_a_bright_one_takes_light(ball) -> None:
+    case = CASES["wall, given"]
+    clip, background, clean = case.clip(ball.front), case.background(ball.front), case.clean(ball.front)
+    true = score(clip, known_plate(background, clip), background, clean)
+    assert true["plate"] < 0.5 and true["lost"] < 0.01 and true["missed"] < 0.01
+    wrong = score(clip, known_plate(background + np.float32(0.05), clip), background, clean)
+    assert wrong["plate"] > 5 and wrong["lost"] > 0.2
+
+
+def test_true_volumes_have_the_true_views_and_mass(ball) -> None:
+    def seen(view: str, frame: int) -> np.ndarray:
+        return ball.views[view].at([frame]).before(np.full(3, 0.2))[0]
+
+    scene, frames = completed(ball.scene), range(0, COUNT, 10)
+    figures = view_figures(
+        scene, lambda k: 1.01 * ball.densities[k], ball.cameras, seen, frames, np.full(3, 0.2, np.float32)
+    )
+    assert figures["psnr_new"] == figures["psnr_90"] > 50
+    doubled = view_figures(scene, lambda k: 2 * ball.densities[k], ball.cameras, seen, frames)
+    assert doubled["psnr_new"] < 30
+    halved = replace(ball.scene, medium=Medium(1.5, 0.8))
+    assert optical_mass(ball.scene, ball.densities) == pytest.approx(2 * optical_mass(halved, ball.densities))
