@@ -24,7 +24,7 @@ weight of those that go on grows by 4 % a bounce, and a few paths make a pixel."
 
 
 def volume(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
-    """Describe values [x, y, z] at voxel centres of a box, trilinear between them."""
+    """Describe values [x, y, z] at voxel centers of a box, trilinear between them."""
     return {
         "type": "gridvolume",
         "grid": mi.VolumeGrid(np.ascontiguousarray(values.transpose(2, 1, 0)[..., None], np.float32)),
@@ -106,7 +106,7 @@ def surroundings(light: dict[str, Any], directions: tuple[int, int]) -> Iterator
 
 
 def pixel_rays(camera: dict[str, Any]) -> Any:
-    """Return Mitsuba's rays through the centres of the pixels, row by row."""
+    """Return Mitsuba's rays through the centers of the pixels, row by row."""
     width, height = camera["size"]
     index = dr.arange(mi.UInt32, width * height)
     pixel = mi.Point2f((mi.Float(index % width) + 0.5) / width, (mi.Float(index // width) + 0.5) / height)

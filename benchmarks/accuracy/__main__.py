@@ -12,9 +12,7 @@ The FOLDER of the ScalarFlow capture has scene.toml and any number of cameraNN.t
 compared at 270 x 480, as the cameras are calibrated and registered (the recordings moved as FluidNexus moves them), and
 each also with one gain a camera.
 
-OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real); of SCENEs also orbit_NAME.png, one moment from
-ten azimuths with the scores by azimuth, and accuracy_strip.png, consecutive frames from the side, with truth and runs
-below each other.
+OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real).
 """
 
 from __future__ import annotations
@@ -27,9 +25,7 @@ from benchmarks.accuracy.report import contact_sheet, markdown, table_columns, w
 from benchmarks.accuracy.runs import SMEAR
 from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
 from benchmarks.accuracy.score import score
-from benchmarks.accuracy.sheets import Row, strip_rows, write_orbits
 from benchmarks.machine import processor
-from smokelift.output.sheet import write_sheet
 
 PLAUSIBLE_AND_SMOOTH = ("balanced", "balanced:detail=0")
 """The default, whose detail in depth is made up, and the answer without it, which is the nearer one in PSNR."""
@@ -66,7 +62,6 @@ def main() -> None:
 
     where = {"machine": processor(), "date": date.today().isoformat()}
     rows = []
-    strips: list[Row] = []
     for done, known in enumerate(scenes, 1):  # written after every scene: the next may take an hour
         for run in runs:
             rows.append(score(known, run, folder(known, run)) | where)
@@ -75,10 +70,6 @@ def main() -> None:
         write(out, name, rows, scenes[:done])
         shown = options.show or [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
         contact_sheet(scenes[:done], shown, folder, out / f"{name}.png")
-        if known.truth is not None:
-            write_orbits(known, shown, folder, out / f"orbit_{known.name}.png")
-            strips += strip_rows(known, shown, folder)
-            write_sheet(out / f"{name}_strip.png", [tiles for _, tiles in strips], [], [label for label, _ in strips])
 
 
 if __name__ == "__main__":

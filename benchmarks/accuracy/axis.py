@@ -30,7 +30,7 @@ from smokelift.scene import Camera, Domain, Medium
 
 FRAMES, OBSERVED = 24, 16
 LOWER_END = 0.1
-"""Share of the smoke's mass, from below, that is its lower end."""
+"""Fraction of the smoke's mass, from below, that is its lower end."""
 
 BOX = (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0)
 CAMERAS = [(side, height) for side in (1, -1) for height in (1.0, 1.5, 2.5)]
@@ -48,7 +48,7 @@ class AxisCase:
     amounts
         Optical depths (rows, columns) of some frames.
     heights, mass, depths : (nz,)
-        Of the truth: metres above the floor, mass, and mean depth away from the camera (m).
+        Of the truth: meters above the floor, mass, and mean depth away from the camera (m).
     """
 
     camera: Camera

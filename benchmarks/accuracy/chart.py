@@ -61,10 +61,10 @@ def chart(runs: Runs) -> Any:
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(6.5 * columns, 5.2 * rows), dpi=DPI, layout="constrained")
-    colours = {name: f"C{index}" for index, name in enumerate(dict.fromkeys(run.series for run in runs.runs))}
+    colors = {name: f"C{index}" for index, name in enumerate(dict.fromkeys(run.series for run in runs.runs))}
     panels = np.atleast_1d(figure.subplots(rows, columns)).ravel()
     for axes, panel in zip(panels, shown, strict=False):
-        _panel(axes, runs, panel, colours)
+        _panel(axes, runs, panel, colors)
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     handles = {name: handle for axes in panels for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
@@ -83,8 +83,8 @@ def _at(run: Run, panel: tuple[str, str]) -> tuple[float, float] | None:
     return None if across is None or up is None else (across, up)
 
 
-def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str]) -> None:
-    """Draw one panel: the Pareto front, every series in its colour, the default, and runs without a time as levels."""
+def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colors: dict[str, str]) -> None:
+    """Draw one panel: the Pareto front, every series in its color, the default, and runs without a time as levels."""
     placed = [(run, at) for run in runs.runs if (at := _at(run, panel)) is not None]
     points = [at for _, at in placed]
     front = [points[index] for index in pareto_front(points)]
@@ -93,14 +93,14 @@ def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str
         color="black", linewidth=1, marker="o", markersize=12, fillstyle="none", label="Pareto front",
     )  # fmt: skip
     for name in dict.fromkeys(run.series for run, _ in placed):
-        _series(axes, name, [(run, at) for run, at in placed if run.series == name], colours[name])
+        _series(axes, name, [(run, at) for run, at in placed if run.series == name], colors[name])
     if runs.default is not None and (at := _at(runs.default, panel)) is not None:
         axes.plot(*at, color="gold", marker="*", markersize=17, markeredgecolor="black", linestyle="none",
                   zorder=1, label="default")  # fmt: skip
     across, up = panel
     levels = [(run, run.errors[up]) for run in runs.runs if up in run.errors and _at(run, panel) is None]
     for run, level in levels:
-        axes.axhline(level, color=colours[run.series], linestyle="--", linewidth=1)
+        axes.axhline(level, color=colors[run.series], linestyle="--", linewidth=1)
     axes.set(xscale="log", yscale="log", xlabel=NAMES[across], ylabel=NAMES[up])
     axes.xaxis.label.set_fontsize(9)
     axes.yaxis.label.set_fontsize(9)
@@ -109,18 +109,18 @@ def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str
     axes.grid(alpha=0.3, which="both")
 
 
-def _series(axes: Any, name: str, placed: list[tuple[Run, tuple[float, float]]], colour: str) -> None:
+def _series(axes: Any, name: str, placed: list[tuple[Run, tuple[float, float]]], color: str) -> None:
     """Draw runs of one series: grids that were given as a line, the amount of detail as a dashed one, others alone."""
     given = sorted(at for run, at in placed if not run.changes and not run.chosen)
     detail = sorted((float(run.changes["detail"]), at) for run, at in placed if [*run.changes] == ["detail"])
     curve = [at for _, at in detail] + [at for run, at in placed if run.name == name and detail]
     for line, style in ((given, {"marker": "o"}), (curve, {"linestyle": "--"})):
         if line:
-            axes.plot(*zip(*line, strict=True), color=colour, linewidth=0.8, **style)
+            axes.plot(*zip(*line, strict=True), color=color, linewidth=0.8, **style)
     for run, at in placed:
         if run.changes or run.chosen:
-            axes.plot(*at, color=colour, marker="s" if run.chosen else "D", fillstyle="none")
-    axes.plot([], [], color=colour, marker="o", label=name)
+            axes.plot(*at, color=color, marker="s" if run.chosen else "D", fillstyle="none")
+    axes.plot([], [], color=color, marker="o", label=name)
 
 
 def _label(axes: Any, runs: Runs, panel: tuple[str, str]) -> None:

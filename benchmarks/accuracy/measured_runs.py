@@ -55,7 +55,7 @@ class Run:
 
     @property
     def series(self) -> str:
-        """What it is called without the changes; runs of one series share a colour."""
+        """What it is called without the changes; runs of one series share a color."""
         return self.name.partition(":")[0]
 
     @property
@@ -111,7 +111,7 @@ def read_runs(path: Path) -> Runs:
     Raises
     ------
     ValueError
-        If it holds no runs, what is no number, or no scene that all runs share.
+        If there is no scene that all runs share.
     """
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
@@ -119,24 +119,19 @@ def read_runs(path: Path) -> Runs:
     by_run: dict[str, dict[str, dict[str, str]]] = {}
     for row in (row for row in rows if row["method"] != _REFERENCE):
         by_run.setdefault(row["run"], {})[row["scene"]] = row
-    if not by_run:
-        raise ValueError(f"{path}: holds no runs.")
     shared = sorted(set.intersection(*(set(scenes) for scenes in by_run.values())))
     if not shared:
         raise ValueError(f"{path}: there is no scene that all runs share; measure all of them on the same scenes.")
     decibels = {"view_error": "psnr_new"}
     if (first := next(name for name in columns if name.startswith("psnr_"))) != "psnr_new":
         decibels = {"input_error": first, **decibels}
-    runs = tuple(_mean(path, name, [scenes[scene] for scene in shared], decibels) for name, scenes in by_run.items())
+    runs = tuple(_mean(name, [scenes[scene] for scene in shared], decibels) for name, scenes in by_run.items())
     return Runs(runs, _caption([scenes[scene] for scenes in by_run.values() for scene in shared], shared))
 
 
-def _mean(path: Path, name: str, rows: list[dict[str, str]], decibels: dict[str, str]) -> Run:
+def _mean(name: str, rows: list[dict[str, str]], decibels: dict[str, str]) -> Run:
     def mean(column: str) -> float | None:
-        try:
-            values = [float(row[column]) for row in rows if row[column] != ""]
-        except (TypeError, ValueError):
-            raise ValueError(f"{path}: {column} of {name} must be a number.") from None
+        values = [float(row[column]) for row in rows if row[column] != ""]
         return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
 
     errors = {"density_error": mean("density_error"), "velocity_error": mean("velocity_error")}

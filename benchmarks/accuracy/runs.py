@@ -11,7 +11,7 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
 - ``billboard``, ``blurred``: the front picture in every view, as it is or blurred
-- ``billboard:depth=-0.02``: it stands so many metres behind the middle of the box of a capture
+- ``billboard:depth=-0.02``: it stands so many meters behind the middle of the box of a capture
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class KnownScene:
     seen
         Returns what a camera saw in a frame, linear (rows, columns, 3).
     billboard
-        Returns the input picture of a frame as it is put into a view, so many metres behind the middle of the box.
+        Returns the input picture of a frame as it is put into a view, so many meters behind the middle of the box.
     truth
         Volumes and velocities, if they are known.
     """
@@ -94,7 +94,7 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
         raise ValueError(f"{paths['input']}: has no [domain].")
     cameras = {view: camera_of(path).resized(*REAL_SIZE) for view, path in paths.items()}
     clips = {view: Clip.open(scene.clip) for view, scene in described.items() if scene.clip is not None}
-    centre, behind = np.array(domain.centre), view_frame(cameras["input"])[1]
+    center, behind = np.array(domain.centre), view_frame(cameras["input"])[1]
 
     def seen(view: str, frame: int) -> Image:
         picture = clips[view].frame(frame)
@@ -104,7 +104,7 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
         return area_average(picture, *REAL_SIZE)
 
     def billboard(view: str, frame: int, depth: float) -> Image:
-        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], centre + depth * behind)
+        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], center + depth * behind)
 
     name = f"{folder.name}, {'registered' if registered else 'as calibrated'}"
     frames = range(REAL_FRAMES[-1] + 1)
@@ -121,7 +121,7 @@ def moved(picture: Image, down: int, right: int) -> Image:
     return whole
 
 
-def picture_on_screen(picture: Image, source: Camera, view: Camera, centre: npt.NDArray[np.float64]) -> Image:
+def picture_on_screen(picture: Image, source: Camera, view: Camera, center: npt.NDArray[np.float64]) -> Image:
     """Return a picture as another camera sees it on an upright screen that turns to face whoever looks.
 
     Parameters
@@ -130,7 +130,7 @@ def picture_on_screen(picture: Image, source: Camera, view: Camera, centre: npt.
         What the source camera saw.
     source, view
         The camera of the picture, and the one that looks at the screen.
-    centre : (3,)
+    center : (3,)
         The middle of the screen (m).
     """
 
@@ -140,9 +140,9 @@ def picture_on_screen(picture: Image, source: Camera, view: Camera, centre: npt.
 
     origin, direction = ray_through_pixels(view)
     facing = np.cross(across(view), [0.0, 0.0, 1.0])
-    points = origin + direction * (((centre - origin) @ facing) / (direction @ facing))[..., None]
-    lateral, height = (points - centre) @ across(view), points[..., 2] - centre[2]
-    places = centre + lateral[..., None] * across(source) + height[..., None] * [0.0, 0.0, 1.0]
+    points = origin + direction * (((center - origin) @ facing) / (direction @ facing))[..., None]
+    lateral, height = (points - center) @ across(view), points[..., 2] - center[2]
+    places = center + lateral[..., None] * across(source) + height[..., None] * [0.0, 0.0, 1.0]
     pixels, _ = project_points(source, places)
     columns, rows = (np.rint(pixels[..., axis] - 0.5).astype(int) for axis in (0, 1))
     inside = (rows >= 0) & (rows < picture.shape[0]) & (columns >= 0) & (columns < picture.shape[1])

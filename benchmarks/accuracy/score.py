@@ -27,9 +27,6 @@ from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array
 
-SIDE = "90"
-"""The view in which a wrong distribution along the rays shows most."""
-
 BILLBOARDS = ("billboard", "blurred")
 """The input picture in every view, as it is and blurred."""
 

@@ -3,7 +3,7 @@
     python -m benchmarks.accuracy.worker scene.toml RUN FIRST LAST OUT
 
 reads the clip's frames FIRST to LAST (and those of further views that RUN names). It writes OUT/0001.npz, ... (density,
-and the velocity at voxel centres in m/s if the run has one), OUT/scene.toml with what was estimated, and OUT/run.json.
+and the velocity at voxel centers in m/s if the run has one), OUT/scene.toml with what was estimated, and OUT/run.json.
 Only the reconstruction is timed, from decoding the clip to OpenVDB files on disk, not the writing of the arrays. Times
 are the processor's, over all cores, so that other work on the machine changes none.
 """

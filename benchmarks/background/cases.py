@@ -180,7 +180,7 @@ def _veiled(seen: Seen, clear: Picture) -> Seen:
 
 
 SPOILED: Mapping[str, Callable[[Picture], Picture]] = {
-    **{f"noise {share:.0%}": partial(noisy, deviation=share) for share in (0.02, 0.05, 0.1)},
+    **{f"noise {fraction:.0%}": partial(noisy, deviation=fraction) for fraction in (0.02, 0.05, 0.1)},
     **{f"crf {crf}": partial(compressed, crf=crf) for crf in (20, 32, 45)},
 }
 """What becomes of sRGB pictures, by the words for it."""

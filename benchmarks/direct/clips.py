@@ -21,9 +21,9 @@ def true_moment(truth: Truth, frame: int) -> SmokeState:
 def reconstructed_moment(folder: Path, truth: Truth, frame: int) -> SmokeState:
     """Return a moment of a run of `benchmarks.accuracy`, from frame 1."""
     with np.load(folder / f"{frame + 1:04d}.npz") as file:
-        density, centres = (file[name].astype(np.float32) for name in ("density", "velocity"))
+        density, centers = (file[name].astype(np.float32) for name in ("density", "velocity"))
     voxel_size = truth.voxel_size * truth.shape[0] / density.shape[0]
-    return SmokeState(density, complete_velocity(Velocity(on_faces(centres), voxel_size, truth.closed)))
+    return Moment(density, complete_velocity(Velocity(on_faces(centers), voxel_size, truth.closed)))
 
 
 def density_error(found: Array, true: Array) -> float:

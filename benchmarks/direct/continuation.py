@@ -74,8 +74,8 @@ def with_dissolving_heads(moments: list[SmokeState], dt: float, rate: float) -> 
     """Return moments whose smoke dissolves since the first: above 30 % of its height, up to a rate (1/s) at its top."""
     layers = moments[-1].density.sum((0, 1))
     top = int(np.flatnonzero(layers > 1e-3 * layers.max())[-1])
-    share = np.clip((np.arange(len(layers)) / top - 0.3) / 0.7, 0, 1)
-    left = [np.exp(-rate * dt * number * share).astype(np.float32) for number in range(len(moments))]
+    fraction = np.clip((np.arange(len(layers)) / top - 0.3) / 0.7, 0, 1)
+    left = [np.exp(-rate * dt * number * fraction).astype(np.float32) for number in range(len(moments))]
     return [replace(moment, density=moment.density * each) for moment, each in zip(moments, left, strict=True)]
 
 
@@ -116,8 +116,8 @@ def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list
         new = dict(list(known.cameras.items())[1:])
         at_frame = {frame: moment.density for frame, moment in zip(frames, found, strict=True)}
         views = view_figures(about.scene, at_frame.__getitem__, new, known.seen, frames[::3])["psnr_new"]
-        share = truth.density(cut).size / found[-1].density.size
-        mass = share * found[-1].density.sum(dtype=float) / truth.density(frames[-1]).sum(dtype=float)
+        ratio = truth.density(cut).size / found[-1].density.size
+        mass = ratio * found[-1].density.sum(dtype=float) / truth.density(frames[-1]).sum(dtype=float)
         figures = [f"{np.mean(errors):.2f}", f"{errors[-1]:.2f}", f"{views:.1f}", f"{mass:.2f}"]
         up = rise([moment.velocity for moment in found], moments[-1].density, truth.dt) / really
         own = [f"{physics.buoyancy:.2f}", f"{up:.2f}"] if physics else ["", ""]

@@ -2,8 +2,8 @@
 
     python -m benchmarks.direct.leaving SMOKE OUT [--frames 48] [--start 40] [--picture FILE.png]
 
-It says how much smoke leaves by a face of the box, and how much dissolves before a side that cannot move, as shares of
-what there is at the start. The picture has eight frames of each in the box that grows, from the front and from 45
+It says how much smoke leaves by a face of the box, and how much dissolves before a side that cannot move, as fractions
+of what there is at the start. The picture has eight frames of each in the box that grows, from the front and from 45
 degrees.
 """
 
@@ -34,7 +34,7 @@ from smokelift.transport import Array, at_centres, faces_in
 
 HEADER = ["case", "room", "left by a face", "dissolved", "box at the end", "seconds a frame: first, last six"]
 AMBIENT = 0.35
-"""Share of the light in the picture that comes from everywhere; the rest comes from above."""
+"""Fraction of the light in the picture that comes from everywhere; the rest comes from above."""
 
 COLUMNS = 8
 
@@ -68,12 +68,12 @@ def left_by_a_face(sequence: Sequence, start: int) -> float:
 
 def share_inside(faces: tuple[Array, Array, Array], scale: float) -> Array:
     """Return the part of every voxel that is still in the box after it has gone `scale` times the velocity."""
-    share = np.ones((), np.float32)
+    fraction = np.ones((), np.float32)
     for axis, along in enumerate(at_centres(faces)):
         count = along.shape[axis]
         low = scale * along + np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
-        share = share * np.clip(np.minimum(low + 1, count - low), 0, 1)
-    return share
+        fraction = fraction * np.clip(np.minimum(low + 1, count - low), 0, 1)
+    return fraction
 
 
 def seen(sequence: Sequence, number: int, around: Domain, degrees: float) -> npt.NDArray[np.uint8]:

@@ -25,10 +25,10 @@ LEARNT = range(8, 20)
 """Frames that the simulation learns from."""
 
 HEIGHT, RADIUS = 1.55, 0.3
-"""Height and radius of the ball, in metres; it stands above the middle of the smoke."""
+"""Height and radius of the ball, in meters; it stands above the middle of the smoke."""
 
 WAY = 1.6
-"""Metres that the moving ball goes, with its middle in the smoke's."""
+"""Meters that the moving ball goes, with its middle in the smoke's."""
 
 POINTS = 400
 """Corners of the moving ball."""

@@ -65,9 +65,9 @@ def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
 
 def _on_faces(known: Known) -> Velocity:
     """The true flow of the first moment on the faces of the small grid, without divergence."""
-    centres = np.pad(known.velocities[FIRST], [(1, 1), (1, 1), (1, 1), (0, 0)], mode="edge")
+    centers = np.pad(known.velocities[FIRST], [(1, 1), (1, 1), (1, 1), (0, 0)], mode="edge")
     inside = slice(1, -1)
-    x = (centres[1:, inside, inside, 0] + centres[:-1, inside, inside, 0]) / 2
-    y = (centres[inside, 1:, inside, 1] + centres[inside, :-1, inside, 1]) / 2
-    z = (centres[inside, inside, 1:, 2] + centres[inside, inside, :-1, 2]) / 2
+    x = (centers[1:, inside, inside, 0] + centers[:-1, inside, inside, 0]) / 2
+    y = (centers[inside, 1:, inside, 1] + centers[inside, :-1, inside, 1]) / 2
+    z = (centers[inside, inside, 1:, 2] + centers[inside, inside, :-1, 2]) / 2
     return project(Velocity((x, y, z), known.domain.voxel_size))

@@ -87,16 +87,16 @@ def _splits(known: Known) -> Known:
 
 
 def _fills(known: Known) -> Known:
-    share = np.linspace(0, 1, LENGTH, dtype=np.float32)[:, None, None, None]
+    fraction = np.linspace(0, 1, LENGTH, dtype=np.float32)[:, None, None, None]
     full = np.float32(THICK * known.densities.max())
-    return _unknown_flow(replace(known, densities=np.maximum(known.densities, share * full)))
+    return _unknown_flow(replace(known, densities=np.maximum(known.densities, fraction * full)))
 
 
-def _fades(*shares: float) -> Callable[[Known], Known]:
-    """Smoke of which a share is there at each moment."""
+def _fades(*fractions: float) -> Callable[[Known], Known]:
+    """Smoke of which a fraction is there at each moment."""
 
     def fades(known: Known) -> Known:
-        density = known.densities * np.array(shares, np.float32)[:, None, None, None]
+        density = known.densities * np.array(fractions, np.float32)[:, None, None, None]
         return _unknown_flow(replace(known, densities=density))
 
     return fades
@@ -106,9 +106,9 @@ def _unknown_flow(known: Known) -> Known:
     return replace(known, velocities=np.full_like(known.velocities, np.nan))
 
 
-def _moved(density: Array, share: float) -> Array:
-    """Return a density (x, y, z) moved along x by a share of the box; nothing comes in."""
-    voxels = round(share * len(density))
+def _moved(density: Array, fraction: float) -> Array:
+    """Return a density (x, y, z) moved along x by a fraction of the box; nothing comes in."""
+    voxels = round(fraction * len(density))
     moved = np.roll(density, voxels, axis=0)
     if voxels > 0:
         moved[:voxels] = 0

@@ -73,7 +73,7 @@ DISTURBANCES: dict[str, Disturbance] = {
     "flicker": _disturbed(
         spoiled.flicker, "Exposure flickers, black behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
-    "flicker-grey": _disturbed(
+    "flicker-gray": _disturbed(
         spoiled.flicker_before_gray, "Exposure flickers, gray behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
     "missing": _disturbed(spoiled.missing, "Frames missing", "share", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)),

@@ -31,7 +31,7 @@ def write_clip(folder: Path, frames: int, extent: float = 1.0) -> Scene:
     frames
         How many.
     extent
-        Length of the smoke along each side of the box, in shares of the usual. Smaller smoke is as opaque.
+        Length of the smoke along each side of the box, in fractions of the usual. Smaller smoke is as opaque.
     """
     scene = Scene(
         clip=ClipSource(folder / "frame_####.exr", fps=24.0),

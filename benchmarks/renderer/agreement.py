@@ -71,7 +71,7 @@ def truth() -> Array:
 
 
 def sampled(field: Array, count: int) -> Array:
-    """The trilinear field at the centres of count^3 voxels."""
+    """The trilinear field at the centers of count^3 voxels."""
     at = (np.arange(count) + 0.5) * VOXELS / count - 0.5
     corners = np.meshgrid(at, at, at, indexing="ij")
     return np.asarray(ndimage.map_coordinates(field, corners, order=1, mode="nearest"), np.float32)
@@ -86,9 +86,9 @@ def surroundings(rows: int = 512) -> Array:
     towards = np.stack(axes, -1)
     z = towards[..., 2:]
     radiance = 0.3 * (1 + z) * np.array([0.5, 0.7, 1.0]) + 0.4 * (1 - z) * np.array([0.3, 0.2, 0.1])
-    for centre, sharpness, colour in (((0.6, -0.5, 0.62), 20, (4, 3, 2)), ((-0.8, 0.1, 0.2), 8, (0.5, 1, 2))):
-        cosine = towards @ centre / np.linalg.norm(centre)
-        radiance = radiance + np.exp(sharpness * (cosine - 1))[..., None] * np.array(colour)
+    for center, sharpness, color in (((0.6, -0.5, 0.62), 20, (4, 3, 2)), ((-0.8, 0.1, 0.2), 8, (0.5, 1, 2))):
+        cosine = towards @ center / np.linalg.norm(center)
+        radiance = radiance + np.exp(sharpness * (cosine - 1))[..., None] * np.array(color)
     return np.asarray(radiance, np.float32)
 
 

@@ -81,7 +81,7 @@ def march(
         scattered = [irradiance * phase_value(function, -ray.d, towards) for function in phases]
         passed = [dr.exp(-e * density * width) for e in extinctions]
         lit = [t * (1 - p) * dr.exp(-e * shadow) for t, p, e in zip(transmittance, passed, extinctions, strict=True)]
-        arriving = [weight * colour for weight in lit for colour in scattered]
+        arriving = [weight * color for weight in lit for color in scattered]
         brighter = [r + a for r, a in zip(radiance, arriving, strict=True)]
         return brighter, [t * p for t, p in zip(transmittance, passed, strict=True)]
 

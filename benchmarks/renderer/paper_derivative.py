@@ -55,8 +55,8 @@ def compare(
     Returns
     -------
     tuple
-        Relative error over voxels of smoke, share of them with the wrong sign, and the relative error for density that
-        is added everywhere.
+        Relative error over voxels of smoke, fraction of them with the wrong sign, and the relative error for density
+        that is added everywhere.
     """
 
     def slope(direction: Doubles) -> float:

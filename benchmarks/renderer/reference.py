@@ -1,6 +1,6 @@
 """The exact answer: the renderer's discrete sums and their adjoint in float64.
 
-Rays are sampled where they cross the voxel-centre planes of their own dominant axis, bilinearly in the plane, with
+Rays are sampled where they cross the voxel-center planes of their own dominant axis, bilinearly in the plane, with
 kappa zero and J that of the nearest voxel outside the grid. The light's optical depth is S^T K S kappa: S from voxels
 to the light's columns (bilinear in each plane), K the midpoint rule along the columns.
 

@@ -1,4 +1,4 @@
-"""The scene of the renderer's benchmark: a plume with structure in a given share of the voxels, seen obliquely."""
+"""The scene of the renderer's benchmark: a plume with structure in a given fraction of the voxels, seen obliquely."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 
 PLUME = 0.18
-"""Share of the voxels with smoke in the first scene."""
+"""Fraction of the voxels with smoke in the first scene."""
 
 OPTICAL_DEPTH = 3.0
 """Largest optical depth along the grid's y axis."""
@@ -56,21 +56,21 @@ class BenchScene:
         return self.lights[0]
 
 
-def plume(size: int, share: float) -> NDArray[np.float32]:
-    """Return a density (size, size, size) with structure that is above zero in exactly this share of the voxels.
+def plume(size: int, fraction: float) -> NDArray[np.float32]:
+    """Return a density (size, size, size) with structure that is above zero in exactly this fraction of the voxels.
 
     It is a tilted ellipsoid with billows. Its surface is the quantile of the distance from the middle that leaves the
-    share inside. With share 1 there is structure everywhere and no envelope.
+    fraction inside. With fraction 1 there is structure everywhere and no envelope.
     """
     axis = (2 * np.arange(size, dtype=np.float32) + 1) / size - 1
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij", sparse=True)
     structure = 1 + 0.45 * np.sin(9 * x + 1) * np.sin(8 * y) * np.cos(7 * z)
     structure *= 1 + 0.3 * np.sin(23 * x + 2 * y) * np.sin(21 * y + 3 * z) * np.sin(19 * z + 2 * x)
-    if share >= 1:
+    if fraction >= 1:
         return np.asarray(structure)
     distance = np.sqrt(((x - 0.12 * z) / 0.65) ** 2 + ((y + 0.08 * z) / 0.65) ** 2 + (z / 0.85) ** 2)
     distance *= 1 + 0.08 * np.sin(11 * x + 3 * z) * np.sin(10 * y + 1) * np.sin(9 * z)
-    rank = round(share * distance.size)
+    rank = round(fraction * distance.size)
     radius = np.partition(distance, rank, axis=None)[rank]
     return np.asarray(np.maximum(1 - distance / radius, 0) * structure)
 

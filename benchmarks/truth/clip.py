@@ -14,7 +14,7 @@ Array = npt.NDArray[Any]
 
 YAWS = {"front": 0, "nov20": 20, "nov45": 45, "side": 90}  # degrees about the vertical, towards +x
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
-# FFmpeg's conversion of colours is a code value too dark unless it is asked to round.
+# FFmpeg's conversion of colors is a code value too dark unless it is asked to round.
 EXACT = int(
     Interpolation.BICUBIC | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
 )

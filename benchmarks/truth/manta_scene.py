@@ -149,10 +149,10 @@ class Simulation:
         mean = np.array(inlet.velocity)
         speed = np.linalg.norm(mean)
         axis = mean / speed
-        centre = np.array(inlet.position)
-        sway = np.array([wobble(centre, time) for wobble in self.wobble])
-        centre[:2] += 0.25 * inlet.radius * sway
-        offset = self.points - centre.astype(np.float32)
+        center = np.array(inlet.position)
+        sway = np.array([wobble(center, time) for wobble in self.wobble])
+        center[:2] += 0.25 * inlet.radius * sway
+        offset = self.points - center.astype(np.float32)
         along = offset @ axis.astype(np.float32)
         radius = np.sqrt((offset**2).sum(-1) - along**2)
         cells = (np.abs(along) < inlet.half_length) & (radius < inlet.radius)

@@ -1,6 +1,6 @@
 """The scenes that are baked: a kind and a seed give everything. Runs inside Blender as well; needs only numpy.
 
-Lengths are metres, times seconds, in a box of 2 x 2 x 3 m from (-1, -1, 0) with z up.
+Lengths are meters, times seconds, in a box of 2 x 2 x 3 m from (-1, -1, 0) with z up.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Inlet:
     Attributes
     ----------
     position
-        Centre.
+        Center.
     radius
         Radius.
     velocity

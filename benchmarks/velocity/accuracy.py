@@ -125,12 +125,12 @@ def blurred(density: Array) -> Array:
     return np.asarray(ndimage.gaussian_filter(density, 1.0), np.float32)
 
 
-def noisy(share: float) -> Callable[[Array], Array]:
+def noisy(fraction: float) -> Callable[[Array], Array]:
     """Return what adds white noise to smoke, of a standard deviation relative to the largest density."""
     rng = np.random.default_rng(0)
 
     def change(density: Array) -> Array:
-        noise = share * density.max() * rng.standard_normal(density.shape).astype(np.float32)
+        noise = fraction * density.max() * rng.standard_normal(density.shape).astype(np.float32)
         return np.asarray(np.maximum(density + noise * (density > 0), 0))
 
     return change

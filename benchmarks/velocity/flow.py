@@ -205,6 +205,6 @@ def _near(positions: Array) -> npt.NDArray[np.intp]:
 
 
 def _positions(shape: tuple[int, int, int]) -> Array:
-    """Voxel centres (3, voxels), in longest sides from the middle."""
+    """Voxel centers (3, voxels), in longest sides from the middle."""
     axes = [(np.arange(n, dtype=np.float32) + np.float32(0.5 - n / 2)) / np.float32(max(shape)) for n in shape]
     return np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")])

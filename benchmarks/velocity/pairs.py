@@ -12,7 +12,7 @@ from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array
 
 SMOKE = 0.01
-"""Share of the largest density from which a voxel counts as smoke."""
+"""Fraction of the largest density from which a voxel counts as smoke."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Pair:
     before, after : (nx, ny, nz) float32
         Densities of two frames.
     motion : (nx, ny, nz, 3) float32
-        What carries the first into the second, in voxels a frame, at voxel centres and at the points of arrival.
+        What carries the first into the second, in voxels a frame, at voxel centers and at the points of arrival.
     inlet : (nx, ny, nz) bool
         Where smoke enters. Estimates do not know it.
     """

@@ -104,19 +104,6 @@ def test_the_pareto_front() -> None:
     assert pareto_front([]) == []
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (HEADER, "no runs"),
-        ((HEADER + ROWS).replace("0.5,20", "soon,20"), "must be a number"),
-        ((HEADER + ROWS).replace("a,paper", "c,paper").replace("b,paper", "d,paper"), "share"),
-    ],
-)
-def test_what_cannot_be_read(tmp_path, text, said) -> None:
-    with pytest.raises(ValueError, match=said):
-        read_runs(write(tmp_path, text))
-
-
 def test_runs_without_a_time_are_no_chart(tmp_path) -> None:
     with pytest.raises(ValueError, match="nothing to draw"):
         chart(read_runs(write(tmp_path, HEADER + "a,billboard,baseline,24,,20,,,box,2026-01-01\n")))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.ablations import EvenDepth, UnprojectedPrediction, WithoutHull, leave_out
-from benchmarks.accuracy.report import ORBIT_COLUMNS, error_columns, markdown
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
 from smokelift.density import (
@@ -82,17 +81,3 @@ def test_without_the_hull_smoke_may_be_beside_what_the_picture_shows():
 def test_a_picture_on_a_screen_is_unchanged_for_its_own_camera():
     picture = np.random.default_rng(0).random((16, 16, 3)).astype(np.float32)
     np.testing.assert_array_equal(picture_on_screen(picture, CAMERA, CAMERA, np.zeros(3)), picture)
-
-
-def test_the_table_shows_a_dash_for_a_figure_that_is_not_there():
-    row = {"scene": "plume-1", "run": "draft", "psnr_0": 40.0, "psnr_90": None, "seconds": 1.25}
-    line = markdown([row], error_columns(["0", "90"])).splitlines()[-1]
-    assert line.startswith("| plume-1 | draft | 40.0 / - |")
-    assert "| 1.25 |" in line
-
-
-def test_scores_of_the_orbit_have_a_table_of_their_own():
-    row = {"scene": "plume-1", "run": "draft", "patches": 0.2284, "patches_worst": 0.3, "patches_own": 0.16}
-    row |= {"texture": 0.5, "texture_own": 0.18, "edges": 0.81, "halo": 0.042, "flicker": 0.72}
-    line = markdown([row], ORBIT_COLUMNS).splitlines()[-1]
-    assert line == "| plume-1 | draft | 0.228 / 0.300 | 0.160 | 0.50 / 0.18 | 0.81 | 4.2% | 0.72 |"

@@ -1,4 +1,4 @@
-"""Figures and sheets of a run whose densities are known: the truth's own, and its front drawn out in depth."""
+"""Figures of a run whose densities are known: the truth's own, and its front drawn out in depth."""
 
 import json
 from pathlib import Path
@@ -8,10 +8,8 @@ import pytest
 
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import score
-from benchmarks.accuracy.sheets import STRIP_FRAMES, strip_rows, write_orbits
 from benchmarks.baked import BLACK
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import read_image
 from smokelift.render import scene_renderer
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed, orbit
 from smokelift.transport import Velocity
@@ -88,16 +86,3 @@ def test_a_front_drawn_out_in_depth_shows_in_its_orbit(known, drawn_out) -> None
 
 def test_a_run_without_densities_has_no_orbit(known, tmp_path) -> None:
     assert "patches" not in score(known, "black", tmp_path)
-
-
-def test_pages_and_strips_show_truth_and_runs_below_each_other(known, drawn_out, tmp_path) -> None:
-    runs = ["draft", "billboard", "truth"]
-    write_orbits(known, runs, lambda *_: drawn_out, tmp_path / "orbit.png")
-    page = read_image(tmp_path / "orbit.png")
-    truth, run = (page[top : top + 240] for top in (32, 32 + 260))
-    width = page.shape[1] // 10
-    front, side = (np.abs(truth - run)[:, column : column + width].mean() for column in (0, 5 * width))
-    assert side > front
-    strips = strip_rows(known, runs, lambda *_: drawn_out)
-    assert [label for label, _ in strips] == ["ball, frames 2 to 9: truth", "ball, frames 2 to 9: draft"]
-    assert {len(tiles) for _, tiles in strips} == {STRIP_FRAMES}

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.stability.__main__ import failures, main
+from benchmarks.stability.__main__ import failures
 from benchmarks.stability.cases import DAMAGED, EXTRACTED
 from benchmarks.stability.environments import ENVIRONMENTS, Failure, lacking
 from benchmarks.stability.forked import Ended, Limits, run
@@ -124,8 +124,3 @@ def test_the_judge_sees_other_files() -> None:
     assert verdict(ended, {"a": (1, 1)}, {"a": (1, 1), "new.png": (1, 1)}, "new") == ""
     assert verdict(ended, {"a": (1, 1)}, {"a": (2, 1)}, "new") == "other files"
     assert verdict(ended, {"a": (1, 1)}, {}, "new") == "other files"
-
-
-def test_the_table(tmp_path, capsys) -> None:
-    assert main([str(tmp_path), "--cases", "1", "--classes", "NumPy twin"]) == 0
-    assert "| NumPy twin | 1 |" in capsys.readouterr().out

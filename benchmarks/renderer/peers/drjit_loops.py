@@ -38,7 +38,7 @@ def prepare(scene: BenchScene) -> Iteration:
     first, following, across, down = (Int32(a) for a in (rays.first, rays.next, rays.across, rays.down))
     phase = Float(phase_volume(scene).ravel())
     target = [Float(np.ascontiguousarray(scene.target.reshape(-1, 3)[rays.pixel, channel])) for channel in range(3)]
-    colours = list(zip(scene.light.irradiance, scene.background, target, strict=True))
+    colors = list(zip(scene.light.irradiance, scene.background, target, strict=True))
     mode = without_atomics()
     cells = np.arange(padded**3, dtype=np.int32).reshape((padded,) * 3)
     nearest = np.pad(cells[1:-1, 1:-1, 1:-1], 1, mode="edge")
@@ -124,10 +124,10 @@ def prepare(scene: BenchScene) -> Iteration:
         medium = light(density)
         depth, scattered = march(medium)
         tau = dr.exp(-depth)
-        image = [irradiance * scattered + behind * tau for irradiance, behind, _ in colours]
-        of_image = [2 * (value - wanted) for value, (_, _, wanted) in zip(image, colours, strict=True)]
-        of_scattered = sum(of * irradiance for of, (irradiance, _, _) in zip(of_image, colours, strict=True))
-        of_transmittance = sum(of * behind for of, (_, behind, _) in zip(of_image, colours, strict=True))
+        image = [irradiance * scattered + behind * tau for irradiance, behind, _ in colors]
+        of_image = [2 * (value - wanted) for value, (_, _, wanted) in zip(image, colors, strict=True)]
+        of_scattered = sum(of * irradiance for of, (irradiance, _, _) in zip(of_image, colors, strict=True))
+        of_transmittance = sum(of * behind for of, (_, behind, _) in zip(of_image, colors, strict=True))
         dr.eval(image, depth, of_scattered, of_transmittance)
         gradient = shadow(medium, march_back(medium, depth, of_scattered, of_transmittance))
         dr.eval(gradient)

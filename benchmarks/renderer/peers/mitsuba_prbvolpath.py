@@ -45,7 +45,7 @@ _GRID = "smoke.interior_medium.sigma_t.data"
 
 
 def prepare(scene: BenchScene, samples: int) -> Iteration:
-    """Build the scene, with a light of irradiance one; colours come in the last line."""
+    """Build the scene, with a light of irradiance one; colors come in the last line."""
     n = scene.domain.resolution[0]
     mitsuba_scene = mi.load_dict(_description(scene))
     params = mi.traverse(mitsuba_scene)

@@ -13,10 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
-from benchmarks.stability.readers import READERS, Reader
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.output.files import checksum
+from smokelift.output.checksum import checksum
+from tests.engine.readers import READERS, Reader
 
 TRIES = settings(
     max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
