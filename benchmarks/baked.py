@@ -59,7 +59,7 @@ class Seen:
         return Seen(*(np.stack([area_average(picture, *size) for picture in pictures]) for pictures in both))
 
     def scattering(self, fraction: float) -> Seen:
-        """Return smoke that scatters this fraction of the light that it scatters."""
+        """Return smoke that sends this fraction of the light that it sends."""
         return Seen(np.float32(fraction) * self.radiance, self.transmittance)
 
     def before(self, plate: npt.ArrayLike, color: tuple[float, float, float] = WHITE) -> Picture:

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.baked import Seen
 from benchmarks.disturbances.known import Known, Take
 from benchmarks.disturbances.spoiled import GRAY, LENGTH, taken, usual
 from smokelift.transport import Array
@@ -55,9 +54,9 @@ def event(known: Known, number: float) -> Take:
 def exposed(known: Known) -> Known:
     """Return it pictured in a light that makes the brightest pixel in front as bright as `BRIGHTEST`."""
     pictured = known.pictured()
-    gain = np.float32(BRIGHTEST) / pictured.front.radiance.max()
-    views = {view: Seen(gain * seen.radiance, seen.transmittance) for view, seen in pictured.views.items()}
-    return replace(pictured, scene=replace(known.scene, lights=(known.light.scaled(float(gain)),)), views=views)
+    gain = BRIGHTEST / float(pictured.front.radiance.max())
+    views = {view: seen.scattering(gain) for view, seen in pictured.views.items()}
+    return replace(pictured, scene=replace(known.scene, lights=(known.light.scaled(gain),)), views=views)
 
 
 def _stands(known: Known) -> Known:
