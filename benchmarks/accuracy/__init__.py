@@ -1,5 +1,5 @@
 """Reconstructions beside known volumes and other views.
 
 ``python -m benchmarks.accuracy`` reconstructs scenes, each run in a process of its own (``worker``), and scores them.
-``axis`` measures where in depth smoke is placed.
+``chart`` draws speed against accuracy.
 """

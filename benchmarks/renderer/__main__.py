@@ -4,9 +4,8 @@
 
 Machines differ and are shared, so times are compared in pairs: Smokelift runs again between any two peers, and a peer's
 ratio is its median over Smokelift's just before and just after. The floor is a copy of ten volumes. Memory is the peak
-beyond imports, density and compiler, in MiB and in volumes of size^3 floats; set-up is compiler, tables and warm-up.
-Errors are relative L2 against float64. Smokelift alone is timed by the fraction of voxels with smoke and by the number
-of lights.
+beyond imports, density and compiler, in MiB and in volumes of size^3 floats. Errors are relative L2 against float64.
+Smokelift alone is timed by the fraction of voxels with smoke and by the number of lights.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ SWEEP_SIZE = 128
 """Voxels a side of the largest grid for the runs over fractions and lights."""
 
 HEADER = (
-    "peer", "ms", "times ours", "times the floor", "MiB", "volumes", "set-up s", "image error", "gradient error",
+    "peer", "ms", "times ours", "times the floor", "MiB", "volumes", "image error", "gradient error",
 )  # fmt: skip
 
 Array = NDArray[np.floating[Any]]
@@ -88,7 +87,6 @@ class Row:
             number(result.milliseconds / floor),
             number(None if peak is None else peak / 2**20),
             number(None if peak is None else peak / (4 * size**3)),
-            number(result.compile_seconds + result.setup_seconds),
             *("?" if e is None else f"{e:.0e}" + ("" if e <= EXACT else " (not exact)") for e in errors),
         ]
 

@@ -48,10 +48,6 @@ class Result:
     ----------
     seconds
         Time of each iteration: image and gradient.
-    compile_seconds
-        Import, set-up and first iteration of a tiny grid.
-    setup_seconds
-        Set-up and warm-up of the grid itself, less the iterations in the warm-up.
     peak_bytes
         Peak of memory beyond what is in use before the set-up: imports, compiler, density and target do not count.
         None where the system does not say.
@@ -60,8 +56,6 @@ class Result:
     """
 
     seconds: tuple[float, ...] = ()
-    compile_seconds: float = 0.0
-    setup_seconds: float = 0.0
     peak_bytes: int | None = None
     failure: str = ""
 
@@ -87,26 +81,21 @@ def run_apart(peer: str, folder: Path, lights: int = 1, device: DeviceName = "cp
 
 def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
     """Run a peer in this process; returns its image and gradient too."""
-    began = time.perf_counter()
     prepare = prepare_function(peer)
     small = bench_scene(plume(TINY, 0.5), np.zeros((TINY, TINY, 3), np.float32), len(scene.lights))
     tiny = prepare(small)
     tiny.run(tiny.upload(small.density))
     del tiny
-    compiled = time.perf_counter()
     before = _reset_peak()
     iteration = prepare(scene)
     density = iteration.upload(scene.density)
     for _ in range(WARM_UPS):
         iteration.run(density)
-    ready = time.perf_counter()
     seconds, outcome = _clocked(iteration, density)
     peak = peak_memory()
     image, gradient = iteration.download(*outcome)
     result = Result(
         seconds=tuple(seconds),
-        compile_seconds=compiled - began,
-        setup_seconds=max(ready - compiled - WARM_UPS * float(np.median(seconds)), 0),
         peak_bytes=None if peak is None or before is None else max(peak - before, 0),
     )
     return result, image, gradient

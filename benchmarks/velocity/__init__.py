@@ -2,5 +2,4 @@
 
 - ``__main__``: whole estimates by solver; on ``pairs`` of baked scenes, or those that ``flow`` makes from a formula
 - ``accuracy``: estimates on baked scenes; ``slices`` draws them
-- ``poisson``: a Poisson solve beside SciPy's
 """

@@ -26,7 +26,6 @@ from smokelift.checks.array_types import Array
 from smokelift.evaluation.metrics import volume_error
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import Side
-from smokelift.transport import advect
 from smokelift.velocity import CoarseToFine, DensityPair, Velocity, VelocityEstimator
 
 PAIRS = range(6, 38, 4)
@@ -45,13 +44,10 @@ class Score:
         Relative L2 error of the velocity.
     cosine
         Cosine of the angle between the two velocity fields, each taken as one vector.
-    mean, largest
-        Mean and largest speed, relative to the truth's.
+    mean
+        Mean speed, relative to the truth's.
     inlet
         Relative L2 error in the cells where smoke enters.
-    warp_error
-        Error of the density that the estimate carries, relative to that of the density that the true velocity
-        carries. Below one the estimate fits changes that are not motion.
     solves
         Time in Poisson solves.
     """
@@ -59,9 +55,7 @@ class Score:
     error: float
     cosine: float
     mean: float
-    largest: float
     inlet: float
-    warp_error: float
     solves: float
 
 
@@ -72,15 +66,11 @@ def score(truth: Truth, frame: int, found: Velocity, solves: float, step: int = 
     moving, entering = near & away_from(inlet), near & inlet
     u, v = found.centres(), np.mean([truth.velocity(frame + k).centres() for k in range(step)], axis=0)
     speed, true_speed = np.linalg.norm(u[moving], axis=-1), np.linalg.norm(v[moving], axis=-1)
-    carried = [advect(truth.density(frame), velocity, step * truth.dt) for velocity in (found, truth.velocity(frame))]
-    ours, best = (float(np.linalg.norm((c - after)[moving])) for c in carried)
     return Score(
         volume_error(u, v, moving),
         float(np.sum(u[moving] * v[moving]) / np.linalg.norm(u[moving]) / np.linalg.norm(v[moving])),
         float(speed.mean() / true_speed.mean()),
-        float(speed.max() / true_speed.max()),
         volume_error(u, v, entering) if entering.any() else np.nan,
-        ours / best if step == 1 else np.nan,
         solves,
     )
 

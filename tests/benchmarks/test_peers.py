@@ -97,7 +97,6 @@ def test_worker_measures_in_a_process_of_its_own(stage):
     assert result.failure == ""
     assert worker.MIN_RUNS <= len(result.seconds) <= worker.MAX_RUNS
     assert min(result.seconds) > 0
-    assert result.compile_seconds > 0
     if sys.platform == "linux":
         assert result.peak_bytes is not None
         assert result.peak_bytes < 2**26
