@@ -23,7 +23,7 @@ HIGHEST = 4.0
 """Largest error that a chart shows."""
 
 HEADER = (
-    "disturbance", "measured", "1 dB lost from", "people meet", "there: mean (dB)", "worst (dB)",
+    "disturbance", "measured", "1 dB lost from", "usual", "there: mean (dB)", "worst (dB)",
     "the paper's method: mean (dB)", "worst (dB)",
 )  # fmt: skip
 

@@ -64,23 +64,23 @@ def _disturbed(
 
 
 DISTURBANCES: dict[str, Disturbance] = {
-    "noise": _disturbed(spoiled.noise, "Noise", "share of the 8-bit range", (0, 0.02, 0.05, 0.1, 0.2), common=(0.05,)),
+    "noise": _disturbed(spoiled.noise, "Noise", "fraction of the 8-bit range", (0, 0.02, 0.05, 0.1, 0.2), common=(0.05,)),
     "crf": _disturbed(spoiled.compression, "H.264", "crf (none at -5)", (-5, 0, 20, 28, 35, 43, 50), -5, (35,)),
     "light": _disturbed(spoiled.wrong_light, "Wrong light", "degrees", (0, 15, 30, 60, 90, 180), common=(30,)),
     "extinction": _disturbed(
         spoiled.wrong_extinction, "Wrong extinction", "factor", (0.1, 0.5, 1, 2, 10), 1, (0.5, 2), True
     ),
     "flicker": _disturbed(
-        spoiled.flicker, "Exposure flickers, black behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
+        spoiled.flicker, "Exposure flickers, black behind", "fraction", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
     "flicker-gray": _disturbed(
-        spoiled.flicker_before_gray, "Exposure flickers, gray behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
+        spoiled.flicker_before_gray, "Exposure flickers, gray behind", "fraction", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
-    "missing": _disturbed(spoiled.missing, "Frames missing", "share", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)),
-    "doubled": _disturbed(spoiled.doubled, "Frames doubled", "share", (0, 1 / 6, 1 / 3, 1 / 2, 1)),
+    "missing": _disturbed(spoiled.missing, "Frames missing", "fraction", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)),
+    "doubled": _disturbed(spoiled.doubled, "Frames doubled", "fraction", (0, 1 / 6, 1 / 3, 1 / 2, 1)),
     "cut": _disturbed(spoiled.cut, "A cut", "frames jumped", (0, 2, 5, 10, 14)),
     "blur": _disturbed(spoiled.blur, "Blur", "voxels", (0, 0.5, 1, 2, 4)),
-    "saturated": _disturbed(spoiled.saturation, "White pixels", "share of the smoke's", (0, 0.02, 0.1, 0.3, 0.6)),
+    "saturated": _disturbed(spoiled.saturation, "White pixels", "fraction of the smoke's", (0, 0.02, 0.1, 0.3, 0.6)),
     "crushed": _disturbed(spoiled.crushing, "Crushed black", "sRGB level", (0, 0.02, 0.05, 0.1, 0.2, 0.4)),
     "background": _disturbed(
         spoiled.bright_background, "Bright background", "radiance beside the smoke's", (0, 0.25, 0.5, 1, 2)
