@@ -195,17 +195,18 @@ def _lost(results: Results, name: str) -> list[float]:
 def table(results: Results) -> str:
     """Return the page's table: a line a disturbance, with the strengths from which accuracy is lost."""
     lines = []
-    for name, disturbance in DISTURBANCES.items():
-        ours = curves(results, name, METHODS[0], "psnr_new")
+    for key, disturbance in DISTURBANCES.items():
+        ours = curves(results, key, METHODS[0], "psnr_new")
         if disturbance.labels or np.isnan(ours).all():
             continue
         measured = [x for x, each in zip(disturbance.strengths, ours.T, strict=True) if not np.isnan(each).all()]
-        lost = " and ".join(f"{strength:.2g}" for strength in _lost(results, name)) or "nowhere"
-        known = [f"{disturbance.title}, {disturbance.unit}", f"{min(measured):.3g} to {max(measured):.3g}", lost]
+        lost = " and ".join(f"{strength:.2g}" for strength in _lost(results, key)) or "nowhere"
+        name = ", ".join(filter(None, (disturbance.title, disturbance.unit)))
+        known = [name, f"{min(measured):.3g} to {max(measured):.3g}", lost]
         for strength in disturbance.common or (None,):
             line = [*known, "" if strength is None else f"{strength:.2g}"]
             for method in METHODS:
-                line += ["", ""] if strength is None else _mean_and_worst(results.changes(name, strength, method))
+                line += ["", ""] if strength is None else _mean_and_worst(results.changes(key, strength, method))
             lines.append(line)
     return tables.markdown(HEADER, lines)
 

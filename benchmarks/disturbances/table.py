@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 from benchmarks.disturbances import calls, smoke, spoiled
 from benchmarks.disturbances.known import Known, Take
@@ -39,71 +38,71 @@ class Disturbance:
     unit: str
     measure: Measure
     strengths: tuple[float, ...]
-    undisturbed: float
+    undisturbed: float = 0.0
     common: tuple[float, ...] = ()
     logarithmic: bool = False
     labels: tuple[str, ...] = ()
 
 
-def _run(make: Callable[[Known, float], Take], known: Known, strength: float, method: MethodName) -> Figures:
-    return whole_run(make(known, strength), method)
+def run(make: Callable[[Known, float], Take]) -> Measure:
+    """Return what measures whole runs of takes."""
+    return lambda known, strength, method: whole_run(make(known, strength), method)
 
 
-def _disturbed(
-    make: Callable[[Known, float], Take],
-    title: str,
-    unit: str,
-    strengths: tuple[float, ...],
-    undisturbed: float = 0.0,
-    common: tuple[float, ...] = (),
-    logarithmic: bool = False,
-    labels: tuple[str, ...] = (),
-) -> Disturbance:
-    """Return a disturbance of whole runs."""
-    return Disturbance(title, unit, partial(_run, make), strengths, undisturbed, common, logarithmic, labels)
-
+FLICKER = (0, 0.05, 0.1, 0.2, 0.4)
+COSINES = (-0.9, -0.5, 0, 0.5, 0.9)
 
 DISTURBANCES: dict[str, Disturbance] = {
-    "noise": _disturbed(spoiled.noise, "Noise", "fraction of the 8-bit range", (0, 0.02, 0.05, 0.1, 0.2), common=(0.05,)),
-    "crf": _disturbed(spoiled.compression, "H.264", "crf (none at -5)", (-5, 0, 20, 28, 35, 43, 50), -5, (35,)),
-    "light": _disturbed(spoiled.wrong_light, "Wrong light", "degrees", (0, 15, 30, 60, 90, 180), common=(30,)),
-    "extinction": _disturbed(
-        spoiled.wrong_extinction, "Wrong extinction", "factor", (0.1, 0.5, 1, 2, 10), 1, (0.5, 2), True
+    "noise": Disturbance(
+        "Noise", "fraction of the 8-bit range", run(spoiled.noise), (0, 0.02, 0.05, 0.1, 0.2), common=(0.05,)
     ),
-    "flicker": _disturbed(
-        spoiled.flicker, "Exposure flickers, black behind", "fraction", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
+    "crf": Disturbance(
+        "H.264", "crf (none at -5)", run(spoiled.compression), (-5, 0, 20, 28, 35, 43, 50), -5, (35,)
     ),
-    "flicker-gray": _disturbed(
-        spoiled.flicker_before_gray, "Exposure flickers, gray behind", "fraction", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
+    "light": Disturbance(
+        "Wrong light", "degrees", run(spoiled.wrong_light), (0, 15, 30, 60, 90, 180), common=(30,)
     ),
-    "missing": _disturbed(spoiled.missing, "Frames missing", "fraction", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)),
-    "doubled": _disturbed(spoiled.doubled, "Frames doubled", "fraction", (0, 1 / 6, 1 / 3, 1 / 2, 1)),
-    "cut": _disturbed(spoiled.cut, "A cut", "frames jumped", (0, 2, 5, 10, 14)),
-    "blur": _disturbed(spoiled.blur, "Blur", "voxels", (0, 0.5, 1, 2, 4)),
-    "saturated": _disturbed(spoiled.saturation, "White pixels", "fraction of the smoke's", (0, 0.02, 0.1, 0.3, 0.6)),
-    "crushed": _disturbed(spoiled.crushing, "Crushed black", "sRGB level", (0, 0.02, 0.05, 0.1, 0.2, 0.4)),
-    "background": _disturbed(
-        spoiled.bright_background, "Bright background", "radiance beside the smoke's", (0, 0.25, 0.5, 1, 2)
+    "extinction": Disturbance(
+        "Wrong extinction", "factor", run(spoiled.wrong_extinction), (0.1, 0.5, 1, 2, 10), 1, (0.5, 2), True
     ),
-    "optical-depth": _disturbed(
-        smoke.optical_depth, "Optical depth", "of the thickest column", (0.001, 0.01, 0.1, 1, 5, 20, 100), 1,
+    "flicker": Disturbance(
+        "Exposure flickers, black behind", "fraction", run(spoiled.flicker), FLICKER, common=(0.1,)
+    ),
+    "flicker-grey": Disturbance(
+        "Exposure flickers, gray behind", "fraction", run(spoiled.flicker_before_gray), FLICKER, common=(0.1,)
+    ),
+    "missing": Disturbance(
+        "Frames missing", "fraction", run(spoiled.missing), (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)
+    ),
+    "doubled": Disturbance("Frames doubled", "fraction", run(spoiled.doubled), (0, 1 / 6, 1 / 3, 1 / 2, 1)),
+    "cut": Disturbance("A cut", "frames jumped", run(spoiled.cut), (0, 2, 5, 10, 14)),
+    "blur": Disturbance("Blur", "voxels", run(spoiled.blur), (0, 0.5, 1, 2, 4)),
+    "saturated": Disturbance(
+        "White pixels", "fraction of the smoke's", run(spoiled.saturation), (0, 0.02, 0.1, 0.3, 0.6)
+    ),
+    "crushed": Disturbance("Crushed black", "sRGB level", run(spoiled.crushing), (0, 0.02, 0.05, 0.1, 0.2, 0.4)),
+    "background": Disturbance(
+        "Bright background", "radiance beside the smoke's", run(spoiled.bright_background), (0, 0.25, 0.5, 1, 2)
+    ),
+    "optical-depth": Disturbance(
+        "Optical depth", "of the thickest column", run(smoke.optical_depth), (0.001, 0.01, 0.1, 1, 5, 20, 100), 1,
         logarithmic=True,
     ),
-    "albedo": _disturbed(smoke.albedo, "Albedo, gray behind", "", (0, 0.25, 0.5, 0.75, 1), 0.75),
-    "anisotropy": _disturbed(smoke.anisotropy, "Anisotropy", "mean cosine", (-0.9, -0.5, 0, 0.5, 0.9)),
-    "event": _disturbed(
-        smoke.event, "What the smoke does", "", tuple(float(k) for k in range(len(smoke.EVENTS))),
+    "albedo": Disturbance("Albedo, gray behind", "", run(smoke.albedo), (0, 0.25, 0.5, 0.75, 1), 0.75),
+    "anisotropy": Disturbance("Anisotropy", "mean cosine", run(smoke.anisotropy), COSINES),
+    "event": Disturbance(
+        "What the smoke does", "", run(smoke.event), tuple(float(k) for k in range(len(smoke.EVENTS))),
         labels=tuple(smoke.EVENTS),
     ),
-    "length": _disturbed(spoiled.clip_length, "Length of the clip", "frames", (1, 2, 3, 6, 12, 20), 6, (), True),
-    "grid": _disturbed(
-        spoiled.grid, "Boxes and grids", "", tuple(float(k) for k in range(len(spoiled.GRIDS))),
+    "length": Disturbance(
+        "Length of the clip", "frames", run(spoiled.clip_length), (1, 2, 3, 6, 12, 20), 6, logarithmic=True
+    ),
+    "grid": Disturbance(
+        "Boxes and grids", "", run(spoiled.grid), tuple(float(k) for k in range(len(spoiled.GRIDS))),
         float(list(spoiled.GRIDS).index("36 high")), labels=tuple(spoiled.GRIDS),
     ),
-    "wrong-albedo": _disturbed(spoiled.wrong_albedo, "Wrong albedo", "factor", (0.25, 0.5, 1, 1.25), 1),
-    "wrong-anisotropy": _disturbed(
-        spoiled.wrong_anisotropy, "Wrong anisotropy", "mean cosine", (-0.9, -0.5, 0, 0.5, 0.9)
-    ),
+    "wrong-albedo": Disturbance("Wrong albedo", "factor", run(spoiled.wrong_albedo), (0.25, 0.5, 1, 1.25), 1),
+    "wrong-anisotropy": Disturbance("Wrong anisotropy", "mean cosine", run(spoiled.wrong_anisotropy), COSINES),
     "start": Disturbance(
         "Start of a fit wrong", "factor to the true density", calls.wrong_start, (0.01, 0.1, 0.5, 1, 2, 10, 100), 1,
         logarithmic=True,
