@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy import ndimage
+from scipy.optimize import minimize_scalar
 
-from benchmarks.accuracy.exposure import best_gain
 from benchmarks.accuracy.runs import billboard_depth, run_name, run_views
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.baked import BLACK
@@ -36,6 +36,9 @@ BASELINES = (*BILLBOARDS, "truth", "black")
 BLUR = 1 / 120
 """Standard deviation of the blurred billboard's Gaussian, as a share of a picture's longer side. Of 1, 2, 3 and 4 / 120
 it is the best for camera 00 of the ScalarFlow capture, with and without a gain."""
+
+LARGEST_GAIN = 4.0
+"""Gains are searched for between this and its inverse."""
 
 VIEW_FIGURES = ("psnr", "ssim")
 ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "texture", "texture_own", "edges", "halo", "flicker")
@@ -189,6 +192,28 @@ def _exposure_figures(known: KnownScene, run: str, folder: Path) -> dict[str, An
     for name in ("gain_psnr", "gain_ssim"):
         row[f"{name}_new"] = finite_mean(row[f"{name}_{view}"] for view in known.cameras if view not in used)
     return row
+
+
+def best_gain(shown: Sequence[Image], seen: Sequence[Image]) -> float:
+    """Return the factor to the radiance shown in all frames that comes nearest to what was seen, in 8-bit sRGB values.
+
+    Parameters
+    ----------
+    shown, seen : sequence of (rows, columns, 3)
+        Linear radiance of the same frames; 1 is returned if nothing is shown.
+    """
+    lit = [picture > 0 for picture in shown]  # a gain changes nothing else
+    ours = np.concatenate([picture[where] for picture, where in zip(shown, lit, strict=True)])
+    true = eight_bit_values(np.concatenate([picture[where] for picture, where in zip(seen, lit, strict=True)]))
+    if not ours.size:
+        return 1.0
+
+    def misfit(stops: float) -> float:
+        return float(np.mean((eight_bit_values(2**stops * ours) - true) ** 2))
+
+    most = np.log2(LARGEST_GAIN)
+    found = minimize_scalar(misfit, bounds=(-most, most), method="bounded", options={"xatol": 0.005})
+    return float(2**found.x)
 
 
 def _volume_figures(known: KnownScene, truth: Truth, folder: Path) -> dict[str, Any]:

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.exposure import best_gain
 from benchmarks.accuracy.scenes import REAL_FRAMES, REAL_SIZE, KnownScene, captured_scene, moved
-from benchmarks.accuracy.score import images, score
+from benchmarks.accuracy.score import best_gain, images, score
 from smokelift import Camera, ClipSource, Scene
 from smokelift.output.images import write_image
 from smokelift.scene import Domain
