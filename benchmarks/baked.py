@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift import Camera, Scene
-from smokelift.evaluation.resampling import on_grid
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, on_grid
 from smokelift.footage.images import Picture, area_average
 from smokelift.render import scene_renderer
 from smokelift.scene import completed

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from av.video.reformatter import Interpolation
 
-from smokelift.checks import Remark
+from smokelift.checks import Finding
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import StoredPicture
@@ -25,12 +25,12 @@ EXACT = int(Interpolation.BICUBIC) | int(Interpolation.ACCURATE_RND) | int(Inter
 class Frames:
     """Frames in memory; a `smokelift.footage.frame_source.FrameSource`."""
 
-    warning: Remark | None = None
+    warning: Finding | None = None
     lens: float | None = None
     backdrop: float | None = None
     fps = FPS
     files: tuple[Path, ...] = ()
-    notes: tuple[Remark, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)

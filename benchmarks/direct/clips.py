@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.direct import Moment, complete_velocity
+from smokelift.direct import SmokeState, complete_velocity
 from smokelift.evaluation import metrics
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.truth import Truth
+from smokelift.evaluation.truth import Truth, resampled
 from smokelift.transport import Array, Velocity, on_faces
 
 
@@ -23,7 +22,7 @@ def reconstructed_moment(folder: Path, truth: Truth, frame: int) -> SmokeState:
     with np.load(folder / f"{frame + 1:04d}.npz") as file:
         density, centers = (file[name].astype(np.float32) for name in ("density", "velocity"))
     voxel_size = truth.voxel_size * truth.shape[0] / density.shape[0]
-    return Moment(density, complete_velocity(Velocity(on_faces(centers), voxel_size, truth.closed)))
+    return SmokeState(density, complete_velocity(Velocity(on_faces(centers), voxel_size, truth.closed)))
 
 
 def density_error(found: Array, true: Array) -> float:

@@ -13,7 +13,7 @@ from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
 from smokelift.evaluation.frame_means import SMOKE_SHARE
 from smokelift.evaluation.metrics import velocity_error
-from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Method, compose
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import MethodName

@@ -12,7 +12,7 @@ from smokelift import Settings
 from smokelift.checks.array_types import Array
 from smokelift.evaluation.frame_means import SMOKE_SHARE, finite_mean
 from smokelift.evaluation.metrics import velocity_error, volume_error
-from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Frame
 from smokelift.render import Image
 from smokelift.setup.settings import MethodName

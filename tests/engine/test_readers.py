@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as st_numpy
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.output.checksum import checksum
+from smokelift.output.files import checksum
 from tests.engine.readers import READERS, Reader
 
 TRIES = settings(
