@@ -58,7 +58,7 @@ class StretchedNoise:
     def _sum(self, level: Level, lattices: Iterator[_Lattice]) -> _Octaves:
         """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
-        places = _core.marked(hull).astype(np.float32)
+        places = np.array(np.nonzero(hull), np.float32)
         places *= size
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)

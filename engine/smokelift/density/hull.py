@@ -81,7 +81,7 @@ class Projection:
 
 def centres_of(voxels: NDArray[np.bool_], domain: Domain) -> NDArray[np.float64]:
     """World positions (n, 3) of the centres of the marked voxels."""
-    places = [axis[index] for axis, index in zip(voxel_axes(domain), _core.marked(voxels), strict=True)]
+    places = [axis[index] for axis, index in zip(voxel_axes(domain), np.nonzero(voxels), strict=True)]
     return np.stack(places, -1)
 
 

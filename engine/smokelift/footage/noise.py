@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import smokelift._core as _core
 from smokelift.footage.images import Picture, srgb_to_linear
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
@@ -188,11 +187,8 @@ def linear_per_srgb(encoded: Picture) -> Picture:
 
 def median_of_seen(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Return the median along the first axis of what is seen (not NaN); NaN where nothing is."""
-    if not np.isnan(values).any():
-        lower, upper = _core.at_ranks(values, ((len(values) - 1) // 2, len(values) // 2))
-    else:
-        ordered, count = np.sort(values, axis=0), np.maximum(count_of_seen(values), 1)  # NaNs come last
-        lower, upper = at_rank(ordered, (count - 1) // 2), at_rank(ordered, count // 2)
+    ordered, count = np.sort(values, axis=0), np.maximum(count_of_seen(values), 1)  # NaNs come last
+    lower, upper = at_rank(ordered, (count - 1) // 2), at_rank(ordered, count // 2)
     return np.asarray((lower + upper) / np.float32(2), np.float32)
 
 

@@ -29,7 +29,6 @@ from av.video.plane import VideoPlane
 from av.video.reformatter import ColorRange, Interpolation
 from av.video.stream import VideoStream
 
-import smokelift._core as _core
 from smokelift.checks import Finding
 from smokelift.footage.alpha import Association, association, association_notes
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
@@ -368,7 +367,7 @@ class Video:
         converted = shown.reformat(*size, "gbrp" if planes else layout, interpolation=way, threads=1)
         if planes:
             green, blue, red = (_lines(plane) for plane in converted.planes)
-            return _core.interleave((red, green, blue))
+            return np.stack((red, green, blue), axis=-1)
         codes: npt.NDArray[Any] = converted.to_ndarray()
         return codes
 

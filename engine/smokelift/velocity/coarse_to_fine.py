@@ -10,7 +10,7 @@ import numpy as np
 import smokelift._core as _core
 from smokelift.checks import require_kind
 from smokelift.scene.checks import integer
-from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, require_same_shape
+from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, require_same_shape, without_divergence
 from smokelift.velocity.estimator import (
     DensityPair,
     VelocityEstimate,
@@ -185,8 +185,7 @@ def _solved(
         del linear, around
         solution, solved = settings.solver.solve(problem, start)
         effort.update({name: solved[name] for name in ("iterations", "products", "projections")})
-        # else thin or noisy smoke would throw single wisps many voxels far
-        u = u.with_faces(_core.clamp_increment(solution.faces, u.faces, MAX_INCREMENT, u.walls))
+        u = _clamped(solution, u)
     figures = {
         **effort,
         "residual": solved["residual"],
@@ -195,6 +194,21 @@ def _solved(
         "dissipation": pair.density_dissipation(centre.dissipation),
     }
     return VelocityEstimate(u, figures, _confidence(direction, weight, smoothness))
+
+
+def _clamped(solution: StaggeredGrid, u: StaggeredGrid) -> StaggeredGrid:
+    """The solution, no component further than `MAX_INCREMENT` from u, without divergence.
+
+    Else thin or noisy smoke would throw single wisps many voxels far.
+    """
+    increments = [found - before for found, before in zip(solution.faces, u.faces, strict=True)]
+    if all(np.abs(increment).max() <= MAX_INCREMENT for increment in increments):
+        return solution
+    clamped = u.with_faces(
+        before + np.clip(increment, -MAX_INCREMENT, MAX_INCREMENT)
+        for before, increment in zip(u.faces, increments, strict=True)
+    )
+    return without_divergence(clamped)[0]
 
 
 def _confidence(direction: Faces, weight: Array, smoothness: float) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
-from smokelift.transport import Array, Faces, StaggeredGrid
+from smokelift.transport import Array, Faces, StaggeredGrid, advect_cells, at_centres
 
 SMOKE_THRESHOLD = 0.01
 """Fraction of the largest density from which a voxel counts as smoke."""
@@ -47,8 +47,9 @@ class Linearisation:
 
     def unexplained(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
         """The share of the squared change that a velocity leaves beyond noise of a variance, and all that it leaves."""
-        whole, rest, inside = _core.residual_sums(self.direction, self.offset, self.weight, self.smoke, u.faces)
-        floor = noise / self.scale**2 * inside
+        left = self.offset + directional_derivative(self.direction, u.faces)
+        whole, rest = (float(np.sum(self.weight * change**2, dtype=np.float64)) for change in (self.offset, left))
+        floor = noise / self.scale**2 * float(np.sum(self.weight[self.smoke], dtype=np.float64))
         return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
 
 
@@ -67,10 +68,40 @@ class Regularisation:
 
 def linearise(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> Linearisation | None:
     """The change between densities around `u` (voxels per frame); None where there is no structure to follow."""
-    (gx, gy, gz), offset, _, carried, _, smoke, scale = _core.linearise(before, after, u.faces, SMOKE_THRESHOLD)
+    carried = advect_cells(before, u)
+    density = np.maximum(carried, after)
+    smoke = density > np.float32(SMOKE_THRESHOLD) * density.max()
+    direction = gradient(np.float32(0.5) * (carried + after))
+    scale = rms_gradient(direction, smoke)
     if scale == 0:
         return None
-    return Linearisation((gx, gy, gz), offset, carried, np.ascontiguousarray(weight), smoke, scale)
+    inverse = np.float32(1 / scale)
+    for component in direction:
+        component *= inverse
+    offset = inverse * (after - carried) - directional_derivative(direction, u.faces)
+    carried *= inverse
+    return Linearisation(direction, offset, carried, np.ascontiguousarray(weight), smoke, scale)
+
+
+def gradient(cells: Array) -> Faces:
+    """Central differences (nx, ny, nz) at voxel centres along x, y and z, one-sided at the sides of the box."""
+    x, y, z = (np.gradient(cells, axis=axis) if cells.shape[axis] > 1 else np.zeros_like(cells) for axis in range(3))
+    return x, y, z
+
+
+def rms_gradient(components: Faces, smoke: npt.NDArray[np.bool_]) -> float:
+    """Root mean square of a gradient in the smoke; 0 where there is none."""
+    count = np.count_nonzero(smoke)
+    squares = sum(float(np.sum(np.square(g[smoke]), dtype=np.float64)) for g in components)
+    return float(np.sqrt(squares / count)) if count else 0.0
+
+
+def directional_derivative(direction: Faces, faces: Faces) -> Array:
+    """direction . u (nx, ny, nz), with the velocity u on faces taken to voxel centres."""
+    x, y, z = (g * centred for g, centred in zip(direction, at_centres(faces), strict=True))
+    x += y
+    x += z
+    return x
 
 
 def least_squares(linear: Linearisation, centre: StaggeredGrid, terms: Regularisation) -> _core.LeastSquares:

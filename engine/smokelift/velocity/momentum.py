@@ -22,9 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-import smokelift._core as _core
-from smokelift.transport import Array, StaggeredGrid, Velocity
-from smokelift.velocity.linearisation import Linearisation
+from smokelift.transport import Array, StaggeredGrid, Velocity, without_divergence
+from smokelift.velocity.linearisation import Linearisation, directional_derivative
 
 MOMENTUM = 0.8
 """Share of the fitted momentum that an estimate without a prediction starts from. Below one, because the fit is to
@@ -70,10 +69,13 @@ class Centre:
 
     def velocity(self, prediction: Prediction | None, density: Array, grid: StaggeredGrid) -> StaggeredGrid:
         """The motion in voxels a frame, on the grid given."""
+        motion = _set_in_motion(density, self.momentum, grid)
         if prediction is None:
-            return grid.with_faces(_core.add_momentum(density, self.momentum, 0.0, None, grid.walls))
-        weight, faces = self.trust * prediction.scale, prediction.velocity.faces
-        return grid.with_faces(_core.add_momentum(density, self.momentum, weight, faces, grid.walls))
+            return motion
+        weight = np.float32(self.trust * prediction.scale)
+        return grid.with_faces(
+            own + weight * predicted for own, predicted in zip(motion.faces, prediction.velocity.faces, strict=True)
+        )
 
 
 def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisation, grid: StaggeredGrid) -> Centre:
@@ -82,13 +84,13 @@ def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisat
     The density (nx, ny, nz) is what momentum goes with. ``grid`` is any field on the estimate's grid.
     """
     rows = 4 if prediction is None else 1
-    columns = []
-    for momentum in np.eye(3 * rows).reshape(-1, rows, 3):
-        moved = _core.add_momentum(density, momentum, 0.0, None, grid.walls)
-        columns.append(_core.directional_derivative(linear.direction, moved))
+    columns = [
+        directional_derivative(linear.direction, _set_in_motion(density, momentum, grid).faces)
+        for momentum in np.eye(3 * rows).reshape(-1, rows, 3)
+    ]
     if prediction is not None:
-        columns.append(_core.directional_derivative(linear.direction, prediction.velocity.faces))
-    products = _core.weighted_products([*columns, linear.carried, linear.offset], linear.weight)
+        columns.append(directional_derivative(linear.direction, prediction.velocity.faces))
+    products = _weighted_products([*columns, linear.carried, linear.offset], linear.weight)
     found, rest = _least_squares(products)
     dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearised change may ask for more than all
     if dissipation < 0 and prediction is None:
@@ -99,6 +101,30 @@ def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisat
     trust = 0.0 if prediction is None else float(np.clip(found[3 * rows] / prediction.scale, 0, 1))
     share = MOMENTUM if prediction is None else 1.0
     return Centre(trust, dissipation, share * found[: 3 * rows].reshape(rows, 3))
+
+
+def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:
+    """The motion P(m) in voxels a frame that a momentum (1 or 4, 3) in the smoke sets off; see `Centre`."""
+    axes = np.meshgrid(*(np.linspace(-1, 1, n, dtype=np.float32) for n in density.shape), indexing="ij", sparse=True)
+    faces = StaggeredGrid.zero(density.shape, 1.0).faces
+    for along, (constant, *slopes) in enumerate(momentum.T.astype(np.float32)):
+        if not constant and not any(slopes):
+            continue
+        change = sum((slope * axis for slope, axis in zip(slopes, axes, strict=False)), start=constant)
+        gain = np.moveaxis(density * change, along, 0)
+        # faces on the sides of the box gain none
+        np.moveaxis(faces[along], along, 0)[1:-1] = np.float32(0.5) * (gain[1:] + gain[:-1])
+    return without_divergence(grid.with_faces(faces))[0]
+
+
+def _weighted_products(columns: list[Array], weight: Array) -> npt.NDArray[np.float64]:
+    """Sums over the voxels of weight a b for all pairs of the columns, shape (columns, columns)."""
+    products = np.zeros((len(columns), len(columns)))
+    for slabs in zip(weight, *columns, strict=True):
+        rows = np.stack(slabs[1:]).reshape(len(columns), -1).astype(np.float64)
+        # unlike a product by BLAS, which adds in an order of its own, it is the same to the bit wherever arrays lie
+        products += np.einsum("an,bn->ab", rows * slabs[0].reshape(-1), rows)
+    return products
 
 
 def _least_squares(products: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], float]:

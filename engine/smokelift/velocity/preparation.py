@@ -20,7 +20,7 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.transport import Array
-from smokelift.velocity.linearisation import SMOKE_THRESHOLD
+from smokelift.velocity.linearisation import SMOKE_THRESHOLD, gradient, rms_gradient
 
 BLUR = 0.5
 """Standard deviation (voxels) of the Gaussian that smooths densities which are neither smooth nor noisy."""
@@ -105,17 +105,10 @@ def without_noise(
     for width in widths:
         first, second = (_core.blur(a, width, 4.0) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
-        enough = left <= allowed * _gradient(second, smoke)
+        enough = left <= allowed * rms_gradient(gradient(second), smoke)
         if enough:
             break
     return (first, second, left**2), enough
-
-
-def _gradient(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
-    """Root mean square of the gradient in the smoke."""
-    if not smoke.any():
-        return 0.0
-    return float(np.sqrt(sum(np.mean(np.square(g[smoke])) for g in _core.gradient(density))))
 
 
 def _passed(width: float) -> float:

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy import ndimage
 
-from smokelift import _core
 from smokelift.footage.images import (
     ImageError,
     PictureKindError,
@@ -333,12 +332,3 @@ def test_pictures_are_smoothed_as_by_scipy(shape: tuple[int, ...], deviation: fl
 def test_the_brightest_channel_is_the_largest(shape: tuple[int, ...]) -> None:
     values = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
     assert np.array_equal(brightest_channel(values), values.max(-1))
-
-
-def test_channels_are_interleaved() -> None:
-    codes = np.random.default_rng(0).integers(0, 255, (5, 70, 4), np.uint8, endpoint=True)
-    planes = [np.pad(codes[..., c], ((0, 0), (0, 9)))[:, :70] for c in range(3)]
-    assert np.array_equal(_core.interleave(tuple(planes)), codes[..., :3])
-    for red in (codes[:4, :, 0].copy(), codes[..., 0]):
-        with pytest.raises(ValueError, match="belong together"):
-            _core.interleave((red, *planes[1:]))
