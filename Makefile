@@ -1,5 +1,6 @@
 # make demo   lift the example clip to a VDB sequence in demo/sequence, with pictures from all sides and a video
 # make test   formatting, types and tests; nothing that needs a GPU
+# make stubs  types of the compiled core, after a change of what cpp/ offers to Python
 # make sanitize       tests of the compiled core with one that checks itself for accesses outside arrays and the like
 # make stability      damaged files and failing systems against the command line; CASES=300 of each kind take an hour
 # make extension      the Blender extension's zips in dist/, with the manual; ENGINE_WHEELS=DIR adds platforms built elsewhere
@@ -30,7 +31,7 @@ HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u
 # What a step that failed left behind is not taken for its result.
 .DELETE_ON_ERROR:
 
-.PHONY: demo test pytest lint sanitize stability manual extension cross-wheels test-blender clean
+.PHONY: demo test pytest lint stubs sanitize stability manual extension cross-wheels test-blender clean
 
 demo: $(VENV)/engine.stamp
 	rm -rf demo/sequence
@@ -55,7 +56,11 @@ lint: $(VENV)/tools.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror cpp/*.cpp cpp/*.h
+	$(BIN)/python tools/stubs.py --check
 	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-workflows .github/workflows/*.yml
+
+stubs: $(VENV)/tools.stamp
+	$(BIN)/python tools/stubs.py
 
 $(VENV)/pip.stamp: pyproject.toml
 	@[ -n "$(PYTHON)" ] || { echo "Smokelift needs Python 3.11, 3.12 or 3.13 with venv; install one, or say make PYTHON=/path/to/python3." >&2; exit 2; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "grid.h"
+#include "halves.h"
 #include "threads.h"
 
 #include <pybind11/numpy.h>
@@ -9,107 +10,112 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace smokelift {
 
 namespace py = pybind11;
+using namespace py::literals;
 
-using Array = py::array_t<float, py::array::c_style | py::array::forcecast>;
-using Array3 = std::array<Array, 3>;
+using Index = py::ssize_t;
+using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
 inline void require_fit(bool fits) {
     if (!fits)
         throw std::invalid_argument("the arrays do not have shapes that belong together.");
 }
 
-inline Shape shape_of(const Array &a) {
+// A caller's array of so many axes (0: of any), C-contiguous. What is only read is converted if it is not of
+// this kind; what is written is refused.
+template <class T, int Axes = 0> struct Array {
+    T *data = nullptr;
+    std::array<Index, Axes> n{};
+    std::size_t size = 0;
+};
+
+template <int Axes = 0, class T = float> using Read = Array<const T, Axes>;
+template <int Axes = 0, class T = float> using Write = Array<T, Axes>;
+
+// A new array for the caller, not defined at first.
+template <class T, int Axes> struct Made {
+    using Stored = std::conditional_t<std::is_same_v<T, bool>, unsigned char, T>; // a vector packs bool
+
+    std::array<Index, Axes> n;
+    std::vector<Stored, LazyPages<Stored>> values;
+
+    explicit Made(const std::array<Index, Axes> &shape)
+        : n(shape), values(std::accumulate(n.begin(), n.end(), std::size_t(1), std::multiplies<>())) {}
+    T *data() { return reinterpret_cast<T *>(values.data()); }
+};
+
+inline In view(const Floats &a) {
     if (a.ndim() != 3 || a.size() == 0)
         throw std::invalid_argument("expected a three-dimensional array that is not empty.");
-    return {int(a.shape(0)), int(a.shape(1)), int(a.shape(2))};
+    return {a.data(), {int(a.shape(0)), int(a.shape(1)), int(a.shape(2))}};
 }
 
-inline In view(const Array &a) { return {a.data(), shape_of(a)}; }
-
-inline In view(const Array &a, const Shape &expected) {
-    require_fit(shape_of(a) == expected);
-    return view(a);
+inline In view(const Floats &a, const Shape &expected) {
+    const In values = view(a);
+    require_fit(values.n == expected);
+    return values;
 }
 
-// Three components at cell centres.
-inline In3 view(const Array3 &a, const Shape &cells) {
-    return {view(a[0], cells), view(a[1], cells), view(a[2], cells)};
+// Face values of a box whose sides are open.
+inline StaggeredIn on_faces(const In3 &components) {
+    const auto [nx, ny, nz] = components[0].n;
+    const Box box{{nx - 1, ny, nz}, {}};
+    for (int c = 0; c < 3; ++c)
+        require_fit(components[c].n == box.faces()[c]);
+    return {components, box};
 }
 
-inline StaggeredIn view(const Array3 &faces, const Box &box) {
-    const auto n = box.faces();
-    return {{view(faces[0], n[0]), view(faces[1], n[1]), view(faces[2], n[2])}, box};
+// The same values in a box that they have to fit.
+inline StaggeredIn in_box(const StaggeredIn &faces, const Box &box) {
+    require_fit(faces.box.cells == box.cells);
+    return {faces.faces, box};
 }
 
-// The box that arrays of face values belong to.
-inline StaggeredIn view(const Array3 &faces, const Box::Closed &closed = {}) {
-    const Shape x = shape_of(faces[0]);
-    return view(faces, Box{{x[0] - 1, x[1], x[2]}, closed});
+// A new velocity for the caller, each component with memory of its own.
+struct NewFaces {
+    Box box;
+    std::array<Field, 3> components;
+
+    explicit NewFaces(const Box &of)
+        : box(of), components{Field(of.faces()[0]), Field(of.faces()[1]), Field(of.faces()[2])} {}
+    StaggeredOut out() { return {{components[0].out(), components[1].out(), components[2].out()}, box}; }
+};
+
+// An array that owns what its data lies in.
+template <class T, class Owned> py::array array_of(T *data, const std::vector<Index> &shape, Owned &&values) {
+    auto owned = std::make_unique<std::decay_t<Owned>>(std::move(values));
+    const py::capsule owner(owned.get(), [](void *p) { delete static_cast<std::decay_t<Owned> *>(p); });
+    owned.release();
+    return py::array_t<T>(shape, data, owner);
 }
 
-// An array that owns `values`; its memory goes back to the system with it, however small the others around
-// it.
-inline Array array_of(Values &&values, const std::vector<py::ssize_t> &shape) {
-    auto owned = std::make_unique<Values>(std::move(values));
-    const py::capsule owner(owned.get(), [](void *p) { delete static_cast<Values *>(p); });
-    const float *data = owned.release()->data();
-    return Array(shape, data, owner);
+// A function for Python that runs without its lock, and with workers if they are what it takes first. Views
+// of arrays are made before, arrays from what it returns afterwards.
+template <class F, class Result, class... Taken>
+auto unlocked(F work, Result (F::*)(Workers &, Taken...) const) {
+    return [work](Taken... taken) -> Result {
+        const py::gil_scoped_release release;
+        const BorrowedWorkers workers;
+        return work(*workers, std::forward<Taken>(taken)...);
+    };
 }
-
-// Not defined at first.
-inline Array new_array(const Shape &n) { return array_of(Values(volume(n)), {n[0], n[1], n[2]}); }
-
-inline Array3 new_arrays(const std::array<Shape, 3> &n) {
-    return {new_array(n[0]), new_array(n[1]), new_array(n[2])};
+template <class F, class Result, class... Taken> auto unlocked(F work, Result (F::*)(Taken...) const) {
+    return [work](Taken... taken) -> Result {
+        const py::gil_scoped_release release;
+        return work(std::forward<Taken>(taken)...);
+    };
 }
-
-inline Out out(Array &a) { return {a.mutable_data(), shape_of(a)}; }
-inline Out3 out(Array3 &a) { return {out(a[0]), out(a[1]), out(a[2])}; }
-
-// Arrays are made while the lock is held; only the work itself runs without it.
-template <class Work> auto released(const Work &work) {
-    py::gil_scoped_release release;
-    const BorrowedWorkers workers;
-    return work(*workers);
-}
-
-// A new array that work(values, workers) fills.
-template <class Work> Array filled(const Shape &n, const Work &work) {
-    Array result = new_array(n);
-    const Out values = out(result);
-    released([&](Workers &workers) { work(values, workers); });
-    return result;
-}
-
-// A new array of any kind and shape that work(values, workers), or work(values) on one thread, fills.
-template <class T = float, class Work>
-py::array_t<T> made(const std::vector<py::ssize_t> &shape, const Work &work) {
-    py::array_t<T> result(shape);
-    T *const values = result.mutable_data();
-    if constexpr (std::is_invocable_v<Work, T *, Workers &>) {
-        released([&](Workers &workers) { work(values, workers); });
-    } else {
-        const py::gil_scoped_release unlocked;
-        work(values);
-    }
-    return result;
-}
-
-// New arrays of face values, the same way.
-template <class Work> Array3 filled(const Box &box, const Work &work) {
-    Array3 result = new_arrays(box.faces());
-    const StaggeredOut values{out(result), box};
-    released([&](Workers &workers) { work(values, workers); });
-    return result;
-}
+template <class F> auto unlocked(F work) { return unlocked(std::move(work), &F::operator()); }
 
 void register_transport(py::module_ &module);
 void register_velocity(py::module_ &module);
@@ -118,3 +124,133 @@ void register_pictures(py::module_ &module);
 void register_density(py::module_ &module);
 
 } // namespace smokelift
+
+// The names are those of _core.pyi.
+namespace pybind11::detail {
+
+// What is read may have other real numbers, as it is converted.
+template <class T> constexpr auto array_name = const_name("Array");
+template <> constexpr auto array_name<const float> = const_name("Reals");
+template <> constexpr auto array_name<const double> = const_name("Reals");
+template <> constexpr auto array_name<const int> = const_name("Integers");
+template <> constexpr auto array_name<int> = const_name("Integers");
+template <> constexpr auto array_name<const bool> = const_name("Mask");
+template <> constexpr auto array_name<bool> = const_name("Mask");
+
+template <class T, int Axes> struct type_caster<smokelift::Array<T, Axes>> {
+    using Value = std::remove_const_t<T>;
+    using Type = smokelift::Array<T, Axes>;
+    PYBIND11_TYPE_CASTER(Type, array_name<T>);
+
+    bool load(handle from, bool) {
+        if constexpr (std::is_const_v<T>)
+            return load(array_t<Value, array::c_style | array::forcecast>::ensure(from));
+        else
+            return array_t<Value, array::c_style>::check_(from) && load(reinterpret_borrow<array>(from));
+    }
+
+private:
+    bool load(array given) {
+        if (!given)
+            return false;
+        loader_life_support::add_patient(given); // what was converted is kept as long as the call takes
+        smokelift::require_fit(Axes == 0 || given.ndim() == Axes);
+        std::copy_n(given.shape(), Axes, value.n.begin());
+        value.size = std::size_t(given.size());
+        if constexpr (std::is_const_v<T>)
+            value.data = static_cast<T *>(given.data());
+        else
+            value.data = static_cast<T *>(given.mutable_data());
+        return true;
+    }
+};
+
+// A box of an array of the caller's, of this kind: it is never converted.
+template <class T> struct type_caster<smokelift::Part<T>> {
+    using Value = std::remove_const_t<T>;
+    PYBIND11_TYPE_CASTER(smokelift::Part<T>, array_name<Value>);
+
+    bool load(handle from, bool) {
+        if (!array_t<Value, 0>::check_(from))
+            return false;
+        auto given = reinterpret_borrow<array>(from);
+        smokelift::require_fit(given.ndim() == 3 && given.size() > 0);
+        for (int axis = 0; axis < 3; ++axis) {
+            value.n[axis] = int(given.shape(axis));
+            value.at.stride[axis] = given.strides(axis) / ssize_t(sizeof(T));
+        }
+        value.at.data =
+            static_cast<T *>(std::is_const_v<T> ? const_cast<void *>(given.data()) : given.mutable_data());
+        return true;
+    }
+};
+
+// A volume that is read.
+template <> struct type_caster<smokelift::In> {
+    PYBIND11_TYPE_CASTER(smokelift::In, array_name<const float>);
+
+    bool load(handle from, bool) {
+        const auto given = smokelift::Floats::ensure(from);
+        if (!given)
+            return false;
+        loader_life_support::add_patient(given);
+        value = smokelift::view(given);
+        return true;
+    }
+};
+
+// Marked voxels.
+template <> struct type_caster<smokelift::Mask> {
+    PYBIND11_TYPE_CASTER(smokelift::Mask, array_name<const bool>);
+
+    bool load(handle from, bool convert) {
+        make_caster<smokelift::Array<const bool, 3>> given;
+        if (!given.load(from, convert))
+            return false;
+        const auto &[data, n, size] = cast_op<smokelift::Array<const bool, 3> &>(given);
+        value = {reinterpret_cast<const unsigned char *>(data), {int(n[0]), int(n[1]), int(n[2])}};
+        return true;
+    }
+};
+
+template <> struct type_caster<smokelift::StaggeredIn> {
+    PYBIND11_TYPE_CASTER(smokelift::StaggeredIn, const_name("Faces"));
+
+    bool load(handle from, bool convert) {
+        make_caster<smokelift::In3> components;
+        if (!components.load(from, convert))
+            return false;
+        value = smokelift::on_faces(cast_op<smokelift::In3 &>(components));
+        return true;
+    }
+};
+
+template <class T, int Axes> struct type_caster<smokelift::Made<T, Axes>> {
+    static constexpr auto name = array_name<T>;
+
+    static handle cast(smokelift::Made<T, Axes> &&made, return_value_policy, handle) {
+        T *const data = made.data();
+        return smokelift::array_of(data, {made.n.begin(), made.n.end()}, std::move(made.values)).release();
+    }
+};
+
+template <> struct type_caster<smokelift::Field> {
+    static constexpr auto name = const_name("Array");
+
+    static handle cast(smokelift::Field &&field, return_value_policy, handle) {
+        const smokelift::Out all = field;
+        return smokelift::array_of(all.data, {all.n[0], all.n[1], all.n[2]}, std::move(field.data()))
+            .release();
+    }
+};
+
+template <> struct type_caster<smokelift::NewFaces> {
+    static constexpr auto name = const_name("list[Array]");
+
+    static handle cast(smokelift::NewFaces &&faces, return_value_policy policy, handle parent) {
+        return make_caster<std::array<smokelift::Field, 3>>::cast(std::move(faces.components), policy,
+                                                                  parent);
+    }
+};
+
+} // namespace pybind11::detail

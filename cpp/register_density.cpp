@@ -6,108 +6,102 @@
 #include <optional>
 
 namespace smokelift {
+namespace {
+
+using Floats1 = py::array_t<float, py::array::c_style>;
+
+template <class... T> void require_size(std::size_t size, const T &...arrays) {
+    require_fit(((arrays.size == size) && ...));
+}
+
+} // namespace
 
 void register_density(py::module_ &module) {
-    using namespace py::literals;
-    using Vector = py::array_t<float, py::array::c_style>;
-    using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
-    using Marks = py::array_t<bool, py::array::c_style | py::array::forcecast>;
-
-    py::class_<MarkedVoxels>(module, "MarkedVoxels")
-        .def(py::init([](const Marks &voxels) {
-                 require_fit(voxels.ndim() == 3);
-                 const Mask mask{reinterpret_cast<const unsigned char *>(voxels.data()),
-                                 {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
-                 return released([&](Workers &workers) { return MarkedVoxels(mask, workers); });
-             }),
+    py::class_<MarkedVoxels>(
+        module, "MarkedVoxels",
+        "The marked voxels of a grid; values (count,) are at them in their order in memory.")
+        .def(py::init(unlocked([](Workers &workers, Mask voxels) { return MarkedVoxels(voxels, workers); })),
              "voxels"_a)
-        .def_property_readonly("count", &MarkedVoxels::count)
-        .def(
-            "above_zero",
-            [](const MarkedVoxels &self, const Array &a, const Array &b) {
-                require_fit(std::size_t(a.size()) == volume(self.shape()) && b.size() == a.size());
-                return released(
-                    [&](Workers &workers) { return self.above_zero(a.data(), b.data(), workers); });
-            },
-            "a"_a, "b"_a)
+        .def_property_readonly("count", &MarkedVoxels::count, "How many there are.")
+        .def("above_zero", unlocked([](Workers &workers, const MarkedVoxels &self, Read<> a, Read<> b) {
+                 require_size(volume(self.shape()), a, b);
+                 return self.above_zero(a.data, b.data, workers);
+             }),
+             "a"_a, "b"_a, "Those of them at which either volume (nx, ny, nz) is above 0.")
         .def(
             "take",
-            [](const MarkedVoxels &self, const Array &from, std::optional<Vector> out) {
-                require_fit(std::size_t(from.size()) == volume(self.shape()));
-                Vector values = out ? *out : Vector(py::ssize_t(self.count()));
-                require_fit(std::size_t(values.size()) == self.count());
+            [](const MarkedVoxels &self, const Floats &volume, std::optional<Floats1> out) {
+                Floats1 values = out ? *out : Floats1(Index(self.count()));
+                require_fit(std::size_t(volume.size()) == smokelift::volume(self.shape()) &&
+                            std::size_t(values.size()) == self.count());
                 float *const to = values.mutable_data();
-                released([&](Workers &workers) { self.take(from.data(), to, workers); });
+                unlocked([&](Workers &workers) { self.take(volume.data(), to, workers); })();
                 return values;
             },
-            "volume"_a, py::arg("out").noconvert() = py::none())
+            "volume"_a, py::arg("out").noconvert() = py::none(),
+            "Values of a volume, written to ``out`` if that is given.")
         .def(
             "put",
-            [](const MarkedVoxels &self, const Array &values, Vector to, float factor) {
-                require_fit(std::size_t(to.size()) == volume(self.shape()) &&
-                            std::size_t(values.size()) == self.count());
-                float *const result = to.mutable_data();
-                released([&](Workers &workers) { self.put(values.data(), factor, result, workers); });
-            },
-            "values"_a, "volume"_a.noconvert(), "factor"_a = 1.0f)
+            unlocked([](Workers &workers, const MarkedVoxels &self, Read<> values, Write<> to, float factor) {
+                require_size(self.count(), values);
+                require_size(volume(self.shape()), to);
+                self.put(values.data, factor, to.data, workers);
+            }),
+            "values"_a, "volume"_a, "factor"_a = 1.0f, "Write values, times a factor, into a volume.")
         .def(
             "share_in_cubes",
-            [](const MarkedVoxels &self, const Vector &values, int size, double weight, Vector out) {
-                require_fit(std::size_t(values.size()) == self.count() && out.size() == values.size() &&
-                            size > 0);
-                float *const shared = out.mutable_data();
-                released([&](Workers &workers) {
-                    share_in_cubes(self, size, weight, values.data(), shared, workers);
-                });
-            },
-            "values"_a.noconvert(), "size"_a, "weight"_a, "out"_a.noconvert())
-        .def(
-            "scale_along_rays",
-            [](const MarkedVoxels &self, const PictureMap &map, const Vector &values,
-               const std::optional<Vector> &plausible, const Doubles &logarithm, float faint, float most,
-               float share, Vector out) {
-                require_fit(self.shape() == map.shape() && std::size_t(values.size()) == self.count() &&
-                            out.size() == values.size() &&
-                            (!plausible || plausible->size() == values.size()) && logarithm.ndim() == 2 &&
-                            logarithm.shape(0) == map.rows && logarithm.shape(1) == map.columns);
-                const RayScale scale{logarithm.data(), plausible ? plausible->data() : nullptr, faint, most,
-                                     share};
-                float *const scaled = out.mutable_data();
-                released([&](Workers &workers) {
-                    scale_along_rays(scale, map, self, values.data(), scaled, workers);
-                });
-            },
-            "picture"_a, "values"_a.noconvert(), "plausible"_a.noconvert(), "logarithm"_a, "faint"_a,
-            "most"_a, "share"_a, "out"_a.noconvert());
+            unlocked([](Workers &workers, const MarkedVoxels &self, Read<> values, int size, double weight,
+                        Write<> out) {
+                require_size(self.count(), values, out);
+                require_fit(size > 0);
+                share_in_cubes(self, size, weight, values.data, out.data, workers);
+            }),
+            "values"_a, "size"_a, "weight"_a, "out"_a,
+            R"(Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
+
+        Half of it is over each of two lattices, half a cube apart. The result may replace the values.)")
+        .def("scale_along_rays",
+             unlocked([](Workers &workers, const MarkedVoxels &self, const PictureMap &picture, Read<> values,
+                         std::optional<Read<>> plausible, Read<2, double> logarithm, float faint, float most,
+                         float share, Write<> out) {
+                 require_size(self.count(), values, plausible.value_or(values), out);
+                 require_fit(self.shape() == picture.shape() &&
+                             logarithm.n == std::array<Index, 2>{picture.rows, picture.columns});
+                 const RayScale scale{logarithm.data, plausible ? plausible->data : nullptr, faint, most,
+                                      share};
+                 scale_along_rays(scale, picture, self, values.data, out.data, workers);
+             }),
+             "picture"_a, "values"_a, "plausible"_a, "logarithm"_a, "faint"_a, "most"_a, "share"_a, "out"_a,
+             R"(Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
+
+        Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
+        would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
+        some, both plus ``faint``, by ``most`` at most. The result may replace the values.)");
 
     module.def(
         "hold",
-        [](const Vector &values, const Vector &gradient, const Vector &density, float bound, Vector out) {
-            const py::ssize_t count = values.size();
-            require_fit(gradient.size() == count && density.size() == count && out.size() == count);
-            float *const held = out.mutable_data();
-            released([&](Workers &workers) {
-                hold(values.data(), gradient.data(), density.data(), bound, std::size_t(count), held,
-                     workers);
-            });
-        },
-        "values"_a.noconvert(), "gradient"_a.noconvert(), "density"_a.noconvert(), "bound"_a,
-        "out"_a.noconvert());
+        unlocked(
+            [](Workers &workers, Read<> values, Read<> gradient, Read<> density, float bound, Write<> out) {
+                require_size(values.size, gradient, density, out);
+                hold(values.data, gradient.data, density.data, bound, values.size, out.data, workers);
+            }),
+        "values"_a, "gradient"_a, "density"_a, "bound"_a, "out"_a,
+        "Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that.");
 
     module.def(
         "descend",
-        [](const Vector &density, const Vector &direction, const Vector &scale, const Vector &floor,
-           float length, float max_change, float bound, Vector arrived, Vector moved) {
-            const py::ssize_t count = density.size();
-            require_fit(direction.size() == count && scale.size() == count && floor.size() == count &&
-                        arrived.size() == count && moved.size() == count);
-            const DescentStep step{density.data(), direction.data(), scale.data(), floor.data(),
-                                   length,         max_change,       bound};
-            float *const to = arrived.mutable_data(), *const way = moved.mutable_data();
-            released([&](Workers &workers) { descend(step, std::size_t(count), to, way, workers); });
-        },
-        "density"_a.noconvert(), "direction"_a.noconvert(), "scale"_a.noconvert(), "floor"_a.noconvert(),
-        "length"_a, "max_change"_a, "bound"_a, "arrived"_a.noconvert(), "moved"_a.noconvert());
+        unlocked([](Workers &workers, Read<> density, Read<> direction, Read<> scale, Read<> floor,
+                    float length, float max_change, float bound, Write<> arrived, Write<> moved) {
+            require_size(density.size, direction, scale, floor, arrived, moved);
+            const DescentStep step{density.data, direction.data, scale.data, floor.data,
+                                   length,       max_change,     bound};
+            descend(step, density.size, arrived.data, moved.data, workers);
+        }),
+        "density"_a, "direction"_a, "scale"_a, "floor"_a, "length"_a, "max_change"_a, "bound"_a, "arrived"_a,
+        "moved"_a,
+        R"(Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
+
+        A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.)");
 }
 
 } // namespace smokelift

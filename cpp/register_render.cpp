@@ -11,154 +11,170 @@
 namespace smokelift {
 namespace {
 
-using Floats = py::array_t<float, py::array::c_style>;
-using SupportMarks = py::array_t<unsigned char, py::array::c_style | py::array::forcecast>;
-using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
+using Bytes = py::array_t<unsigned char, py::array::c_style | py::array::forcecast>;
+using Light = std::variant<ParallelLight, PointLight>;
+using VoxelArray = Write<4>;
+using Fields = Made<float, 4>; // over blocks, [field][x][y][z]
+using OverBlocks = Read<4>;    // the same, given
 
 // Where there can be smoke, and the ranges of rows around that.
 struct Support {
-    SupportMarks marked;
+    Bytes marked;
+    Shape n;
     Spans spans;
 
-    explicit Support(const SupportMarks &marks) : marked(marks) {
+    explicit Support(const Bytes &marks) : marked(marks) {
         require_fit(marks.ndim() == 3);
-        spans = spans_around(marks.data(), shape());
+        n = {int(marked.shape(0)), int(marked.shape(1)), int(marked.shape(2))};
+        spans = spans_around(marks.data(), n);
     }
-    Shape shape() const { return {int(marked.shape(0)), int(marked.shape(1)), int(marked.shape(2))}; }
 };
 
-Voxels voxels_of(Floats &a, const Support &support) {
-    const Shape n = support.shape();
-    require_fit(a.ndim() == 4 && a.shape(0) == n[0] + 2 && a.shape(1) == n[1] + 2 && a.shape(2) == n[2] + 2);
-    const int width = static_cast<int>(a.shape(3));
+// The voxels of a support in an array with their border.
+Voxels voxels_of(VoxelArray a, const Support &support) {
+    const auto [x, y, z] = support.n;
+    require_fit(a.n[0] == x + 2 && a.n[1] == y + 2 && a.n[2] == z + 2);
+    const int width = int(a.n[3]);
     require_fit(width == 1 || width == 2 || width == 4);
-    return {a.mutable_data(), n, width};
+    return {a.data, support.n, width};
 }
 
 // The rays with the arrays that they point to.
 struct OwnedRays {
     Floats lines, length;
-    Integers planes;
+    std::vector<int> planes; // clip() writes them
     Rays rays;
 
-    OwnedRays(const Floats &l, const Floats &d, const Integers &p) : lines(l), length(d), planes(p.size()) {
-        require_fit(l.ndim() == 3 && l.shape(2) == 4 && p.ndim() == 3 && p.shape(2) == 4 && d.ndim() == 2);
-        require_fit(d.shape(0) == l.shape(0) && d.shape(1) == l.shape(1) && p.shape(0) == l.shape(0) &&
-                    p.shape(1) == l.shape(1));
-        std::copy_n(p.data(), p.size(), planes.mutable_data()); // clip() writes them
+    OwnedRays(const Floats &l, const Floats &d, Read<3, int> p)
+        : lines(l), length(d), planes(p.data, p.data + p.size) {
+        require_fit(l.ndim() == 3 && l.shape(2) == 4 && d.ndim() == 2 && p.n[2] == 4);
+        for (int axis = 0; axis < 2; ++axis)
+            require_fit(d.shape(axis) == l.shape(axis) && p.n[axis] == l.shape(axis));
         rays.lines = lines.data();
         rays.length = length.data();
-        rays.planes = planes.mutable_data();
-        rays.rows = static_cast<int>(d.shape(0));
-        rays.columns = static_cast<int>(d.shape(1));
+        rays.planes = planes.data();
+        rays.rows = int(d.shape(0));
+        rays.columns = int(d.shape(1));
         rays.find_runs();
     }
-    void require_pixels(const Floats &a, int channels) const {
-        require_fit(std::size_t(a.size()) == rays.pixels() * channels);
+    std::size_t samples() const {
+        std::size_t count = 0;
+        for (std::size_t ray = 0; ray < rays.pixels(); ++ray)
+            count += std::max(0, planes[4 * ray + 3] - planes[4 * ray + 2] + 1);
+        return count;
     }
-    Record record(std::optional<Floats> &a, int width) const {
+    // Values of each channel that a record holds.
+    std::size_t recorded() const { return rays.planes_of_runs() * Rays::LANES; }
+    void require_pixels(std::size_t size, int channels) const {
+        require_fit(size == rays.pixels() * channels);
+    }
+    Record record(std::optional<Write<>> a, int width) const {
         if (!a)
             return {};
-        require_fit(std::size_t(a->size()) == rays.planes_of_runs() * width * Rays::LANES);
-        return {a->mutable_data()};
+        require_fit(a->size == recorded() * width);
+        return {a->data};
     }
 };
 
 // The box of an array that a support stands for.
-template <class T, class Data>
-Strided<T> box_of(const py::array_t<float> &a, Data data, const Support &support,
-                  const std::array<int, 3> &corner) {
-    require_fit(a.ndim() == 3);
-    std::array<Stride, 3> stride{};
+template <class T> Strided<T> box_of(Part<T> a, const Support &support, const Shape &corner) {
+    Strided<T> box = a.at;
     for (int axis = 0; axis < 3; ++axis) {
-        require_fit(corner[axis] >= 0 && corner[axis] + support.shape()[axis] <= a.shape(axis));
-        stride[axis] = a.strides(axis) / Stride(sizeof(float));
-        data += corner[axis] * stride[axis];
+        require_fit(corner[axis] >= 0 && corner[axis] + support.n[axis] <= a.n[axis]);
+        box.data += corner[axis] * box.stride[axis];
     }
-    return {data, stride};
+    return box;
 }
 
-// An array over blocks, [field][x][y][z].
-using OverBlocks = py::array_t<float, py::array::c_style>;
+Fields over_blocks(int fields, const Shape &n) { return Fields({fields, n[0], n[1], n[2]}); }
 
-// A new one that work(values, workers) fills.
-template <class Work> auto over_blocks(int fields, const Shape &n, const Work &work) {
-    return made({fields, n[0], n[1], n[2]}, work);
-}
+Shape blocks_of(OverBlocks a) { return {int(a.n[1]), int(a.n[2]), int(a.n[3])}; }
 
-Shape blocks_shape(const OverBlocks &a, int fields) {
-    require_fit(a.ndim() == 4 && a.shape(0) == fields);
-    return {int(a.shape(1)), int(a.shape(2)), int(a.shape(3))};
+void require_fields(OverBlocks a, Index fields, const Shape &n) {
+    require_fit(a.n == std::array<Index, 4>{fields, n[0], n[1], n[2]});
 }
 
 // How many channels there are in means of extinction and emission.
-int channels_of(const OverBlocks &means) {
-    require_fit(means.ndim() == 4 && means.shape(0) > 1 && (means.shape(0) - 1) % Blocks::FIELDS == 0);
-    return static_cast<int>(means.shape(0) - 1) / Blocks::FIELDS;
+int channels_of(OverBlocks means) {
+    require_fit(means.n[0] > 1 && (means.n[0] - 1) % Blocks::FIELDS == 0);
+    return int(means.n[0] - 1) / Blocks::FIELDS;
 }
 
 // Blocks that reach around all voxels of a support.
 void require_around(const Blocks &blocks, const Support &support) {
     for (int axis = 0; axis < 3; ++axis)
         require_fit(blocks.size > 0 && 2 * blocks.offset[axis] + 1 >= blocks.size &&
-                    2 * (blocks.offset[axis] + support.shape()[axis]) - 1 <
-                        (2 * blocks.n[axis] - 1) * blocks.size);
+                    2 * (blocks.offset[axis] + support.n[axis]) - 1 < (2 * blocks.n[axis] - 1) * blocks.size);
 }
 
-using Light = std::variant<ParallelLight, PointLight>;
-
 // Zeros that get memory where they are touched.
-Array zeros(const std::vector<py::ssize_t> &shape) {
+py::array_t<float> zeros(const std::vector<Index> &shape) {
     std::size_t size = 1;
-    for (const py::ssize_t n : shape)
+    for (const Index n : shape)
         size *= std::size_t(n);
     Values values(size);
     if (!LazyPages<float>::starts_as_zero(size))
         std::fill(values.begin(), values.end(), 0.0f);
-    return array_of(std::move(values), shape);
+    float *const data = values.data();
+    return array_of(data, shape, std::move(values));
 }
 
 void register_voxels(py::module_ &module) {
-    using namespace py::literals;
+    module.def("zeros", &zeros, "shape"_a,
+               "Zeros that get memory where they are touched, in large pages where the system has them.");
 
-    module.def("zeros", &zeros, "shape"_a);
+    py::class_<Support>(module, "Support",
+                        "Where there can be smoke; ``marked`` is (nx, ny, nz), not 0 in such voxels.")
+        .def(py::init<const Bytes &>(), "marked"_a);
 
-    py::class_<Support>(module, "Support").def(py::init<const SupportMarks &>(), "marked"_a);
+    module.def("pack",
+               unlocked([](Workers &workers, Part<const float> density, const Shape &corner,
+                           const Support &support, float extinction, VoxelArray medium) {
+                   pack(box_of(density, support, corner), support.marked.data(), extinction, support.spans,
+                        voxels_of(medium, support), workers);
+               }),
+               "density"_a, "corner"_a, "support"_a, "extinction"_a, "medium"_a,
+               R"(Write the extinction of the marked voxels from their density.
 
-    module.def(
-        "pack",
-        [](const py::array_t<float> &density, const std::array<int, 3> &corner, const Support &support,
-           float extinction, Floats medium) {
-            const auto box = box_of<const float>(density, density.data(), support, corner);
-            const Voxels voxels = voxels_of(medium, support);
-            released([&](Workers &workers) {
-                pack(box, support.marked.data(), extinction, support.spans, voxels, workers);
-            });
-        },
-        "density"_a.noconvert(), "corner"_a, "support"_a, "extinction"_a, "medium"_a.noconvert());
+        ``corner`` is where the support begins in the array of densities; ``extinction`` is in 1/m at density 1.)");
 
     module.def(
         "unpack",
-        [](Floats gradient, const Support &support, float extinction, py::array_t<float> result,
-           const std::array<int, 3> &corner) {
-            const Voxels voxels = voxels_of(gradient, support);
-            const auto box = box_of<float>(result, result.mutable_data(), support, corner);
-            released(
-                [&](Workers &workers) { unpack(voxels, support.marked.data(), extinction, box, workers); });
-        },
-        "gradient"_a.noconvert(), "support"_a, "extinction"_a, "result"_a.noconvert(), "corner"_a);
+        unlocked([](Workers &workers, VoxelArray gradient, const Support &support, float extinction,
+                    Part<float> result, const Shape &corner) {
+            unpack(voxels_of(gradient, support), support.marked.data(), extinction,
+                   box_of(result, support, corner), workers);
+        }),
+        "gradient"_a, "support"_a, "extinction"_a, "result"_a, "corner"_a,
+        "Write the derivative by density of the marked voxels into ``result``; others are left as they are.");
 }
 
 void register_lights(py::module_ &module) {
-    using namespace py::literals;
+    py::class_<Phase>(module, "Phase", R"(Henyey-Greenstein phase function times albedo, towards the camera.
 
-    py::class_<Phase>(module, "Phase")
+        ``to_eye`` is (3, 4): it maps a voxel's index (i, j, k, 1) to the direction to the eye, of any length.)")
         .def(py::init([](const std::array<std::array<float, 4>, 3> &to_eye, float albedo, float anisotropy) {
                  return Phase{to_eye, albedo, anisotropy};
              }),
              py::kw_only(), "to_eye"_a, "albedo"_a, "anisotropy"_a);
 
-    py::class_<ParallelLight>(module, "ParallelLight")
+    py::class_<ParallelLight>(module, "ParallelLight",
+                              R"(Parallel light, swept through planes of voxels across its dominant axis.
+
+        Parameters
+        ----------
+        direction : (3,)
+            Of travel, unit length.
+        energy : (3,)
+            Irradiance by channel in W/m^2.
+        axis, travel
+            Dominant axis, and +1 or -1 along it.
+        first
+            Number of the first plane in the grid of which this one is a part.
+        slope
+            Voxels that a ray moves from plane to plane along the two other axes.
+        step
+            Length of a ray between two planes in metres.)")
         .def(py::init([](const std::array<float, 3> &direction, const std::array<float, 3> &energy, int axis,
                          int travel, int first, const std::array<double, 2> &slope, float step) {
                  return ParallelLight{direction, energy, axis, travel, first, slope, step};
@@ -166,7 +182,20 @@ void register_lights(py::module_ &module) {
              py::kw_only(), "direction"_a, "energy"_a, "axis"_a, "travel"_a, "first"_a, "slope"_a, "step"_a);
 
     using Face = PointLight::Face;
-    py::class_<Face>(module, "Face")
+    py::class_<Face>(
+        module, "Face",
+        R"(A side of the cube around a point light, and the planes of voxels in front of it, the nearest first.
+
+        Parameters
+        ----------
+        axis, travel
+            Axis across the side, and +1 or -1 along it.
+        first, planes
+            The nearest plane of voxels, and how many there are.
+        far
+            Distance in voxels of the plane where columns are one voxel apart.
+        columns_b, columns_c
+            First column and number of columns that meet the grid along the two other axes.)")
         .def(py::init([](int axis, int travel, int first, int planes, double far,
                          std::array<int, 2> columns_b, std::array<int, 2> columns_c) {
                  return Face{axis,         travel,       first,        planes,      far,
@@ -175,231 +204,255 @@ void register_lights(py::module_ &module) {
              py::kw_only(), "axis"_a, "travel"_a, "first"_a, "planes"_a, "far"_a, "columns_b"_a,
              "columns_c"_a);
 
-    py::class_<PointLight>(module, "PointLight")
+    py::class_<PointLight>(module, "PointLight", R"(Light from a point outside the grid.
+
+        Parameters
+        ----------
+        position : (3,)
+            In grid coordinates, voxel centres at integers.
+        energy : (3,)
+            Intensity by channel over the squared voxel edge, in W/m^2.
+        voxel_size
+            In metres.
+        faces
+            The sides of the cube around it that see the grid.)")
         .def(py::init([](const std::array<double, 3> &position, const std::array<float, 3> &energy,
                          float voxel_size, const std::vector<Face> &faces) {
                  return PointLight{position, energy, voxel_size, faces};
              }),
              py::kw_only(), "position"_a, "energy"_a, "voxel_size"_a, "faces"_a);
 
-    module.def(
-        "shade",
-        [](Floats medium, const Support &support, const Phase &phase, const std::vector<Light> &lights) {
-            const Voxels voxels = voxels_of(medium, support);
-            released([&](Workers &workers) {
-                bool add = false;
-                for (const Light &light : lights) {
-                    std::visit([&](const auto &l) { shade(voxels, support.spans, phase, l, add, workers); },
-                               light);
-                    add = true;
-                }
-                extend_into_border(voxels);
-            });
-        },
-        "medium"_a.noconvert(), "support"_a, "phase"_a, "lights"_a);
+    module.def("shade",
+               unlocked([](Workers &workers, VoxelArray medium, const Support &support, const Phase &phase,
+                           const std::vector<Light> &lights) {
+                   const Voxels voxels = voxels_of(medium, support);
+                   bool add = false;
+                   for (const Light &light : lights) {
+                       std::visit(
+                           [&](const auto &l) { shade(voxels, support.spans, phase, l, add, workers); },
+                           light);
+                       add = true;
+                   }
+                   extend_into_border(voxels);
+               }),
+               "medium"_a, "support"_a, "phase"_a, "lights"_a,
+               "Write the radiance that the lights scatter in every voxel towards the camera.");
 
     module.def(
         "shade_adjoint",
-        [](Floats medium, Floats gradient, std::optional<Floats> scratch, const Support &support,
-           const Phase &phase, const std::vector<Light> &lights) {
+        unlocked([](Workers &workers, VoxelArray medium, VoxelArray gradient,
+                    std::optional<VoxelArray> scratch, const Support &support, const Phase &phase,
+                    const std::vector<Light> &lights) {
             const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
             const Voxels space = scratch ? voxels_of(*scratch, support) : Voxels{};
             require_fit(gradients.width == voxels.width && (scratch || lights.size() == 1) &&
                         space.width == 1);
-            released([&](Workers &workers) {
-                fold_border(gradients);
-                for (const Light &light : lights) {
-                    if (const auto *point = std::get_if<PointLight>(&light))
-                        shade_adjoint(voxels, gradients, support.spans, phase, *point, workers);
-                    else
-                        shade_adjoint(voxels, gradients, space, support.spans, phase,
-                                      std::get<ParallelLight>(light), workers);
-                }
-            });
-        },
-        "medium"_a.noconvert(), "gradient"_a.noconvert(), "scratch"_a.noconvert(), "support"_a, "phase"_a,
-        "lights"_a);
+            fold_border(gradients);
+            for (const Light &light : lights) {
+                if (const auto *point = std::get_if<PointLight>(&light))
+                    shade_adjoint(voxels, gradients, support.spans, phase, *point, workers);
+                else
+                    shade_adjoint(voxels, gradients, space, support.spans, phase,
+                                  std::get<ParallelLight>(light), workers);
+            }
+        }),
+        "medium"_a, "gradient"_a, "scratch"_a, "support"_a, "phase"_a, "lights"_a,
+        R"(Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
+
+        ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
+        in-scattered radiance is used up.)");
 }
 
 void register_camera(py::module_ &module) {
-    using namespace py::literals;
+    py::class_<OwnedRays>(module, "Rays", R"(One ray a pixel.
 
-    py::class_<OwnedRays>(module, "Rays")
-        .def(py::init<const Floats &, const Floats &, const Integers &>(), "lines"_a, "length"_a, "planes"_a)
-        .def(
-            "clip",
-            [](OwnedRays &self, const Support &support, Floats medium) {
-                const Voxels voxels = voxels_of(medium, support);
-                released([&](Workers &workers) { clip(voxels, self.rays, workers); });
-            },
-            "support"_a, "medium"_a.noconvert())
-        .def_property_readonly("samples",
-                               [](const OwnedRays &self) {
-                                   std::size_t count = 0;
-                                   for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
-                                       count += std::max(0, self.rays.planes[4 * ray + 3] -
-                                                                self.rays.planes[4 * ray + 2] + 1);
-                                   return count;
-                               })
+        Parameters
+        ----------
+        lines : (rows, columns, 4)
+            b0, b1, c0, c1: the ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k) along the two other axes,
+            voxel centres at integers.
+        length : (rows, columns)
+            Between two planes in metres.
+        planes : (rows, columns, 4)
+            Dominant axis, travel along it, first and last plane with a sample; last < first where there is none.)")
+        .def(py::init<const Floats &, const Floats &, Read<3, int>>(), "lines"_a, "length"_a, "planes"_a)
+        .def("clip",
+             unlocked([](Workers &workers, OwnedRays &self, const Support &support, VoxelArray medium) {
+                 clip(voxels_of(medium, support), self.rays, workers);
+             }),
+             "support"_a, "medium"_a, "Shorten every ray to where the voxels around it hold anything.")
+        .def_property_readonly("samples", &OwnedRays::samples, "Samples of all rays together.")
         .def_property_readonly(
-            "recorded", [](const OwnedRays &self) { return self.rays.planes_of_runs() * Rays::LANES; });
+            "recorded", &OwnedRays::recorded,
+            "Samples that a record holds of each channel: neighbouring rays have as many.");
 
     using Places = std::vector<double>;
     module.def(
         "pixel_rays",
-        [](const std::array<Vector, 3> &start, const std::array<Vector, 3> &direction, bool far,
-           const Places &columns, const Places &rows, const Shape &n) {
-            const py::ssize_t height = py::ssize_t(rows.size()), width = py::ssize_t(columns.size());
-            Floats lines({height, width, py::ssize_t(4)}), length({height, width});
-            Integers planes({height, width, py::ssize_t(4)});
+        unlocked([](Workers &workers, const std::array<Vector, 3> &start,
+                    const std::array<Vector, 3> &direction, bool far, const Places &columns,
+                    const Places &rows, const Shape &n) {
+            const Index height = Index(rows.size()), width = Index(columns.size());
+            Made<float, 3> lines({height, width, 4});
+            Made<float, 2> length({height, width});
+            Made<int, 3> planes({height, width, 4});
             const Lens lens{{start[0], start[1], start[2]}, {direction[0], direction[1], direction[2]}, far};
-            released([&, to = lines.mutable_data(), steps = length.mutable_data(),
-                      at = planes.mutable_data()](Workers &workers) {
-                pixel_rays(lens, columns, rows, n, to, steps, at, workers);
-            });
-            return py::make_tuple(lines, length, planes);
-        },
-        "start"_a, "direction"_a, "far"_a, "columns"_a, "rows"_a, "shape"_a);
+            pixel_rays(lens, columns, rows, n, lines.data(), length.data(), planes.data(), workers);
+            return std::tuple(std::move(lines), std::move(length), std::move(planes));
+        }),
+        "start"_a, "direction"_a, "far"_a, "columns"_a, "rows"_a, "shape"_a,
+        R"(Lines, lengths in voxels and planes of `Rays` through all pixels, as far as their samples meet a grid.
 
-    module.def(
-        "march",
-        [](Floats medium, const Support &support, const OwnedRays &rays, Floats scattered, Floats depth,
-           std::optional<Floats> record) {
-            const Voxels voxels = voxels_of(medium, support);
-            rays.require_pixels(scattered, voxels.width - 1);
-            rays.require_pixels(depth, 1);
-            const Record samples = rays.record(record, voxels.width);
-            released([&](Workers &workers) {
-                march(voxels, rays.rays, scattered.mutable_data(), depth.mutable_data(), samples, workers);
-            });
-        },
-        "medium"_a.noconvert(), "support"_a, "rays"_a, "scattered"_a.noconvert(), "depth"_a.noconvert(),
-        "record"_a.noconvert());
+        Where in the grid a ray starts, and which way it goes, is a + x b + y c at the places x and y of its column and row,
+        (3, 3) each. Samples lie before the start unless the camera is far away.)");
+
+    module.def("march",
+               unlocked([](Workers &workers, VoxelArray medium, const Support &support, const OwnedRays &rays,
+                           Write<> scattered, Write<> depth, std::optional<Write<>> record) {
+                   const Voxels voxels = voxels_of(medium, support);
+                   rays.require_pixels(scattered.size, voxels.width - 1);
+                   rays.require_pixels(depth.size, 1);
+                   march(voxels, rays.rays, scattered.data, depth.data, rays.record(record, voxels.width),
+                         workers);
+               }),
+               "medium"_a, "support"_a, "rays"_a, "scattered"_a, "depth"_a, "record"_a,
+               R"(Write the radiance towards the camera and the optical depth of every ray.
+
+        Parameters
+        ----------
+        scattered : (rows, columns, channels)
+            Radiance, written.
+        depth : (rows, columns)
+            Optical depth, written.
+        record : (1 + channels, `Rays.recorded`)
+            What the samples held, written for `march_adjoint`; may be None.)");
 
     module.def(
         "march_adjoint",
-        [](const OwnedRays &rays, const Floats &depth, const Floats &scattered_gradient,
-           const Floats &transmittance_gradient, std::optional<Floats> record, Floats gradient,
-           const Support &support) {
+        unlocked([](Workers &workers, const OwnedRays &rays, Read<> depth, Read<> scattered_gradient,
+                    Read<> transmittance_gradient, std::optional<Write<>> record, VoxelArray gradient,
+                    const Support &support) {
             const Voxels voxels = voxels_of(gradient, support);
-            rays.require_pixels(scattered_gradient, voxels.width - 1);
-            rays.require_pixels(transmittance_gradient, 1);
-            rays.require_pixels(depth, 1);
+            rays.require_pixels(scattered_gradient.size, voxels.width - 1);
+            rays.require_pixels(transmittance_gradient.size, 1);
+            rays.require_pixels(depth.size, 1);
             const Record samples = rays.record(record, voxels.width);
             require_fit(samples.data);
-            released([&](Workers &workers) {
-                clear(voxels, workers);
-                march_adjoint(rays.rays, depth.data(), scattered_gradient.data(),
-                              transmittance_gradient.data(), samples, voxels, workers);
-            });
-        },
-        "rays"_a, "depth"_a.noconvert(), "scattered_gradient"_a.noconvert(),
-        "transmittance_gradient"_a.noconvert(), "record"_a.noconvert(), "gradient"_a.noconvert(),
-        "support"_a);
+            clear(voxels, workers);
+            march_adjoint(rays.rays, depth.data, scattered_gradient.data, transmittance_gradient.data,
+                          samples, voxels, workers);
+        }),
+        "rays"_a, "depth"_a, "scattered_gradient"_a, "transmittance_gradient"_a, "record"_a, "gradient"_a,
+        "support"_a,
+        R"(Write the derivatives by the voxels of ``gradient`` from those by radiance and transmittance of every ray.
+
+        ``record`` is that of `march`; it is overwritten.)");
 }
 
 void register_blocks(py::module_ &module) {
-    using namespace py::literals;
+    py::class_<Blocks>(
+        module, "Blocks",
+        R"(Cubes of ``size`` voxels; every voxel of a support lies between the centres of eight.
 
-    py::class_<Blocks>(module, "Blocks")
-        .def(py::init([](const std::array<int, 3> &shape, int size, const std::array<int, 3> &offset) {
+        ``offset`` is the index of the support's first voxel among those of the first block, ``shape`` the number of blocks.)")
+        .def(py::init([](const Shape &shape, int size, const Shape &offset) {
                  return Blocks{shape, size, offset};
              }),
              py::kw_only(), "shape"_a, "size"_a, "offset"_a);
 
     module.def(
         "average",
-        [](Floats medium, const Support &support, const Blocks &blocks) {
+        unlocked([](Workers &workers, VoxelArray medium, const Support &support, const Blocks &blocks) {
             const Voxels voxels = voxels_of(medium, support);
             require_around(blocks, support);
-            const int fields = 1 + (voxels.width - 1) * Blocks::FIELDS;
-            return over_blocks(fields, blocks.n, [&](float *means, Workers &workers) {
-                average(voxels, support.spans, blocks, means, workers);
-            });
-        },
-        "medium"_a.noconvert(), "support"_a, "blocks"_a);
+            Fields means = over_blocks(1 + (voxels.width - 1) * Blocks::FIELDS, blocks.n);
+            average(voxels, support.spans, blocks, means.data(), workers);
+            return means;
+        }),
+        "medium"_a, "support"_a, "blocks"_a,
+        "Over blocks (1 + 4 channels, bx, by, bz): the mean of the extinction kappa, then kappa J by "
+        "channel, linear.");
 
-    module.def(
-        "average_adjoint",
-        [](Floats medium, const Support &support, const Blocks &blocks, const OverBlocks &means_gradient,
-           Floats gradient) {
-            const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
-            require_around(blocks, support);
-            require_fit(gradients.width == voxels.width &&
-                        blocks_shape(means_gradient, 1 + (voxels.width - 1) * Blocks::FIELDS) == blocks.n);
-            released([&](Workers &workers) {
-                average_adjoint(voxels, support.spans, blocks, means_gradient.data(), gradients, workers);
-            });
-        },
-        "medium"_a.noconvert(), "support"_a, "blocks"_a, "means_gradient"_a.noconvert(),
-        "gradient"_a.noconvert());
+    module.def("average_adjoint",
+               unlocked([](Workers &workers, VoxelArray medium, const Support &support, const Blocks &blocks,
+                           OverBlocks means_gradient, VoxelArray gradient) {
+                   const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
+                   require_around(blocks, support);
+                   require_fit(gradients.width == voxels.width);
+                   require_fields(means_gradient, 1 + (voxels.width - 1) * Blocks::FIELDS, blocks.n);
+                   average_adjoint(voxels, support.spans, blocks, means_gradient.data, gradients, workers);
+               }),
+               "medium"_a, "support"_a, "blocks"_a, "means_gradient"_a, "gradient"_a,
+               "Add to the derivatives by kappa and J what those by the result of `average` say of them.");
 
-    module.def(
-        "add_interpolated",
-        [](const OverBlocks &values, float factor, const Blocks &blocks, Floats medium,
-           const Support &support) {
-            const Voxels voxels = voxels_of(medium, support);
-            require_around(blocks, support);
-            require_fit(blocks_shape(values, (voxels.width - 1) * Blocks::FIELDS) == blocks.n);
-            released([&](Workers &workers) {
-                add_interpolated(values.data(), factor, blocks, voxels, support.spans, workers);
-                extend_into_border(voxels);
-            });
-        },
-        "values"_a.noconvert(), "factor"_a, "blocks"_a, "medium"_a.noconvert(), "support"_a);
+    module.def("add_interpolated",
+               unlocked([](Workers &workers, OverBlocks values, float factor, const Blocks &blocks,
+                           VoxelArray medium, const Support &support) {
+                   const Voxels voxels = voxels_of(medium, support);
+                   require_around(blocks, support);
+                   require_fields(values, (voxels.width - 1) * Blocks::FIELDS, blocks.n);
+                   add_interpolated(values.data, factor, blocks, voxels, support.spans, workers);
+                   extend_into_border(voxels);
+               }),
+               "values"_a, "factor"_a, "blocks"_a, "medium"_a, "support"_a,
+               "J += factor x values (4 channels, bx, by, bz): what eight blocks say, weighted as between "
+               "their centres.");
 
-    module.def(
-        "interpolate_adjoint",
-        [](Floats gradient, const Support &support, float factor, const Blocks &blocks) {
-            const Voxels gradients = voxels_of(gradient, support);
-            require_around(blocks, support);
-            const int fields = (gradients.width - 1) * Blocks::FIELDS;
-            return over_blocks(fields, blocks.n, [&](float *values_gradient, Workers &workers) {
-                fold_border(gradients);
-                interpolate_adjoint(gradients, support.spans, factor, blocks, values_gradient, workers);
-            });
-        },
-        "gradient"_a.noconvert(), "support"_a, "factor"_a, "blocks"_a);
-}
+    module.def("interpolate_adjoint",
+               unlocked([](Workers &workers, VoxelArray gradient, const Support &support, float factor,
+                           const Blocks &blocks) {
+                   const Voxels gradients = voxels_of(gradient, support);
+                   require_around(blocks, support);
+                   Fields result = over_blocks((gradients.width - 1) * Blocks::FIELDS, blocks.n);
+                   fold_border(gradients);
+                   interpolate_adjoint(gradients, support.spans, factor, blocks, result.data(), workers);
+                   return result;
+               }),
+               "gradient"_a, "support"_a, "factor"_a, "blocks"_a,
+               "Derivative by the values of `add_interpolated` (4 channels, bx, by, bz) from that by J.");
 
-void register_diffuse_light(py::module_ &module) {
-    using namespace py::literals;
+    module.def("diffuse", unlocked([](Workers &workers, OverBlocks means, float albedo, float edge) {
+                   const int channels = channels_of(means);
+                   const Shape n = blocks_of(means);
+                   const std::size_t stride = Blocks::FIELDS * volume(n);
+                   Fields phi = over_blocks(channels * Blocks::FIELDS, n);
+                   const DiffuseLight light(means.data, albedo, n, edge);
+                   for (int channel = 0; channel < channels; ++channel)
+                       light.solve(means.data + volume(n) + channel * stride, phi.data() + channel * stride,
+                                   workers);
+                   return phi;
+               }),
+               "means"_a, "albedo"_a, "edge"_a,
+               R"(Mean radiance (4 channels, bx, by, bz) after any number of scatterings, in W/m^2/sr.
 
-    module.def(
-        "diffuse",
-        [](const OverBlocks &means, float albedo, float edge) {
-            const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
-            const Shape n = blocks_shape(means, 1 + fields);
-            return over_blocks(fields, n, [&](float *phi, Workers &workers) {
-                const std::size_t count = volume(n);
-                const DiffuseLight light(means.data(), albedo, n, edge);
-                for (int channel = 0; channel < channels; ++channel)
-                    light.solve(means.data() + (1 + channel * Blocks::FIELDS) * count,
-                                phi + channel * Blocks::FIELDS * count, workers);
-            });
-        },
-        "means"_a.noconvert(), "albedo"_a, "edge"_a);
+        Parameters
+        ----------
+        means : (1 + 4 channels, bx, by, bz)
+            Extinction in 1/m, then what is emitted by channel, in W/m^3/sr, the same in all directions.
+        edge
+            Of a block in metres.)");
 
     module.def(
         "diffuse_adjoint",
-        [](const OverBlocks &means, const OverBlocks &radiance, const OverBlocks &radiance_gradient,
-           float albedo, float edge) {
-            const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
-            const Shape n = blocks_shape(means, 1 + fields);
-            require_fit(blocks_shape(radiance, fields) == n && blocks_shape(radiance_gradient, fields) == n);
-            return over_blocks(1 + fields, n, [&](float *result, Workers &workers) {
-                const std::size_t count = volume(n);
-                const DiffuseLight light(means.data(), albedo, n, edge);
-                std::fill_n(result, count, 0.0f);
-                for (int channel = 0; channel < channels; ++channel) {
-                    const std::size_t at = channel * Blocks::FIELDS * count;
-                    light.solve_adjoint(means.data() + count + at, radiance.data() + at,
-                                        radiance_gradient.data() + at, result + count + at, result, workers);
-                }
-            });
-        },
-        "means"_a.noconvert(), "radiance"_a.noconvert(), "radiance_gradient"_a.noconvert(), "albedo"_a,
-        "edge"_a);
+        unlocked([](Workers &workers, OverBlocks means, OverBlocks radiance, OverBlocks radiance_gradient,
+                    float albedo, float edge) {
+            const int channels = channels_of(means);
+            const Shape n = blocks_of(means);
+            require_fields(radiance, channels * Blocks::FIELDS, n);
+            require_fields(radiance_gradient, channels * Blocks::FIELDS, n);
+            Fields result = over_blocks(1 + channels * Blocks::FIELDS, n);
+            float *const extinction = result.data(), *const emission = extinction + volume(n);
+            const DiffuseLight light(means.data, albedo, n, edge);
+            std::fill_n(extinction, volume(n), 0.0f);
+            for (int channel = 0; channel < channels; ++channel) {
+                const std::size_t at = channel * Blocks::FIELDS * volume(n);
+                light.solve_adjoint(means.data + volume(n) + at, radiance.data + at,
+                                    radiance_gradient.data + at, emission + at, extinction, workers);
+            }
+            return result;
+        }),
+        "means"_a, "radiance"_a, "radiance_gradient"_a, "albedo"_a, "edge"_a,
+        "Derivative by the means (1 + 4 channels, bx, by, bz) from that by the radiance of `diffuse`.");
 }
 
 } // namespace
@@ -409,7 +462,6 @@ void register_render(py::module_ &module) {
     register_lights(module);
     register_camera(module);
     register_blocks(module);
-    register_diffuse_light(module);
 }
 
 } // namespace smokelift

@@ -7,85 +7,75 @@
 namespace smokelift {
 
 void register_transport(py::module_ &module) {
-    using namespace py::literals;
-
     module.def(
-        "solve_poisson",
-        [](const Array &f, const Box::Closed &closed) {
-            const In right = view(f);
-            return filled(right.n, [&](Out p, Workers &workers) {
-                std::copy_n(right.data, volume(right.n), p.data);
-                Poisson({right.n, closed}).solve(p, workers);
-            });
-        },
-        "f"_a, "closed"_a);
+        "solve_poisson", unlocked([](Workers &workers, In f, const Box::Closed &closed) {
+            Field p(f.n);
+            std::copy_n(f.data, volume(f.n), p.data().data());
+            Poisson({f.n, closed}).solve(p, workers);
+            return p;
+        }),
+        "f"_a, "closed"_a,
+        R"(Solve -laplace p = f at cell centres, with p = 0 on open sides and no flux through closed ones.
 
-    module.def(
-        "project",
-        [](const Array3 &faces, const Box::Closed &closed, int passes) {
-            const StaggeredIn from = view(faces, closed);
-            double residual = 0;
-            Array3 result = filled(from.box, [&](const StaggeredOut &u, Workers &workers) {
-                copy(from, u, workers);
-                Projection projection(u.box);
-                for (int pass = 0; pass < passes; ++pass)
-                    projection.apply(u, workers);
-                residual = relative_divergence(read(u), workers);
-            });
-            return std::pair(result, residual);
-        },
-        "faces"_a, "closed"_a, "passes"_a = 2);
+        With all sides closed the mean of f is removed first, and p is known up to a constant.)");
 
-    module.def(
-        "divergence",
-        [](const Array3 &faces) {
-            const StaggeredIn u = view(faces);
-            return filled(u.box.cells, [&](Out cells, Workers &workers) { divergence(u, cells, workers); });
-        },
-        "faces"_a);
+    module.def("project",
+               unlocked([](Workers &workers, StaggeredIn faces, const Box::Closed &closed, int passes) {
+                   faces.box.closed = closed;
+                   NewFaces result(faces.box);
+                   const StaggeredOut u = result.out();
+                   copy(faces, u, workers);
+                   Projection projection(u.box);
+                   for (int pass = 0; pass < passes; ++pass)
+                       projection.apply(u, workers);
+                   return std::pair(std::move(result), relative_divergence(read(u), workers));
+               }),
+               "faces"_a, "closed"_a, "passes"_a = 2,
+               R"(The nearest velocity without divergence, and max |div u| / max |u| of that.
 
-    module.def(
-        "relative_divergence",
-        [](const Array3 &faces) {
-            const StaggeredIn u = view(faces);
-            return released([&](Workers &workers) { return relative_divergence(u, workers); });
-        },
-        "faces"_a);
+        Nearest in the sum of squares over faces, those on open sides counted half. A second pass removes what rounding
+        leaves.)");
 
-    module.def(
-        "gradient",
-        [](const Array &cells) {
-            const In a = view(cells);
-            Array3 result = new_arrays({a.n, a.n, a.n});
-            const Out3 g = out(result);
-            released([&](Workers &workers) { gradient(a, g, workers); });
-            return result;
-        },
-        "cells"_a);
+    module.def("divergence", unlocked([](Workers &workers, const StaggeredIn &faces) {
+                   Field cells(faces.box.cells);
+                   divergence(faces, cells, workers);
+                   return cells;
+               }),
+               "faces"_a, "Net outflow of every cell.");
 
-    module.def(
-        "advect_cells",
-        [](const Array &field, const Array3 &displacement, bool maccormack, bool extend) {
-            const In a = view(field);
-            const StaggeredIn u = view(displacement, Box{a.n, {}});
-            return filled(a.n, [&](Out moved, Workers &workers) {
-                if (maccormack)
-                    advect_cells_maccormack(a, u, moved, workers);
-                else
-                    advect_cells(a, u, extend, moved, workers);
-            });
-        },
-        "field"_a, "displacement"_a, "maccormack"_a, "extend"_a = false);
+    module.def("relative_divergence", unlocked([](Workers &workers, const StaggeredIn &faces) {
+                   return relative_divergence(faces, workers);
+               }),
+               "faces"_a, "max |div u| / max |u|; 0 of no motion.");
 
-    module.def(
-        "advect_faces",
-        [](const Array3 &field, const Array3 &displacement, bool maccormack) {
-            const StaggeredIn a = view(field), u = view(displacement, a.box);
-            return filled(a.box, [&](const StaggeredOut &moved, Workers &workers) {
-                advect_faces(a, u, maccormack, moved, workers);
-            });
-        },
-        "field"_a, "displacement"_a, "maccormack"_a);
+    module.def("advect_cells",
+               unlocked([](Workers &workers, In field, const StaggeredIn &displacement, bool maccormack,
+                           bool extend) {
+                   require_fit(displacement.box.cells == field.n);
+                   Field moved(field.n);
+                   if (maccormack)
+                       advect_cells_maccormack(field, displacement, moved, workers);
+                   else
+                       advect_cells(field, displacement, extend, moved, workers);
+                   return moved;
+               }),
+               "field"_a, "displacement"_a, "maccormack"_a, "extend"_a = false,
+               R"(Values at x - displacement(x), interpolated linearly.
+
+        What comes from outside the box is zero. With ``extend``, and without the correction, it is the nearest value
+        inside. The correction (Selle et al. 2008) is limited to the values around the point of origin.)");
+
+    module.def("advect_faces",
+               unlocked([](Workers &workers, const StaggeredIn &field, const StaggeredIn &displacement,
+                           bool maccormack) {
+                   require_fit(displacement.box.cells == field.box.cells);
+                   NewFaces moved(field.box);
+                   advect_faces(field, displacement, maccormack, moved.out(), workers);
+                   return moved;
+               }),
+               "field"_a, "displacement"_a, "maccormack"_a,
+               "The same for a velocity, each component at its own faces; beyond the box it continues as on "
+               "its side.");
 }
 
 } // namespace smokelift

@@ -1,12 +1,19 @@
 """Transport, velocity and rendering of smoke on a box of unit cells, compiled from ``cpp/``.
 
-Arrays are float32, C-contiguous, ``[x, y, z]``; those of transport and velocity are converted if they are not, those of
-the renderer are refused. ``cells`` have the shape (nx, ny, nz). ``faces`` are the normal components on x, y and z
-faces, arrays of shape (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1). Velocities are displacements in cells per
-frame. ``closed`` says which sides of the box are walls, in the order x-, x+, y-, y+, z-, z+.
+Arrays are float32, C-contiguous, ``[x, y, z]``. What is only read is converted if it is not, what is written is
+refused. ``cells`` have the shape (nx, ny, nz). ``faces`` are the normal components on x, y and z faces, arrays
+of shape (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1). Velocities are displacements in cells per frame.
+``closed`` says which sides of the box are walls, in the order x-, x+, y-, y+, z-, z+.
+
+The renderer's grid has a border of one voxel. A volume is (nx+2, ny+2, nz+2, 1 + channels): by voxel the
+extinction in 1/m and the in-scattered radiance of each channel, or derivatives by these. Of its diffuse light
+arrays over blocks of voxels are (fields, bx, by, bz). What is linear across a block has four fields: the mean,
+and the slopes along x, y and z, which are the differences across a block.
 
 Functions raise ValueError for arrays whose shapes do not belong together.
 """
+
+# Written by tools/stubs.py from the docstrings in cpp/register_*.cpp.
 
 from collections.abc import Sequence
 from typing import Any, TypedDict
@@ -15,11 +22,19 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float32]
+Reals = npt.NDArray[np.floating[Any]]
+Integers = npt.NDArray[np.int32]
+Bytes = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
-Faces = tuple[Array, Array, Array] | list[Array]
-Vectors = tuple[Array, Array, Array] | list[Array]
-"""Three components at cell centres, each (nx, ny, nz)."""
-Closed = tuple[bool, bool, bool, bool, bool, bool] | list[bool]
+Faces = tuple[Reals, Reals, Reals] | list[Array]
+
+class Figures(TypedDict):
+    """How a minimum was found: steps of the solver, products with the matrix, projections, its last residual."""
+
+    iterations: int
+    products: int
+    projections: int
+    residual: float
 
 def set_threads(count: int) -> None:
     """Set the number of threads of every call from now on; 0, as at first, takes all cores of the process.
@@ -27,15 +42,13 @@ def set_threads(count: int) -> None:
     Results do not depend on it.
     """
 
-# Transport
-
-def solve_poisson(f: Array, closed: Closed) -> Array:
+def solve_poisson(f: Reals, closed: npt.ArrayLike) -> Array:
     """Solve -laplace p = f at cell centres, with p = 0 on open sides and no flux through closed ones.
 
     With all sides closed the mean of f is removed first, and p is known up to a constant.
     """
 
-def project(faces: Faces, closed: Closed, passes: int = 2) -> tuple[list[Array], float]:
+def project(faces: Faces, closed: npt.ArrayLike, passes: int = 2) -> tuple[list[Array], float]:
     """The nearest velocity without divergence, and max |div u| / max |u| of that.
 
     Nearest in the sum of squares over faces, those on open sides counted half. A second pass removes what rounding
@@ -48,10 +61,7 @@ def divergence(faces: Faces) -> Array:
 def relative_divergence(faces: Faces) -> float:
     """max |div u| / max |u|; 0 of no motion."""
 
-def gradient(cells: Array) -> list[Array]:
-    """Central differences at cell centres along x, y and z, one-sided at the sides of the box."""
-
-def advect_cells(field: Array, displacement: Faces, maccormack: bool, extend: bool = False) -> Array:
+def advect_cells(field: Reals, displacement: Faces, maccormack: bool, extend: bool = False) -> Array:
     """Values at x - displacement(x), interpolated linearly.
 
     What comes from outside the box is zero. With ``extend``, and without the correction, it is the nearest value
@@ -61,74 +71,11 @@ def advect_cells(field: Array, displacement: Faces, maccormack: bool, extend: bo
 def advect_faces(field: Faces, displacement: Faces, maccormack: bool) -> list[Array]:
     """The same for a velocity, each component at its own faces; beyond the box it continues as on its side."""
 
-# The data term of a velocity
-
-def blur(cells: Array, width: float, truncate: float) -> Array:
+def blur(cells: Reals, width: float, truncate: float) -> Array:
     """A Gaussian of a standard deviation in cells, cut off at ``truncate`` of them; ends are mirrored."""
-
-def linearise(
-    before: Array, after: Array, u: Faces, threshold: float
-) -> tuple[list[Array], Array, Array, Array, Array, Mask, float]:
-    """The change between two densities around a velocity, as a linear function of the velocity.
-
-    Returns
-    -------
-    direction
-        Gradient of the mean of ``after`` and ``carried``, over ``scale``; three arrays (nx, ny, nz).
-    offset
-        (after - carried) / scale - direction . u.
-    residual
-        after - carried.
-    carried
-        ``before``, moved by u, over ``scale``.
-    density
-        The larger of ``after`` and the moved ``before``.
-    smoke
-        Where that exceeds ``threshold`` times its maximum.
-    scale
-        Root mean square of the gradient inside the smoke. Where it is zero, nothing else is defined.
-    """
-
-def residual_sums(
-    direction: Vectors, offset: Array, weight: Array, smoke: Mask, u: Faces
-) -> tuple[float, float, float]:
-    """Sums of weight offset^2, of weight (offset + direction . u)^2, and of weight inside the smoke."""
-
-def directional_derivative(direction: Vectors, u: Faces) -> Array:
-    """direction . u at cell centres, u the mean of opposite faces."""
-
-def weighted_products(columns: list[Array], weight: Array) -> npt.NDArray[np.float64]:
-    """Sums over the cells of weight a b for all pairs of the columns, shape (columns, columns)."""
-
-# Motion
-
-def add_momentum(
-    density: Array, source: npt.ArrayLike, trust: float, prediction: Faces | None, closed: Closed
-) -> list[Array]:
-    """trust prediction + P(density source), with P the projection.
-
-    Parameters
-    ----------
-    source
-        Cells per frame at density 1, shape (1, 3) or (4, 3): constant, and slopes along x, y, z, which run from -1 to 1
-        over the box.
-    prediction
-        May be None where ``trust`` is zero.
-    """
 
 def prolong(u: Faces) -> list[Array]:
     """A velocity in the cells of a grid that is twice as fine, each with the divergence of its coarse one."""
-
-def clamp_increment(solution: Faces, u: Faces, largest: float, closed: Closed) -> list[Array]:
-    """u + (solution - u, every component clamped to +- largest), projected; the solution where nothing exceeds that."""
-
-class Figures(TypedDict):
-    """How a minimum was found: steps of the solver, products with the matrix, projections, its last residual."""
-
-    iterations: int
-    products: int
-    projections: int
-    residual: float
 
 class LeastSquares:
     """A quadratic function of face velocities, E(u) = u.Au - 2 b.u + constant.
@@ -136,19 +83,18 @@ class LeastSquares:
     E sums weight (offset + direction . u)^2 + irrotational |curl u|^2 over the cells, and of v = u - centre the terms
     first_order |grad v|^2 + second_order |grad curl v|^2 + kinetic |v|^2.
     """
-
     def __init__(
         self,
         *,
-        direction: Vectors,
-        offset: Array,
-        weight: Array,
-        irrotational: Array,
+        direction: Sequence[Reals],
+        offset: Reals,
+        weight: Reals,
+        irrotational: Reals,
         centre: Faces,
         first_order: float,
         second_order: float,
         kinetic: float,
-        closed: Closed,
+        closed: npt.ArrayLike,
     ) -> None: ...
     def apply(self, u: Faces) -> list[Array]:
         """A u."""
@@ -199,25 +145,27 @@ class LeastSquares:
             Of the conjugate gradients in the proximal operator.
         """
 
-# Renderer. Its grid has a border of one voxel. A `Volume` is float32, (nx+2, ny+2, nz+2, 1 + channels): by voxel
-# the extinction in 1/m and the in-scattered radiance of each channel, or derivatives by these.
-
-Volume = npt.NDArray[np.float32]
-
-def zeros(shape: tuple[int, ...]) -> Array:
+def zeros(shape: npt.ArrayLike) -> Array:
     """Zeros that get memory where they are touched, in large pages where the system has them."""
 
 class Support:
     """Where there can be smoke; ``marked`` is (nx, ny, nz), not 0 in such voxels."""
+    def __init__(self, marked: Bytes) -> None: ...
 
-    def __init__(self, marked: npt.NDArray[np.uint8]) -> None: ...
+def pack(density: Array, corner: npt.ArrayLike, support: Support, extinction: float, medium: Array) -> None:
+    """Write the extinction of the marked voxels from their density.
+
+    ``corner`` is where the support begins in the array of densities; ``extinction`` is in 1/m at density 1.
+    """
+
+def unpack(gradient: Array, support: Support, extinction: float, result: Array, corner: npt.ArrayLike) -> None:
+    """Write the derivative by density of the marked voxels into ``result``; others are left as they are."""
 
 class Phase:
     """Henyey-Greenstein phase function times albedo, towards the camera.
 
     ``to_eye`` is (3, 4): it maps a voxel's index (i, j, k, 1) to the direction to the eye, of any length.
     """
-
     def __init__(self, *, to_eye: npt.ArrayLike, albedo: float, anisotropy: float) -> None: ...
 
 class ParallelLight:
@@ -238,7 +186,6 @@ class ParallelLight:
     step
         Length of a ray between two planes in metres.
     """
-
     def __init__(
         self,
         *,
@@ -247,7 +194,7 @@ class ParallelLight:
         axis: int,
         travel: int,
         first: int,
-        slope: tuple[float, float],
+        slope: npt.ArrayLike,
         step: float,
     ) -> None: ...
 
@@ -265,7 +212,6 @@ class Face:
     columns_b, columns_c
         First column and number of columns that meet the grid along the two other axes.
     """
-
     def __init__(
         self,
         *,
@@ -274,8 +220,8 @@ class Face:
         first: int,
         planes: int,
         far: float,
-        columns_b: tuple[int, int],
-        columns_c: tuple[int, int],
+        columns_b: npt.ArrayLike,
+        columns_c: npt.ArrayLike,
     ) -> None: ...
 
 class PointLight:
@@ -292,12 +238,26 @@ class PointLight:
     faces
         The sides of the cube around it that see the grid.
     """
-
     def __init__(
-        self, *, position: npt.ArrayLike, energy: npt.ArrayLike, voxel_size: float, faces: list[Face]
+        self, *, position: npt.ArrayLike, energy: npt.ArrayLike, voxel_size: float, faces: Sequence[Face]
     ) -> None: ...
 
-Lights = list[ParallelLight | PointLight]
+def shade(medium: Array, support: Support, phase: Phase, lights: Sequence[ParallelLight | PointLight]) -> None:
+    """Write the radiance that the lights scatter in every voxel towards the camera."""
+
+def shade_adjoint(
+    medium: Array,
+    gradient: Array,
+    scratch: Array | None,
+    support: Support,
+    phase: Phase,
+    lights: Sequence[ParallelLight | PointLight],
+) -> None:
+    """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
+
+    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
+    in-scattered radiance is used up.
+    """
 
 class Rays:
     """One ray a pixel.
@@ -312,9 +272,8 @@ class Rays:
     planes : (rows, columns, 4)
         Dominant axis, travel along it, first and last plane with a sample; last < first where there is none.
     """
-
-    def __init__(self, lines: Array, length: Array, planes: npt.NDArray[np.int32]) -> None: ...
-    def clip(self, support: Support, medium: Volume) -> None:
+    def __init__(self, lines: Reals, length: Reals, planes: Integers) -> None: ...
+    def clip(self, support: Support, medium: Array) -> None:
         """Shorten every ray to where the voxels around it hold anything."""
 
     @property
@@ -331,36 +290,15 @@ def pixel_rays(
     far: bool,
     columns: npt.ArrayLike,
     rows: npt.ArrayLike,
-    shape: tuple[int, int, int],
-) -> tuple[Array, Array, npt.NDArray[np.int32]]:
+    shape: npt.ArrayLike,
+) -> tuple[Array, Array, Integers]:
     """Lines, lengths in voxels and planes of `Rays` through all pixels, as far as their samples meet a grid.
 
     Where in the grid a ray starts, and which way it goes, is a + x b + y c at the places x and y of its column and row,
     (3, 3) each. Samples lie before the start unless the camera is far away.
     """
 
-def pack(density: Array, corner: tuple[int, int, int], support: Support, extinction: float, medium: Volume) -> None:
-    """Write the extinction of the marked voxels from their density.
-
-    ``corner`` is where the support begins in the array of densities; ``extinction`` is in 1/m at density 1.
-    """
-
-def unpack(gradient: Volume, support: Support, extinction: float, result: Array, corner: tuple[int, int, int]) -> None:
-    """Write the derivative by density of the marked voxels into ``result``; others are left as they are."""
-
-def shade(medium: Volume, support: Support, phase: Phase, lights: Lights) -> None:
-    """Write the radiance that the lights scatter in every voxel towards the camera."""
-
-def shade_adjoint(
-    medium: Volume, gradient: Volume, scratch: Volume | None, support: Support, phase: Phase, lights: Lights
-) -> None:
-    """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
-
-    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
-    in-scattered radiance is used up.
-    """
-
-def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth: Array, record: Volume | None) -> None:
+def march(medium: Array, support: Support, rays: Rays, scattered: Array, depth: Array, record: Array | None) -> None:
     """Write the radiance towards the camera and the optical depth of every ray.
 
     Parameters
@@ -375,11 +313,11 @@ def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth:
 
 def march_adjoint(
     rays: Rays,
-    depth: Array,
-    scattered_gradient: Array,
-    transmittance_gradient: Array,
-    record: Volume | None,
-    gradient: Volume,
+    depth: Reals,
+    scattered_gradient: Reals,
+    transmittance_gradient: Reals,
+    record: Array | None,
+    gradient: Array,
     support: Support,
 ) -> None:
     """Write the derivatives by the voxels of ``gradient`` from those by radiance and transmittance of every ray.
@@ -387,30 +325,26 @@ def march_adjoint(
     ``record`` is that of `march`; it is overwritten.
     """
 
-# Diffuse light: arrays over blocks of voxels are (fields, bx, by, bz). What is linear across a block has four fields:
-# the mean, and the slopes along x, y and z, which are the differences across a block.
-
 class Blocks:
     """Cubes of ``size`` voxels; every voxel of a support lies between the centres of eight.
 
     ``offset`` is the index of the support's first voxel among those of the first block, ``shape`` the number of blocks.
     """
+    def __init__(self, *, shape: npt.ArrayLike, size: int, offset: npt.ArrayLike) -> None: ...
 
-    def __init__(self, *, shape: tuple[int, int, int], size: int, offset: tuple[int, int, int]) -> None: ...
-
-def average(medium: Volume, support: Support, blocks: Blocks) -> Array:
+def average(medium: Array, support: Support, blocks: Blocks) -> Array:
     """Over blocks (1 + 4 channels, bx, by, bz): the mean of the extinction kappa, then kappa J by channel, linear."""
 
-def average_adjoint(medium: Volume, support: Support, blocks: Blocks, means_gradient: Array, gradient: Volume) -> None:
+def average_adjoint(medium: Array, support: Support, blocks: Blocks, means_gradient: Reals, gradient: Array) -> None:
     """Add to the derivatives by kappa and J what those by the result of `average` say of them."""
 
-def add_interpolated(values: Array, factor: float, blocks: Blocks, medium: Volume, support: Support) -> None:
+def add_interpolated(values: Reals, factor: float, blocks: Blocks, medium: Array, support: Support) -> None:
     """J += factor x values (4 channels, bx, by, bz): what eight blocks say, weighted as between their centres."""
 
-def interpolate_adjoint(gradient: Volume, support: Support, factor: float, blocks: Blocks) -> Array:
+def interpolate_adjoint(gradient: Array, support: Support, factor: float, blocks: Blocks) -> Array:
     """Derivative by the values of `add_interpolated` (4 channels, bx, by, bz) from that by J."""
 
-def diffuse(means: Array, albedo: float, edge: float) -> Array:
+def diffuse(means: Reals, albedo: float, edge: float) -> Array:
     """Mean radiance (4 channels, bx, by, bz) after any number of scatterings, in W/m^2/sr.
 
     Parameters
@@ -421,13 +355,23 @@ def diffuse(means: Array, albedo: float, edge: float) -> Array:
         Of a block in metres.
     """
 
-def diffuse_adjoint(means: Array, radiance: Array, radiance_gradient: Array, albedo: float, edge: float) -> Array:
+def diffuse_adjoint(means: Reals, radiance: Reals, radiance_gradient: Reals, albedo: float, edge: float) -> Array:
     """Derivative by the means (1 + 4 channels, bx, by, bz) from that by the radiance of `diffuse`."""
 
-# Pictures
+def depth_profile(
+    voxels: Mask,
+    places: npt.ArrayLike,
+    depth: npt.ArrayLike,
+    at: Sequence[Reals],
+    middle: Reals,
+    width: Reals,
+    flatness: float,
+) -> tuple[Array, Array]:
+    """exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
 
-def marked(voxels: Mask) -> npt.NDArray[np.int64]:
-    """Indices (3, n) of the marked voxels along x, y and z: those of `numpy.nonzero`, in the same order."""
+    ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction; ``at`` rows and
+    columns (n,) where the pictures ``middle`` and ``width`` are read.
+    """
 
 class PictureMap:
     """Where the voxels of a grid lie in a picture.
@@ -435,10 +379,7 @@ class PictureMap:
     ``to_pixel`` (3, 4) maps homogeneous points of the world to (x depth, y depth, depth) in pixels. ``centres`` are the
     voxel centres' world coordinates (m) along x, y and z, ``size`` the picture's columns and rows.
     """
-
-    def __init__(
-        self, to_pixel: npt.NDArray[np.float64], centres: list[npt.NDArray[np.float64]], size: tuple[int, int]
-    ) -> None: ...
+    def __init__(self, to_pixel: Reals, centres: npt.ArrayLike, size: npt.ArrayLike) -> None: ...
     def places(self, voxels: Mask) -> tuple[Array, Array, Mask]:
         """Rows and columns (n,) of the marked voxels, pixel centres at integers; whether they are in the picture."""
 
@@ -449,85 +390,14 @@ class PictureMap:
     def nearest(self) -> float:
         """Least depth (m) of the voxels before the camera; infinite if there are none."""
 
-def depth_profile(
-    voxels: Mask,
-    places: list[npt.NDArray[np.float64]],
-    depth: npt.NDArray[np.float64],
-    at: list[Array],
-    middle: npt.NDArray[np.float64],
-    width: npt.NDArray[np.float64],
-    flatness: float,
-) -> tuple[Array, Array]:
-    """exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
-
-    ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction; ``at`` rows and
-    columns (n,) where the pictures ``middle`` and ``width`` are read.
-    """
-
-class MarkedVoxels:
-    """The marked voxels of a grid; values (count,) are at them in their order in memory."""
-
-    def __init__(self, voxels: Mask) -> None: ...
-    @property
-    def count(self) -> int:
-        """How many there are."""
-
-    def above_zero(self, a: Array, b: Array) -> MarkedVoxels:
-        """Those of them at which either volume (nx, ny, nz) is above 0."""
-
-    def take(self, volume: Array, out: Array | None = None) -> Array:
-        """Values of a volume, written to ``out`` if that is given."""
-
-    def put(self, values: npt.NDArray[np.floating[Any]], volume: Array, factor: float = 1.0) -> None:
-        """Write values, times a factor, into a volume."""
-
-    def share_in_cubes(self, values: Array, size: int, weight: float, out: Array) -> None:
-        """Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
-
-        Half of it is over each of two lattices, half a cube apart. The result may replace the values.
-        """
-
-    def scale_along_rays(
-        self,
-        picture: PictureMap,
-        values: Array,
-        plausible: Array | None,
-        logarithm: npt.NDArray[np.floating[Any]],
-        faint: float,
-        most: float,
-        share: float,
-        out: Array,
-    ) -> None:
-        """Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
-
-        Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
-        would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
-        some, both plus ``faint``, by ``most`` at most. The result may replace the values.
-        """
-
-def hold(values: Array, gradient: Array, density: Array, bound: float, out: Array) -> None:
-    """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
-
-def descend(
-    density: Array,
-    direction: Array,
-    scale: Array,
-    floor: Array,
-    length: float,
-    max_change: float,
-    bound: float,
-    arrived: Array,
-    moved: Array,
-) -> None:
-    """Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
-
-    A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.
-    """
-
-def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
+def read_bilinearly(picture: Reals, rows: Reals, columns: Reals) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
 
-# A grid and one half as fine. Arrays may be boxes of larger ones, but for the last axis.
+def read_lattice(lattice: Reals, places: Reals) -> Array:
+    """A lattice that repeats, read at finite places (3, n), linear between nodes at whole numbers.
+
+    To the bit `scipy.ndimage.map_coordinates` of order 1 and mode "grid-wrap".
+    """
 
 def means_of_two(values: Array, voxels: Mask | None = None) -> Array:
     """Means of two along every axis; beyond the grid there is nothing, nor in rows without marked voxels."""
@@ -541,56 +411,34 @@ def scale_alike(values: Array, voxels: Mask, before: Array, after: Array, least:
     ``before``, at least ``least``, and ``after`` are the coarse grid's, linear between its voxels' middles.
     """
 
-def read_lattice(lattice: Array, places: Array) -> Array:
-    """A lattice that repeats, read at finite places (3, n), linear between nodes at whole numbers.
-
-    To the bit `scipy.ndimage.map_coordinates` of order 1 and mode "grid-wrap".
-    """
-
-def sum_lines(
-    picture: npt.NDArray[np.uint8],
-    table: Array,
-    first: npt.NDArray[np.int32],
-    lines: npt.NDArray[np.int32],
-    weights: Array,
-) -> Array:
+def sum_lines(picture: Bytes, table: Reals, first: Integers, lines: Integers, weights: Reals) -> Array:
     """Weighted sums (n, columns, channels) of lines of a picture (rows, columns, channels) whose values a table tells.
 
     The ``n``-th is that of ``lines`` from ``first[n]`` to ``first[n + 1]``, as of a sparse matrix in rows, and the same
     to the last bit. ``table`` has 256 values. Pixels lie one after the other in each line.
     """
 
-def sum_columns(values: Array, first: npt.NDArray[np.int32], columns: npt.NDArray[np.int32], weights: Array) -> Array:
+def sum_columns(values: Reals, first: Integers, columns: Integers, weights: Reals) -> Array:
     """Weighted sums (rows, n, channels) of columns of values (rows, columns, channels), as of `sum_lines`."""
 
-def add_weighted(
-    picture: npt.NDArray[np.uint8],
-    table: Array,
-    weights: Array,
-    lines: npt.NDArray[np.int32],
-    columns: npt.NDArray[np.int32],
-    sums: Array,
-) -> None:
+def add_weighted(picture: Bytes, table: Reals, weights: Reals, lines: Integers, columns: Integers, sums: Array) -> None:
     """Add the values of a picture (rows, columns, 3), times weights (m, n, 3) of its parts, to sums of its shape.
 
     The ``n``-th part down has the lines from ``lines[n]`` to ``lines[n + 1]``; columns likewise. The rest is as of
     `sum_lines`.
     """
 
-def interleave(
-    channels: tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]],
-) -> npt.NDArray[np.uint8]:
-    """Write three pictures (rows, columns), in each of which pixels lie one after the other, as (rows, columns, 3)."""
+def blur_picture(picture: Reals, weights: npt.ArrayLike) -> Array:
+    """A picture (rows, columns) or (rows, columns, channels), smoothed down and across.
 
-def at_ranks(values: Array, ranks: Sequence[int]) -> Array:
-    """Values (len(ranks), ...) that have some ranks, from 0, along the first axis of values, none of which is NaN."""
+    ``weights`` are those of a pixel itself and of its neighbours on either side, outwards. Beyond its edges the picture
+    is its own mirror image.
+    """
 
-def filled_spans(volume: Array) -> npt.NDArray[np.int32]:
+def filled_spans(volume: Reals) -> Integers:
     """Of every column of voxels (i, j) the first that is not zero and the end of those that are not, (nx, ny, 2)."""
 
-def project_turned(
-    volume: Array, spans: npt.NDArray[np.int32], first: float, steps: tuple[float, float], columns: int
-) -> Array:
+def project_turned(volume: Reals, spans: Integers, first: float, steps: npt.ArrayLike, columns: int) -> Array:
     """The picture (columns, nz) of a volume that is turned about its last axis, a pixel a voxel.
 
     It is zero outside the spans; see `filled_spans`.
@@ -599,40 +447,29 @@ def project_turned(
     the voxels' shadows, so that even smoke makes an even picture from every angle.
     """
 
-def scale_turned(
-    volume: Array, spans: npt.NDArray[np.int32], first: float, steps: tuple[float, float], logarithm: Array
-) -> None:
+def scale_turned(volume: Array, spans: Integers, first: float, steps: npt.ArrayLike, logarithm: Reals) -> None:
     """Multiply a volume in its spans by exponentials of a picture (columns, nz), read as `project_turned` weighs it."""
 
-def unfold(picture: Array, at: npt.NDArray[np.int32], size: int) -> Array:
+def unfold(picture: Reals, at: Integers, size: int) -> Array:
     """Pixels (size * size, n) of the square patches about places (2, n), all of which lie in the picture."""
 
-def fold(pixels: Array, at: npt.NDArray[np.int32], size: int, shape: tuple[int, int]) -> Array:
+def fold(pixels: Reals, at: Integers, size: int, shape: npt.ArrayLike) -> Array:
     """For each pixel of a picture the mean of what the patches that cover it hold there; 0 where none does."""
 
-def to_quantiles(values: Array, wanted: Array) -> None:
+def to_quantiles(values: Array, wanted: Reals) -> None:
     """Replace values (lines, n) by their distance to the quantiles of the same rank of a line of ``wanted`` (lines, m).
 
     These are sorted. The distances are the one-dimensional optimal transport from one distribution to the other.
     """
 
-def blur_picture(picture: Array, weights: npt.NDArray[np.floating[Any]]) -> Array:
-    """A picture (rows, columns) or (rows, columns, channels), smoothed down and across.
-
-    ``weights`` are those of a pixel itself and of its neighbours on either side, outwards. Beyond its edges the picture
-    is its own mirror image.
-    """
-
-# Extraction
-
 def pyramid_levels(rows: int, columns: int) -> int:
     """Levels of a pyramid over so many cells; the coarsest has two cells at most along its longer side."""
 
 def extract(
-    moments: Array,
-    source: Sequence[float],
-    errors: Sequence[float],
-    deviations: Sequence[tuple[float, float, float, float]],
+    moments: Reals,
+    source: npt.ArrayLike,
+    errors: npt.ArrayLike,
+    deviations: npt.ArrayLike,
     outlier_freedom: float,
     pixels: float,
     rounds: int,
@@ -645,4 +482,63 @@ def extract(
     has a covariance of ``errors``, the upper triangle. ``source`` (3,) is J where its fields are 0, ``deviations`` the
     prior's standard deviations by level, the finest first. ``outlier_freedom`` are the degrees of freedom of the noise,
     0 for normal noise; ``pixels`` are in a cell.
+    """
+
+class MarkedVoxels:
+    """The marked voxels of a grid; values (count,) are at them in their order in memory."""
+    def __init__(self, voxels: Mask) -> None: ...
+    @property
+    def count(self) -> int:
+        """How many there are."""
+
+    def above_zero(self, a: Reals, b: Reals) -> MarkedVoxels:
+        """Those of them at which either volume (nx, ny, nz) is above 0."""
+
+    def take(self, volume: Reals, out: Array | None = None) -> Array:
+        """Values of a volume, written to ``out`` if that is given."""
+
+    def put(self, values: Reals, volume: Array, factor: float = 1.0) -> None:
+        """Write values, times a factor, into a volume."""
+
+    def share_in_cubes(self, values: Reals, size: int, weight: float, out: Array) -> None:
+        """Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
+
+        Half of it is over each of two lattices, half a cube apart. The result may replace the values.
+        """
+
+    def scale_along_rays(
+        self,
+        picture: PictureMap,
+        values: Reals,
+        plausible: Reals | None,
+        logarithm: Reals,
+        faint: float,
+        most: float,
+        share: float,
+        out: Array,
+    ) -> None:
+        """Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
+
+        Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
+        would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
+        some, both plus ``faint``, by ``most`` at most. The result may replace the values.
+        """
+
+def hold(values: Reals, gradient: Reals, density: Reals, bound: float, out: Array) -> None:
+    """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
+
+def descend(
+    density: Reals,
+    direction: Reals,
+    scale: Reals,
+    floor: Reals,
+    length: float,
+    max_change: float,
+    bound: float,
+    arrived: Array,
+    moved: Array,
+) -> None:
+    """Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
+
+    A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.
     """
