@@ -108,12 +108,7 @@ std::vector<Span> spans_within(In a, int reach, Workers &workers) {
     std::vector<Span> own(std::size_t(nx) * ny, Span{0, 0}), along_y = own, result = own;
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         for (int j = 0; j < ny; ++j) {
-            const float *const row = a.row(i, j);
-            int first = 0, end = nz;
-            while (first < end && row[first] == 0)
-                ++first;
-            while (end > first && row[end - 1] == 0)
-                --end;
+            const auto [first, end] = nonzero(a.row(i, j), nz);
             if (first < end)
                 own[std::size_t(i) * ny + j] = {std::max(first - reach, 0), std::min(end + reach, nz)};
         }

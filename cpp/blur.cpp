@@ -1,7 +1,5 @@
 #include "blur.h"
 
-#include "voxels.h"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -23,27 +21,11 @@ std::vector<float> gaussian(double width, double truncate) {
     return weights;
 }
 
-// The element of a line of n whose mirror image is at i.
-int mirrored(int i, int n) {
-    i = (i % (2 * n) + 2 * n) % (2 * n);
-    return i < n ? i : 2 * n - 1 - i;
-}
-
 SMOKELIFT_CLONES
 void add(const float *__restrict a, float factor, float *__restrict out, const Span &span) {
     const int end = span[1];
     for (int i = span[0]; i < end; ++i)
         out[i] += factor * a[i];
-}
-
-// From the first to the last number of a row that is not zero.
-Span nonzero(const float *row, int n) {
-    int first = 0, end = n;
-    while (first < end && row[first] == 0)
-        ++first;
-    while (first < end && row[end - 1] == 0)
-        --end;
-    return {first, end};
 }
 
 } // namespace

@@ -48,16 +48,6 @@ void add_weighted_line(const unsigned char *__restrict codes, const float *__res
         sums[x] += table[codes[x]] * weights[x];
 }
 
-SMOKELIFT_CLONES
-void interleave_line(const unsigned char *__restrict red, const unsigned char *__restrict green,
-                     const unsigned char *__restrict blue, int width, unsigned char *__restrict codes) {
-    for (int x = 0; x < width; ++x) {
-        codes[3 * x] = red[x];
-        codes[3 * x + 1] = green[x];
-        codes[3 * x + 2] = blue[x];
-    }
-}
-
 } // namespace
 
 void sum_lines(const CodedLines &picture, const float *table, const LineWeights &weights, float *sums) {
@@ -91,13 +81,6 @@ void add_weighted(const CodedLines &picture, const float *table, const PartWeigh
             add_weighted_line(picture.codes + line * picture.stride, table, across.data(), picture.width,
                               sums + std::ptrdiff_t(line) * picture.width);
     }
-}
-
-void interleave(const std::array<CodedLines, 3> &channels, unsigned char *codes) {
-    const auto [red, green, blue] = channels;
-    for (int line = 0; line < red.lines; ++line, codes += 3 * std::ptrdiff_t(red.width))
-        interleave_line(red.codes + line * red.stride, green.codes + line * green.stride,
-                        blue.codes + line * blue.stride, red.width, codes);
 }
 
 } // namespace smokelift

@@ -2,7 +2,6 @@
 // product is rounded by itself (CMakeLists.txt): sums are those of the same steps in NumPy, to the last bit.
 #pragma once
 
-#include <array>
 #include <cstddef>
 
 namespace smokelift {
@@ -43,8 +42,5 @@ struct PartWeights {
 
 // Adds the values of a picture of three channels, times the weights of its parts, to sums (lines, width).
 void add_weighted(const CodedLines &picture, const float *table, const PartWeights &weights, float *sums);
-
-// Writes three pictures of one channel as one (lines, width, 3).
-void interleave(const std::array<CodedLines, 3> &channels, unsigned char *codes);
 
 } // namespace smokelift

@@ -31,23 +31,19 @@ void descend_range(const DescentStep &step, std::size_t begin, std::size_t end, 
     }
 }
 
-template <class Work> void in_chunks(std::size_t count, Workers &workers, const Work &work) {
-    workers.run(int((count + CHUNK - 1) / CHUNK),
-                [&](int c) { work(c * CHUNK, std::min(count, (c + 1) * CHUNK)); });
-}
-
 } // namespace
 
 void hold(const float *values, const float *gradient, const float *density, float bound, std::size_t count,
           float *held, Workers &workers) {
-    in_chunks(count, workers, [&](std::size_t begin, std::size_t end) {
+    workers.run_ranges(count, CHUNK, [&](std::size_t begin, std::size_t end) {
         hold_range(values, gradient, density, bound, begin, end, held);
     });
 }
 
 void descend(const DescentStep &step, std::size_t count, float *density, float *moved, Workers &workers) {
-    in_chunks(count, workers,
-              [&](std::size_t begin, std::size_t end) { descend_range(step, begin, end, density, moved); });
+    workers.run_ranges(count, CHUNK, [&](std::size_t begin, std::size_t end) {
+        descend_range(step, begin, end, density, moved);
+    });
 }
 
 } // namespace smokelift

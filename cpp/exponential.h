@@ -34,4 +34,10 @@ SMOKELIFT_INLINE Attenuation attenuation(float x) {
     return {power * minus_one + power, -(power * minus_one + (power - 1.0f))};
 }
 
+// exp(x), of any sign.
+SMOKELIFT_INLINE float exponential(float x) {
+    const float less = attenuation(x < 0 ? -x : x).transmittance;
+    return x < 0 ? less : 1 / less;
+}
+
 } // namespace smokelift

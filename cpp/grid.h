@@ -46,6 +46,22 @@ SMOKELIFT_INLINE Span joined(const Span &a, const Span &b) {
     return {std::min(a[0], b[0]), std::max(a[1], b[1])};
 }
 
+// From the first to the last number of a row that is not zero.
+inline Span nonzero(const float *row, int n) {
+    int first = 0, end = n;
+    while (first < end && row[first] == 0)
+        ++first;
+    while (first < end && row[end - 1] == 0)
+        --end;
+    return {first, end};
+}
+
+// The element of a line of n whose mirror image is at i.
+inline int mirrored(int i, int n) {
+    i = (i % (2 * n) + 2 * n) % (2 * n);
+    return i < n ? i : 2 * n - 1 - i;
+}
+
 // The elements with the first index i.
 template <class T> Grid<T> slab(const Grid<T> &a, int i) { return {a.row(i, 0), {1, a.n[1], a.n[2]}}; }
 

@@ -35,4 +35,9 @@ void scale_alike(const Part<const float> &fine, const Part<const bool> &marked,
                  const Part<const float> &before, const Part<const float> &after, float least,
                  const Part<float> &result, Workers &workers);
 
+// A velocity in the cells of a grid that is twice as fine. Each fine cell has the divergence of its coarse
+// one, and what goes through a coarse face goes through its four fine ones. Only the coarse cells beside one
+// count (Toth and Roe 2002, J. Comput. Phys. 180, 736).
+void prolong(const StaggeredIn &coarse, const StaggeredOut &fine, Workers &workers);
+
 } // namespace smokelift

@@ -50,9 +50,8 @@ void read_range(In lattice, const float *places, std::size_t count, std::size_t 
 } // namespace
 
 void read_lattice(In lattice, const float *places, std::size_t count, float *values, Workers &workers) {
-    workers.run(int((count + READS_PER_TASK - 1) / READS_PER_TASK), [&](int task) {
-        const std::size_t begin = task * READS_PER_TASK;
-        read_range(lattice, places, count, begin, std::min(count, begin + READS_PER_TASK), values);
+    workers.run_ranges(count, READS_PER_TASK, [&](std::size_t begin, std::size_t end) {
+        read_range(lattice, places, count, begin, end, values);
     });
 }
 

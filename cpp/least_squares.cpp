@@ -35,12 +35,6 @@ void scaled(const float *__restrict a, float factor, float *__restrict out, std:
         out[i] = factor * a[i];
 }
 
-SMOKELIFT_CLONES
-void add_scaled(const float *__restrict a, float factor, float *__restrict out, std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
-        out[i] += factor * a[i];
-}
-
 // Enough blocks of slabs for some threads, each of so many that the slabs computed twice at its ends hardly
 // count.
 constexpr int BLOCKS = 8, MIN_SLABS = 4, MAX_SLABS = 16;
@@ -120,7 +114,7 @@ double LeastSquares::finish(Window &window, const StaggeredIn &u, const Staggere
             if (r.first_order > 0) {
                 smoothness_slab(slab(u[c], std::max(i - 1, 0)), a, slab(u[c], std::min(i + 1, u[c].n[0] - 1)),
                                 {0, 0, 0}, u[c].n, r.first_order, {}, out[c]);
-                add_scaled(a.data, r.kinetic, out[c].data, a.slab_size());
+                axpy(r.kinetic, a.data, out[c].data, a.slab_size());
             } else {
                 scaled(a.data, r.kinetic, out[c].data, a.slab_size());
             }

@@ -17,34 +17,6 @@ void divergence_slab(const In3 &u, Out cells, int i) {
     }
 }
 
-namespace {
-
-SMOKELIFT_CLONES
-void gradient_slab(In a, const Out3 &g, int i) {
-    const auto [nx, ny, nz] = a.n;
-    const int before = std::max(i - 1, 0), after = std::min(i + 1, nx - 1);
-    const float wx = after > before ? 1.0f / float(after - before) : 0;
-    for (int j = 0; j < ny; ++j) {
-        const int below = std::max(j - 1, 0), above = std::min(j + 1, ny - 1);
-        const float wy = above > below ? 1.0f / float(above - below) : 0;
-        const float *__restrict x0 = a.row(before, j), *__restrict x1 = a.row(after, j);
-        const float *__restrict y0 = a.row(i, below), *__restrict y1 = a.row(i, above);
-        const float *__restrict c = a.row(i, j);
-        float *__restrict gx = g[0].row(i, j), *__restrict gy = g[1].row(i, j),
-                          *__restrict gz = g[2].row(i, j);
-        for (int k = 0; k < nz; ++k) {
-            gx[k] = wx * (x1[k] - x0[k]);
-            gy[k] = wy * (y1[k] - y0[k]);
-        }
-        for (int k = 1; k < nz - 1; ++k)
-            gz[k] = 0.5f * (c[k + 1] - c[k - 1]);
-        gz[0] = nz > 1 ? c[1] - c[0] : 0;
-        gz[nz - 1] = nz > 1 ? c[nz - 1] - c[nz - 2] : 0;
-    }
-}
-
-} // namespace
-
 SMOKELIFT_CLONES
 void curl_slab(const In3 &u, const Out3 &w, int i) {
     const int nx = u[1].n[0], ny = u[0].n[1], nz = u[0].n[2];
@@ -190,10 +162,6 @@ void edge_means_slab(In a, int c, Out edges, int i) {
 
 void divergence(const In3 &faces, Out cells, Workers &workers) {
     workers.run(cells.n[0], [&](int i) { divergence_slab(faces, slab(cells, i), i); });
-}
-
-void gradient(In cells, const Out3 &result, Workers &workers) {
-    workers.run(cells.n[0], [&](int i) { gradient_slab(cells, result, i); });
 }
 
 } // namespace smokelift

@@ -12,9 +12,6 @@ void divergence(const In3 &faces, Out cells, Workers &workers);
 // The same for the cells of one slab.
 void divergence_slab(const In3 &faces, Out slab, int i);
 
-// Central differences at cell centres, one-sided at the sides of the box. All arrays (nx, ny, nz).
-void gradient(In cells, const Out3 &result, Workers &workers);
-
 // What follows computes slab i (the elements of one x) from whole arrays or from the slabs that it depends
 // on, so that what lies in between never needs to be whole.
 

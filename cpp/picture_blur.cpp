@@ -1,6 +1,4 @@
-#include "picture_blur.h"
-
-#include "compiler.h"
+#include "blur.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -13,12 +11,6 @@ struct Pair {
     const float *before, *after;
     double weight;
 };
-
-// The element of a line of n whose mirror image is at i.
-int mirrored(int i, int n) {
-    i = (i % (2 * n) + 2 * n) % (2 * n);
-    return i < n ? i : 2 * n - 1 - i;
-}
 
 template <int Width>
 SMOKELIFT_INLINE void sum_some(const float *middle, double weight, const std::vector<Pair> &pairs,

@@ -166,11 +166,6 @@ void read_range(const double *__restrict picture, int rows, int columns, const f
     }
 }
 
-SMOKELIFT_INLINE float exponential(float x) {
-    const float less = attenuation(x < 0 ? -x : x).transmittance;
-    return x < 0 ? less : 1 / less;
-}
-
 SMOKELIFT_CLONES
 void scale_evenly(const float *__restrict steps, const bool *__restrict visible, float share,
                   const float *values, float *scaled, int count) {
@@ -206,27 +201,6 @@ std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
     for (int i = 0; i < voxels.n[0]; ++i)
         first[i + 1] += first[i];
     return first;
-}
-
-void find_marked(Mask voxels, const std::vector<std::size_t> &first, std::int64_t *indices,
-                 Workers &workers) {
-    const std::size_t count = first.back();
-    workers.run(voxels.n[0], [&](int i) {
-        if (first[i] == first[i + 1])
-            return;
-        std::int64_t *at = indices + first[i];
-        for (int j = 0; j < voxels.n[1]; ++j) {
-            const unsigned char *row = voxels.row(i, j);
-            for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2]; ++k) {
-                if (!row[k])
-                    continue;
-                at[0] = i;
-                at[count] = j;
-                at[2 * count] = k;
-                ++at;
-            }
-        }
-    });
 }
 
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
@@ -272,9 +246,35 @@ void scale_along_rays(const RayScale &scale, const PictureMap &map, const Marked
 
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,
                      const float *at_columns, std::size_t count, float *values, Workers &workers) {
-    workers.run(int((count + READS_PER_TASK - 1) / READS_PER_TASK), [&](int task) {
-        const std::size_t begin = task * READS_PER_TASK, end = std::min(count, begin + READS_PER_TASK);
+    workers.run_ranges(count, READS_PER_TASK, [&](std::size_t begin, std::size_t end) {
         read_range(picture, rows, columns, at_rows, at_columns, begin, end, values);
+    });
+}
+
+void find_profile(const DepthProfile &profile, Mask voxels, const std::vector<std::size_t> &first,
+                  const SeenAt &seen_at, float *shapes, float *widths, Workers &workers) {
+    const auto read = [&](const double *picture, float *values) {
+        read_bilinearly(picture, profile.rows, profile.columns, seen_at.rows, seen_at.columns, first.back(),
+                        values, workers);
+    };
+    read(profile.middle, shapes), read(profile.width, widths);
+    const auto &[x, y, z] = profile.places;
+    const auto &d = profile.depth;
+    workers.run(voxels.n[0], [&](int i) {
+        std::size_t at = first[i];
+        if (at == first[i + 1])
+            return;
+        for (int j = 0; j < voxels.n[1]; ++j) {
+            const unsigned char *const row = voxels.row(i, j);
+            const double start = x[i] * d[0] + y[j] * d[1];
+            for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2]; ++k) {
+                if (!row[k])
+                    continue;
+                const float distance = std::abs(float(start + z[k] * d[2]) - shapes[at]);
+                shapes[at] = std::exp(-std::pow(distance / widths[at], float(profile.flatness)));
+                ++at;
+            }
+        }
     });
 }
 

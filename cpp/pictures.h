@@ -6,7 +6,6 @@
 #include "threads.h"
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
 namespace smokelift {
@@ -39,9 +38,6 @@ int first_marked(const unsigned char *row, int n);
 // The first of the marked voxels in each plane across x, and how many there are at the end.
 std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
 
-// The indices (3, count) of the marked voxels along x, y and z, in their order in memory; `first` as below.
-void find_marked(Mask voxels, const std::vector<std::size_t> &first, std::int64_t *indices, Workers &workers);
-
 // The places of the marked voxels, in their order in memory; `first` is that of count_marked().
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
                  const Places &places, Workers &workers);
@@ -72,5 +68,19 @@ void scale_along_rays(const RayScale &scale, const PictureMap &map, const Marked
 // A picture (rows, columns) read bilinearly at some places; the nearest pixel's value outside.
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,
                      const float *at_columns, std::size_t count, float *values, Workers &workers);
+
+// How likely smoke is at a voxel by its depth: exp(-(|depth - middle| / width)^flatness).
+struct DepthProfile {
+    std::array<std::vector<double>, 3> places; // of the voxels along x, y and z, m from a centre
+    std::array<double, 3> depth;               // direction
+    const double *middle, *width;              // pictures (rows, columns) of each ray's, m
+    int rows, columns;
+    double flatness;
+};
+
+// Shape and width (m) at the marked voxels in their order in memory, which the picture shows at some places;
+// `first` is that of count_marked().
+void find_profile(const DepthProfile &profile, Mask voxels, const std::vector<std::size_t> &first,
+                  const SeenAt &seen_at, float *shapes, float *widths, Workers &workers);
 
 } // namespace smokelift

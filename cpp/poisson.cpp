@@ -1,6 +1,4 @@
-#include "poisson.h"
-
-#include "axis_modes.h"
+#include "projection.h"
 
 namespace smokelift {
 namespace {

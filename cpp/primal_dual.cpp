@@ -1,4 +1,4 @@
-#include "primal_dual.h"
+#include "solvers.h"
 
 #include "vectors.h"
 

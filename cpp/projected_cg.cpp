@@ -1,4 +1,4 @@
-#include "projected_cg.h"
+#include "solvers.h"
 
 #include "spectral.h"
 #include "vectors.h"

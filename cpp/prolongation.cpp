@@ -1,4 +1,4 @@
-#include "prolongation.h"
+#include "halves.h"
 
 #include <algorithm>
 #include <vector>

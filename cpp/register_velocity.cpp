@@ -1,8 +1,6 @@
 #include "blur.h"
-#include "primal_dual.h"
-#include "projected_cg.h"
-#include "prolongation.h"
 #include "python.h"
+#include "solvers.h"
 #include "vectors.h"
 
 template <> struct pybind11::detail::type_caster<smokelift::Figures> {

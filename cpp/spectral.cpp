@@ -1,6 +1,5 @@
 #include "spectral.h"
 
-#include "axis_modes.h"
 #include "vectors.h"
 
 namespace smokelift {

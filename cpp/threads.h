@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <cstddef>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -30,6 +31,14 @@ public:
 
     // The sum of partial(0) ... partial(count - 1), added in that order whatever the number of threads.
     double sum(int count, const std::function<double(int)> &partial);
+
+    // Runs task(begin, end) on ranges of `size`, the last one shorter, that make up 0 ... count.
+    template <class Task> void run_ranges(std::size_t count, std::size_t size, const Task &task) {
+        run(int((count + size - 1) / size), [&](int range) {
+            const std::size_t begin = range * size;
+            task(begin, count - begin < size ? count : begin + size);
+        });
+    }
 
     int threads() const { return wanted_; }
 

@@ -55,9 +55,7 @@ void add(const float *__restrict a, float factor, float *__restrict out, int n) 
 SMOKELIFT_CLONES
 void multiply_by_exponential(const float *__restrict logarithm, float *__restrict out, int n) {
     for (int k = 0; k < n; ++k) {
-        const float x = logarithm[k];
-        const float less = attenuation(x < 0 ? -x : x).transmittance;
-        out[k] *= x < 0 ? less : 1 / less;
+        out[k] *= exponential(logarithm[k]);
     }
 }
 
@@ -67,12 +65,7 @@ void find_filled(In volume, int *spans, Workers &workers) {
     const auto [nx, ny, nz] = volume.n;
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         for (int j = 0; j < ny; ++j) {
-            const float *const row = volume.row(i, j);
-            int first = 0, end = nz;
-            while (first < nz && row[first] == 0)
-                ++first;
-            while (end > first && row[end - 1] == 0)
-                --end;
+            const auto [first, end] = nonzero(volume.row(i, j), nz);
             int *const span = spans + 2 * (std::size_t(i) * ny + j);
             span[0] = first, span[1] = end;
         }
@@ -90,9 +83,8 @@ void project_turned(In volume, const int *spans, const Turned &turned, float *pi
         for (int j = 0; j < ny; ++j)
             if (const int *span = spans + 2 * (std::size_t(i) * ny + j); span[0] < span[1])
                 filled.push_back({i, j, {}});
-    workers.run(int((filled.size() + columns_a_task - 1) / columns_a_task), [&](int task) {
-        const std::size_t begin = std::size_t(task) * columns_a_task;
-        for (std::size_t n = begin; n < std::min(filled.size(), begin + columns_a_task); ++n)
+    workers.run_ranges(filled.size(), columns_a_task, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
             filled[n].taps = taps_of(turned, filled[n].i, filled[n].j);
     });
     std::fill_n(picture, std::size_t(turned.columns) * nz, 0.0f);

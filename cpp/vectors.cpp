@@ -48,16 +48,14 @@ double dot(const float *a, const float *b, std::size_t n, Workers &workers) {
 }
 
 void axpy(float factor, const float *x, float *y, std::size_t n, Workers &workers) {
-    workers.run(chunks(n), [&](int c) {
-        const std::size_t start = c * chunk;
-        axpy(factor, x + start, y + start, std::min(chunk, n - start));
+    workers.run_ranges(n, chunk, [&](std::size_t begin, std::size_t end) {
+        axpy(factor, x + begin, y + begin, end - begin);
     });
 }
 
 void xpay(const float *x, float factor, float *y, std::size_t n, Workers &workers) {
-    workers.run(chunks(n), [&](int c) {
-        const std::size_t start = c * chunk;
-        xpay(x + start, factor, y + start, std::min(chunk, n - start));
+    workers.run_ranges(n, chunk, [&](std::size_t begin, std::size_t end) {
+        xpay(x + begin, factor, y + begin, end - begin);
     });
 }
 

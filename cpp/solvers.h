@@ -1,10 +1,18 @@
-// Chambolle and Pock's primal-dual splitting (2011), as in algorithm 5 of Cen, Zhang and Liang (2023).
+// Minima of the quadratic over velocities without divergence: by conjugate gradients, and by Chambolle and
+// Pock's primal-dual splitting (2011), as in algorithm 5 of Cen, Zhang and Liang (2023).
 #pragma once
 
 #include "least_squares.h"
 #include "projection.h"
 
 namespace smokelift {
+
+// Minimises the quadratic from u, which has to be free of divergence and stays so. Stops when the projected
+// gradient has fallen to `tolerance` times that of the fluid at rest, after `limit` iterations, or when
+// rounding keeps it from falling any further. `b`, the right-hand side, gives its room to the residual in the
+// meantime and is the same as before, to rounding, in the end.
+Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tolerance, int limit,
+                     const StaggeredOut &u, Workers &workers);
 
 struct PrimalDual {
     double sigma, tau, theta;  // dual step, primal step (the paper's gamma), over-relaxation
