@@ -47,13 +47,13 @@ SMOKELIFT_INLINE Span joined(const Span &a, const Span &b) {
 }
 
 // From the first to the last number of a row that is not zero.
-inline Span nonzero(const float *row, int n) {
-    int first = 0, end = n;
-    while (first < end && row[first] == 0)
+SMOKELIFT_INLINE Span nonzero(const float *row, int n) {
+    const float *first = row, *end = row + n;
+    while (first < end && *first == 0)
         ++first;
-    while (first < end && row[end - 1] == 0)
+    while (end > first && end[-1] == 0)
         --end;
-    return {first, end};
+    return {int(first - row), int(end - row)};
 }
 
 // The element of a line of n whose mirror image is at i.

@@ -31,11 +31,11 @@ from typing import Any, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float32]
+from smokelift.checks.array_types import Array, Mask
+
 Reals = npt.NDArray[np.floating[Any]]
 Integers = npt.NDArray[np.int32]
 Bytes = npt.NDArray[np.uint8]
-Mask = npt.NDArray[np.bool_]
 Faces = tuple[Reals, Reals, Reals] | list[Array]
 
 class Figures(TypedDict):
