@@ -258,7 +258,7 @@ void find_profile(const DepthProfile &profile, Mask voxels, const std::vector<st
                         values, workers);
     };
     read(profile.middle, shapes), read(profile.width, widths);
-    const auto &[x, y, z] = profile.places;
+    const std::vector<double> &x = profile.places[0], &y = profile.places[1], &z = profile.places[2];
     const auto &d = profile.depth;
     workers.run(voxels.n[0], [&](int i) {
         std::size_t at = first[i];
