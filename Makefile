@@ -95,7 +95,7 @@ $(VENV)/manual.stamp: $(VENV)/engine.stamp
 
 extension: dist/extension.stamp
 
-dist/extension.stamp: build/engine-wheels/stamp build/manual/index.html tools/build_extension.py $(wildcard tools/extension_*.py tools/bundle*.txt) blender_manifest.toml LICENSE $(wildcard addon/*.py)
+dist/extension.stamp: build/engine-wheels/stamp build/manual/index.html tools/build_extension.py $(wildcard tools/extension_*.py tools/bundle*.txt) blender_manifest.toml LICENSE $(wildcard addon/*.py addon/*/*.py)
 	$(BIN)/python tools/build_extension.py --engine-wheels build/engine-wheels $(ENGINE_WHEELS) --out dist
 	touch $@
 

@@ -1,25 +1,23 @@
 """Smokelift's Blender add-on: a clip of smoke becomes a volume in the shot.
 
-It knows nothing of the engine but its command line and its files. From what knows no Blender to the interface:
+It knows nothing of the engine but its command line and its files. Its folders import in one direction,
+``panel`` -> ``result`` -> ``scene`` -> ``core``:
 
-- Without Blender: `take` (the files of a run), `job` (the engine's process), `toml` (the text of a scene file), `pace`
-  (a speed ramp), `pictures` (a sequence with gaps), `sentences` (the engine's messages in the panel's words),
-  `contract` (what the add-on repeats of the engine).
-- Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
-  `scene_file` (Blender scene to scene file: `clip_table`, `background`, `strokes`, `mask`, `camera_table`, `box_table`
-  and `light_tables`, of a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `proxy` (what
-  viewports show of a large one), `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and
-  light that match the clip), `compositing` (smoke over the clip), `projection` (the clip's background on a card),
-  `plate` (the clean plate for these three), `instances` (the smoke at other times), `nodes` (the node groups of these),
-  `clip_pictures` (frames of the clip as files), `undistort` (the clip without its lens's distortion), `usd` (an export
-  that is imported), `follow` (paths of a .blend that is saved elsewhere).
-- Work beside Blender: `run` (the queue of takes), `side_job` (what changes no result), `shot_check` (the forecast of a
-  run), `batch` (the command line).
-- Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
-  with the sub-panels `element`, `results_panel`, `advanced_panel`, `look_panel`,
-  `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
-  `operators`, `strokes_panel`, `box`, `place` and `editors` (`needs` says when they can be pressed); `drop`, `presets`
-  and `preferences`, which Blender calls so.
+- `core`, without Blender: `take` (the files of a run), `job` (the engine's process), `sentences` (its messages in the
+  panel's words), `contract` (what the add-on repeats of it), `retiming` (a speed ramp), `image_sequence` (with gaps).
+- `scene`, Blender's data: `smoke` (the objects that hold the settings); `scene_file` (Blender scene to scene file) with
+  `clip`, `plate`, `strokes`, `mask`, `camera`, `box` and `lights`; `volume` (sequence to Volume object) with `look`
+  (its material) and `modifiers` (its proxy, and frames between two of a take); `shot_setup` (what matches the clip)
+  with `compositing` and `projection`; `nodes` (the node groups of these), `pictures` (frames of the clip as files),
+  `floor` (where smoke stands) and `blender` (what all of them ask of Blender).
+- `result`: `smoke_takes` (the takes of a smoke), `run_queue` (runs of the engine), `side_job` (work that changes no
+  result), `shot_check` (the forecast of a run), `directing` (what acts on the smoke after its clip), `export`, `follow`
+  (paths of a .blend that is saved elsewhere), `command_line`.
+- `panel`: `tab`, whose parts are `clip_panel`, `camera_panel`, `quality_panel` and `run_panel`; the sub-panels in files
+  of their names; `properties` (the settings), `layout` (what the panels share), `editors` (what is shown elsewhere in
+  Blender), and `preferences`, which Blender calls so.
+
+``batch.py`` is the command line as a script.
 """
 
 from types import ModuleType
@@ -33,7 +31,7 @@ def register() -> None:
     EngineMissingError
         If the zip is for another Blender, which its preferences show when they enable the add-on.
     """
-    from .job import require_fitting_zip
+    from .core.job import require_fitting_zip
 
     require_fitting_zip()
     for module in _modules():
@@ -48,39 +46,27 @@ def unregister() -> None:
 
 def _modules() -> tuple[ModuleType, ...]:
     """Modules with something to register, each after those it needs; panels in the order of the tab."""
-    from . import (
+    from .panel import (
         advanced_panel,
-        background,
-        batch,
-        box,
+        camera_panel,
+        clip_panel,
         direct_panel,
-        drop,
         editors,
-        element,
-        export,
-        follow,
-        instances,
+        element_panel,
+        export_panel,
         look_panel,
-        mask,
-        operators,
-        panel,
-        place,
         preferences,
-        presets,
         properties,
+        quality_panel,
         results_panel,
-        run,
+        run_panel,
         setup_panel,
-        shot_check,
-        side_job,
-        strokes_panel,
-        undistort,
-        usd,
-        volume,
+        tab,
     )
+    from .result import command_line, export, follow, run_queue, shot_check, side_job
+    from .scene import volume
 
-    data = (preferences, properties, volume, follow, shot_check, run, side_job)
-    buttons = (operators, background, mask, strokes_panel, box, place)
-    further = (editors, instances, undistort, drop, presets, usd)
-    panels = (panel, element, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
-    return (*data, *buttons, *further, *panels, batch)
+    data = (preferences, properties, volume, follow, shot_check, run_queue, side_job, export)
+    buttons = (clip_panel, camera_panel, quality_panel, run_panel, editors)
+    panels = (tab, element_panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export_panel)
+    return (*data, *buttons, *panels, command_line)

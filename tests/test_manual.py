@@ -94,7 +94,7 @@ def test_make_targets_of_a_page_exist(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_options_given_to_blender_exist(page: Path) -> None:
-    tree = ast.parse((ROOT / "addon" / "batch.py").read_text(encoding="utf-8"))
+    tree = ast.parse((ROOT / "addon" / "result" / "command_line.py").read_text(encoding="utf-8"))
     known = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     for line in commands(page, "blender"):
         _, _, ours = line.partition("smokelift reconstruct")

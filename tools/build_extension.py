@@ -165,8 +165,7 @@ def stage_add_on(product: Product, manifest: Mapping[str, Any]) -> None:
         complete |= GPU
         (stage / "__init__.py").write_text(GPU_ADD_ON, encoding="utf-8")
     else:
-        for file in sorted((ROOT / "addon").glob("*.py")):
-            shutil.copy(file, stage)
+        shutil.copytree(ROOT / "addon", stage, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
         if MANUAL.is_dir():
             shutil.copytree(MANUAL, stage / MANUAL.name, ignore=shutil.ignore_patterns("*.map", "*.gz"))
         else:

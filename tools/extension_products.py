@@ -108,7 +108,7 @@ class Product:
 
     @property
     def libraries(self) -> Path:
-        """What the engine imports from; the add-on looks for a folder of this name (addon/job.py)."""
+        """What the engine imports from; the add-on looks for a folder of this name (addon/core/job.py)."""
         return self.stage / f"python{self.python}"
 
 

@@ -18,8 +18,8 @@ import psutil
 from scipy import ndimage
 
 import addon
-from addon import proxy, volume
-from addon.take import Take
+from addon.core.take import Take
+from addon.scene import modifiers, volume
 from smokelift.output.vdb import write_proxy, write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import smoke
@@ -40,7 +40,7 @@ def main() -> None:
     addon.register()
     obj = volume.show(smoke(bpy.context.scene), take)
     for shown in (True, False):
-        proxy.modifier_of(obj).show_viewport = shown
+        modifiers.proxy_modifier(obj).show_viewport = shown
         before = psutil.Process().memory_info().rss
         seconds = [_played(obj, frame) for frame in range(1, FRAMES + 1)]
         megabytes = (psutil.Process().memory_info().rss - before) / 1e6 / FRAMES

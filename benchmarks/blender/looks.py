@@ -13,8 +13,8 @@ import bpy
 from PIL import Image
 
 import addon
-from addon import compositing, look, volume
-from addon.take import Take
+from addon.core.take import Take
+from addon.scene import compositing, look, volume
 from benchmarks.blender.pictures import beside, save
 from tests.example_shot import FULL_SIZE, set_up_example, smoke
 

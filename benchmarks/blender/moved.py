@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 from mathutils import Vector
 
-from addon import projection
+from addon.scene import projection
 from benchmarks.blender.looks import FRAME, RIM, rendered, shown_example
 from benchmarks.blender.pictures import beside, save
 from tests.example_shot import add

@@ -15,9 +15,9 @@ import bpy
 from mathutils import Vector
 
 import addon
-from addon import volume
-from addon.smoke import new_smoke
-from addon.take import Take
+from addon.core.take import Take
+from addon.scene import volume
+from addon.scene.smoke import new_smoke
 from benchmarks.blender.looks import rendered
 from benchmarks.blender.pictures import save
 from tests.example_shot import FULL_SIZE, add, add_camera, set_world

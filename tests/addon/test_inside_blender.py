@@ -1,7 +1,7 @@
 """Runs the tests of ``inside`` with the bpy of this Python, in two processes: to start one takes as long as a file.
 
 bpy is one per process and a crash of it ends the process; so it stays out of this one. A single file, or a test of
-it, is run like any other: ``pytest tests/addon/inside/volume.py -k velocity``.
+it, is run like any other: ``pytest tests/addon/inside/scene/volume.py -k velocity``.
 
 Those that reconstruct clips, simulate, export or render are left to ``make test-blender``, which runs every file in
 every bpy: they take nearly as long as half of all other tests.
@@ -16,7 +16,7 @@ import pytest
 
 INSIDE = Path(__file__).parent / "inside"
 LONG = (
-    "batch.py",
+    "command_line.py",
     "compositing.py",
     "directing.py",
     "export.py",
@@ -25,14 +25,14 @@ LONG = (
     "volume.py",
     "whole.py",
 )
-FILES = sorted({path.name for path in INSIDE.glob("*.py")} - {"conftest.py", *LONG})
+FILES = sorted(path for path in INSIDE.rglob("*.py") if path.name not in ("conftest.py", *LONG))
 SECONDS = 600
 
 
 @pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="there is no bpy for this Python")
-@pytest.mark.parametrize("names", [FILES[::2], FILES[1::2]])
-def test_inside(names) -> None:
-    files = [str(INSIDE / name) for name in names]
+@pytest.mark.parametrize("paths", [FILES[::2], FILES[1::2]])
+def test_inside(paths) -> None:
+    files = [str(path) for path in paths]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files]
     done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
     assert done.returncode == 0, done.stdout[-20_000:] + done.stderr[-2_000:]

@@ -17,7 +17,7 @@ def calls(module: str) -> list[tuple[str, ast.Call]]:
     return [(getattr(node.func, "attr", getattr(node.func, "id", "")), node) for node in found]
 
 
-@pytest.mark.parametrize("module", sorted(path.name for path in ADDON.glob("*.py")))
+@pytest.mark.parametrize("module", sorted(path.relative_to(ADDON).as_posix() for path in ADDON.rglob("*.py")))
 def test_nothing_is_filled_in_before_it_is_translated(module) -> None:
     for name, call in calls(module):
         said = [*call.args, *(keyword.value for keyword in call.keywords if keyword.arg == "text")]

@@ -82,7 +82,7 @@ class InWheel:
             archive.extractall(add_on)
         imports = [add_on.parent, add_on / f"python{self.python}"]
         environment = variables(folder, self.python) | {"PYTHONPATH": os.pathsep.join(map(str, imports))}
-        for file in sorted(ADD_ONS_TESTS.glob("*.py")):
+        for file in sorted(ADD_ONS_TESTS.rglob("*.py")):
             if file.name != "conftest.py":  # each in a process of its own, as there
                 run([*interpreter, "-m", "pytest", *pytest_words(file, folder, [*imports, ROOT])], environment)
 

@@ -12,7 +12,7 @@ import bpy
 import pytest
 
 import addon
-from addon.take import Take
+from addon.core.take import Take
 from smokelift.output.vdb import write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE, set_up_example

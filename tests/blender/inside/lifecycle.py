@@ -93,8 +93,8 @@ def batch(blend: Path, *words: str) -> list[str]:
 import sys, bpy
 bpy.ops.preferences.addon_enable(module={MODULE!r})
 bpy.ops.wm.open_mainfile(filepath={str(blend)!r})
-from {MODULE} import batch
-sys.exit(batch.main(sys.argv[1:]))
+from {MODULE}.result import command_line
+sys.exit(command_line.main(sys.argv[1:]))
 """
     return [sys.executable, "-c", start, *words]
 
@@ -131,7 +131,7 @@ def test_installs_from_disk() -> None:
 
 def doctor() -> str:
     """What the engine says of itself, started as the add-on starts it."""
-    from bl_ext.user_default.smokelift.job import engine_command
+    from bl_ext.user_default.smokelift.core.job import engine_command
 
     # it ends with its standard input, so that has to stay open
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}

@@ -1,0 +1,371 @@
+"""Runs of the engine in child processes, one after the other.
+
+The engine writes its progress to its standard output, one JSON object a line. A thread reads them, so polling never
+waits. The engine ends when its standard input closes: so a job is cancelled on every system, and ends by itself when
+Blender quits or crashes.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import platform
+import queue
+import subprocess
+import sys
+import sysconfig
+import threading
+import time
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any, Literal
+
+from .contract import BLENDERS, CANCELLED, PLATFORMS, ZIP_FILE
+from .sentences import sentence
+
+Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
+
+ENDED: tuple[Outcome, ...] = ("done", "failed", "cancelled")
+
+HOME = Path(__file__).parents[1]
+"""The extension; the one with Taichi for the GPU lies beside it."""
+
+LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
+"""Folder of an extension that the engine imports from: what is compiled is for one version of Python."""
+
+LINES_A_POLL = 500
+"""Lines read in one poll, at most, so that many lines do not delay the caller."""
+
+LONGEST_LINE = 2**20
+"""Bytes."""
+
+GRACE_SECONDS = 8.0
+"""Time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm."""
+
+DRAIN_SECONDS = 1.0
+"""Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""
+
+_START = """
+import os, runpy, sys
+
+if hasattr(os, "nice"):
+    os.nice(10)
+sys.path[:0] = sys.argv.pop(1).split(os.pathsep)
+runpy.run_module("smokelift_command.tethered", run_name="__main__", alter_sys=True)
+"""
+
+
+class EngineMissingError(RuntimeError):
+    """The engine is not installed."""
+
+
+def engine_command(arguments: Sequence[str]) -> list[str]:
+    """The command that runs the engine with this Python, isolated from the user's Python environment.
+
+    Raises
+    ------
+    EngineMissingError
+        If the engine is not installed, or another Python's.
+    """
+    require_fitting_zip()
+    shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
+    found = importlib.util.find_spec("smokelift")
+    if shipped[0].is_dir():
+        folders = [folder for folder in shipped if folder.is_dir()]
+    elif found is not None and found.origin is not None:
+        folders = [Path(found.origin).parents[1]]
+    else:
+        raise EngineMissingError("Smokelift's engine is missing: install the extension again.")
+    return [sys.executable, "-I", "-c", _START, os.pathsep.join(map(str, folders)), *arguments]
+
+
+def require_fitting_zip() -> None:
+    """Refuse the engine of a zip for another Python or another platform, which Blender installs without a word.
+
+    Raises
+    ------
+    EngineMissingError
+        With the name of the zip that fits.
+    """
+    pythons = sorted(folder.name.removeprefix("python") for folder in HOME.glob("python3.*"))
+    try:
+        manifest = tomllib.loads((HOME / "blender_manifest.toml").read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # it runs without being installed
+        manifest = {}
+    own_python = LIBRARIES.removeprefix("python")
+    system = (sys.platform, _processor())
+    own_platform = PLATFORMS.get(system, "-".join(system))
+    platforms = manifest.get("platforms", [own_platform])
+    if own_python in (pythons or [own_python]) and own_platform in platforms:
+        return
+    zip_is = " ".join([*platforms, *(f"with Python {python}" for python in pythons)])
+    this = f"{own_platform} with Python {own_python}"
+    if own_python not in BLENDERS or system not in PLATFORMS:
+        raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}, for which there is none.")
+    names = {"blenders": BLENDERS[own_python], "platform": own_platform.replace("-", "_")}
+    name = ZIP_FILE.format(version=manifest.get("version", "*"), **names)
+    raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
+
+
+def _processor() -> str:
+    """What this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own."""
+    return sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
+
+
+class Job:
+    """One run of the engine.
+
+    Parameters
+    ----------
+    command
+        What to start.
+    log
+        File to which all messages are appended.
+    before
+        Number of the clip's frames before the first of the result.
+    done
+        Frames that are finished already, which a run that is resumed counts too.
+
+    Attributes
+    ----------
+    outcome
+        Its state.
+    done, total
+        Finished frames and all frames; 0 of 0 while unknown.
+    seconds_left
+        The engine's estimate; None while unknown.
+    notes
+        The engine's assumptions and warnings, a sentence each.
+    doubts
+        Why the result may be nothing, or wrong: the notes that say so, each after the engine's name for it.
+    sentence
+        The result, or the reason of a failure.
+    details
+        The fields of the engine's "done" message.
+    status
+        The engine's exit status; None before it ends.
+    """
+
+    def __init__(self, command: Sequence[str], log: Path, before: int = 0, done: int = 0) -> None:
+        self.outcome: Outcome = "waiting"
+        self.done, self.total = done, 0
+        self.seconds_left: float | None = None
+        self.notes: list[str] = []
+        self.doubts: list[tuple[str, str]] = []
+        self.sentence = ""
+        self.details: Mapping[str, Any] = {}
+        self.status: int | None = None
+        self._command = list(command)
+        self._log_path = log
+        self._before = before
+        self._log: IO[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lines: queue.Queue[bytes | None] = queue.Queue(4 * LINES_A_POLL)
+        self._kill_at: float | None = None
+        self._output_ended = False
+        self._exited_at: float | None = None
+        self._error = ""
+
+    @property
+    def ended(self) -> bool:
+        """Whether its state is final."""
+        return self.outcome in ENDED
+
+    def start(self) -> None:
+        """Start the process; a failure to start is an outcome too."""
+        try:
+            self._log_path.parent.mkdir(parents=True, exist_ok=True)
+            self._log = self._log_path.open("ab", buffering=0)
+            self._process = subprocess.Popen(
+                self._command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                creationflags=_quiet_flags(),
+            )
+        except OSError as error:
+            self._close()
+            self.outcome, self.sentence = "failed", f"The engine could not be started: {error}."
+            return
+        self.outcome = "running"
+        assert self._process.stdout is not None
+        threading.Thread(target=_read, args=(self._process.stdout, self._lines), daemon=True).start()
+
+    def poll(self) -> bool:
+        """Read the engine's new messages, without waiting; returns whether anything changed."""
+        if self.outcome != "running":
+            return False
+        assert self._process is not None
+        changed = False
+        for _ in range(LINES_A_POLL):
+            try:
+                line = self._lines.get_nowait()
+            except queue.Empty:
+                break
+            if line is None:
+                self._output_ended = True
+                break
+            changed = self._read_line(line) or changed
+        if self._kill_at is not None and time.monotonic() > self._kill_at:
+            self._process.kill()
+        if self._process.poll() is not None:
+            self._exited_at = self._exited_at or time.monotonic()
+            if self._output_ended or (self._lines.empty() and time.monotonic() - self._exited_at > DRAIN_SECONDS):
+                self._end(self._process.returncode)
+                return True
+        return changed
+
+    def cancel(self) -> None:
+        """Ask the engine to end; finished frames stay."""
+        if self.outcome == "waiting":
+            self.outcome, self.sentence = "cancelled", "Cancelled before it began."
+        elif self.outcome == "running" and self._kill_at is None:
+            self._kill_at = time.monotonic() + GRACE_SECONDS
+            self._close_input()
+
+    def kill(self) -> None:
+        """End the engine at once; finished frames stay."""
+        self.cancel()
+        if self._process is not None and self.outcome == "running":
+            self._process.kill()
+            self._process.wait()
+            with suppress(queue.Empty):  # the reader may wait for room in the queue
+                while self._lines.get(timeout=0.2) is not None:
+                    pass
+            self._end(self._process.returncode)
+
+    def _read_line(self, line: bytes) -> bool:
+        """Handle one line; what is no message goes to the log."""
+        text = line.decode("utf-8", "replace").rstrip()
+        try:
+            message = json.loads(text)
+            event = message.pop("event")
+        except (ValueError, AttributeError, LookupError, TypeError):
+            self._write_log(text)
+            return False
+        try:
+            return self._handle(event, message)
+        except (LookupError, TypeError, ValueError):
+            self._write_log(text)
+            return False
+
+    def _handle(self, event: str, message: dict[str, Any]) -> bool:
+        match event:
+            case "note":
+                self.notes.append(sentence(message, self._before))
+                if message.get("doubt"):
+                    self.doubts.append((str(message.get("kind", "")), self.notes[-1]))
+                self._write_log(self.notes[-1])
+            case "start":
+                self.done, self.total = int(message["done"]), int(message["total"])
+                if "seconds_left" in message:
+                    self.seconds_left = float(message["seconds_left"])
+            case "frame":
+                self.done, self.total = int(message["done"]), int(message["total"])
+                self.seconds_left = float(message["seconds_left"])
+                number = self._before + int(message["frame"])
+                self._write_log(f"frame {number}: {self.done} of {self.total}")
+            case "done":
+                self.sentence, self.details = sentence(message, self._before), message
+                self._write_log(self.sentence)
+            case "error":
+                self._error = str(message["text"])
+                self._write_log(self._error)
+            case _:
+                self._write_log(json.dumps({"event": event, **message}))
+                return False
+        return True
+
+    def _end(self, status: int) -> None:
+        self.status = status
+        if status == 0:
+            self.outcome = "done"
+        elif self._kill_at is not None or status == CANCELLED:
+            self.outcome, self.sentence = "cancelled", f"Cancelled; finished frames stay: {self.done}."
+        else:
+            self.outcome = "failed"
+            self.sentence = self._error or self._failure_reason(status)
+        self._write_log(f"[{self.outcome}, status {status}]")
+        self._close()
+
+    def _failure_reason(self, status: int) -> str:
+        if status < 0 or status == 137:
+            return (
+                f"The engine was ended from outside (signal {abs(status) % 128}), perhaps for lack of memory: choose a "
+                "lower quality."
+            )
+        try:
+            lines = self._log_path.read_bytes()[-4096:].decode("utf-8", "replace").split("\n")
+        except OSError:
+            lines = []
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        return f"The engine stopped with an error of its own: {last or f'status {status}'}"
+
+    def _write_log(self, text: str) -> None:
+        if self._log is not None and text:
+            with suppress(OSError):  # the engine itself reports a full disk
+                self._log.write((text + "\n").encode("utf-8", "replace"))
+
+    def _close_input(self) -> None:
+        if self._process is not None and self._process.stdin is not None:
+            with suppress(OSError):  # it has ended already
+                self._process.stdin.close()
+
+    def _close(self) -> None:
+        self._close_input()
+        if self._log is not None:
+            self._log.close()
+            self._log = None
+
+
+class Queue:
+    """Jobs that run one after the other."""
+
+    def __init__(self) -> None:
+        self.jobs: list[Job] = []
+
+    @property
+    def current(self) -> Job | None:
+        """The job that runs, or None."""
+        return next((job for job in self.jobs if job.outcome == "running"), None)
+
+    @property
+    def ended(self) -> bool:
+        """Whether all jobs have ended."""
+        return all(job.ended for job in self.jobs)
+
+    def add(self, job: Job) -> None:
+        """Append a job."""
+        self.jobs.append(job)
+
+    def poll(self) -> list[Job]:
+        """Poll the running job and start the next, without waiting; returns the jobs that changed."""
+        changed = [job for job in self.jobs if job.poll()]
+        if self.current is None:
+            waiting = next((job for job in self.jobs if job.outcome == "waiting"), None)
+            if waiting is not None:
+                waiting.start()
+                changed.append(waiting)
+        return changed
+
+    def kill(self) -> None:
+        """End all jobs at once."""
+        for job in reversed(self.jobs):
+            job.kill()
+
+
+def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
+    with stream:
+        for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
+            lines.put(line)
+    lines.put(None)
+
+
+def _quiet_flags() -> int:
+    """Flags that give no console window and a low priority on Windows."""
+    if sys.platform == "win32":
+        return subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS
+    return 0

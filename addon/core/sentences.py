@@ -1,0 +1,105 @@
+"""What the engine says, in the panel's words where its own are those of a command line; and amounts in words."""
+
+from collections.abc import Mapping
+from typing import Any
+
+SENTENCES = {
+    "reconstructed": "Match to the clip: {psnr}. {frames} in {seconds}.",
+    "written": "{frames} in {seconds}.",
+    "continued": "{frames} in {seconds}, {simulated} of them simulated.",
+    "looped": "{frames} in {seconds}, which repeat.",
+    "proxy": "The proxy of {frames} is made.",
+    "hardly any smoke fitted": (
+        "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
+        "changes there. Hide by a Mask what is no smoke, or choose Clean Plate, Scene Lights or Smoke Material. "
+        "Report says what was assumed."
+    ),
+    "not all is smoke": (
+        "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "
+        "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
+        "Report shows what counts as smoke. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
+    ),
+    "not all may be smoke": (
+        "Some of what counts as smoke may be something else: a coarse fit leaves {error:.0%} of it unexplained. "
+        "People, leaves, labels and light that changes look like smoke, too. Hide them by a Mask, or choose a Clean "
+        "Plate."
+    ),
+    "clearest frame": (
+        "Frame {frame} shows more of the background than the others: if it is free of smoke, go to it and press Plate "
+        "from This Frame."
+    ),
+    "cut": (
+        "The picture changes at once between frames {before} and {after}, as at a cut, so no single background fits "
+        "both sides. Choose Frames {first} to {before} or {after} to {last}."
+    ),
+    "dissolving smoke": (
+        "From frame {frame} on the smoke dissolves before it reaches the end of its box, because the box cannot grow "
+        "any more. Give it more Room than {room:g}, or move the camera or lamp in its way."
+    ),
+}
+"""Sentences by kind, with the figures that the engine gives."""
+
+FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
+"""Figures that the engine counts from 0, and the panel from 1."""
+
+MATCHES = ((34.0, "very good"), (28.0, "good"), (22.0, "fair"))
+"""Words for how well smoke matches its clip, by the least PSNR inside the smoke (dB), set by hand: the difference there
+is at most 2, 4 and 8 % of the range."""
+
+POOR = "poor"
+"""The word for a PSNR below these."""
+
+OF_RESULT = ("dissolving smoke",)
+"""Sentences whose frames are counted from the first of the result, from 1."""
+
+
+def sentence(message: Mapping[str, Any], before: int = 0) -> str:
+    """A message of the engine, as the panel shows it.
+
+    Parameters
+    ----------
+    message
+        With the engine's ``text``; with its ``kind`` and ``figures`` if it has those.
+    before
+        Number of the clip's frames before the first of the result.
+    """
+    kind = message.get("kind", "")
+    words, add = SENTENCES.get(kind), before if kind in OF_RESULT else 1
+    if words is None:
+        return str(message["text"])
+    figures = dict(message["figures"])
+    figures |= {name: figures[name] + add for name in FRAME_NUMBERS if name in figures}
+    if "frames" in figures:
+        figures["frames"] = "1 frame" if figures["frames"] == 1 else f"{figures['frames']} frames"
+    if "seconds" in figures:
+        figures["seconds"] = spent(figures["seconds"])
+    if "psnr" in figures:
+        figures["psnr"] = f"{match(figures['psnr'])} ({figures['psnr']:.1f} dB)"
+    return words.format(**figures)
+
+
+def match(psnr: float) -> str:
+    """How well smoke matches its clip, in words, by the PSNR inside the smoke (dB)."""
+    return next((word for least, word in MATCHES if psnr >= least), POOR)
+
+
+def spent(seconds: float) -> str:
+    """A time that something took, in words."""
+    whole = max(1, round(seconds))
+    if whole < 60:
+        return f"{whole} s"
+    minutes, rest = divmod(whole, 60)
+    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def duration(seconds: float) -> str:
+    """A time in words, to the second below a minute and to the minute above."""
+    if seconds < 60.0:
+        return f"{max(1, round(seconds))} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def disk_size(megabytes: float) -> str:
+    """An amount of disk in words."""
+    return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"

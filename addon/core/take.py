@@ -1,0 +1,427 @@
+"""A take: the files of one run.
+
+Every take has the next free number, so no run overwrites another:
+
+    take_0003/        the sequence, written by the engine
+    take_0003.toml    its scene file
+    take_0003.json    the engine's further options, and the .blend files that may show it
+    take_0003.log     the engine's messages
+    take_0003.png     a thumbnail of the last frame, input beside reconstruction
+    take_0003_mask.png  the mask, if it was drawn in Blender
+    take_0003_mask_####.png  the same where it moves, for every frame
+
+One that is made of another take, which goes on after its clip, has another speed or repeats, has no scene file:
+
+    take_0004.json    what is done, the other take, and the engine's further options
+    take_0004.stl     the meshes that are obstacles, if there are any
+    take_0004_####.stl  the same where they move, for every frame
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from .contract import DIRECTIONS, INDEX_FILE
+
+OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance")
+"""The engine's options that a take may hold: those that decide the result."""
+
+TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
+"""What a take is called that is made of another one."""
+
+CACHED = 128
+"""Takes whose files are kept in memory: more than a list shows at once."""
+
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
+"""A number or a range of frames; never an option."""
+
+_NAME = re.compile(r"take_(\d{4,})")
+
+
+class TakeError(ValueError):
+    """A take whose files cannot be written or read; says why in one sentence."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """One run's files; ``directory`` holds its sequence."""
+
+    directory: Path
+
+    @property
+    def scene_file(self) -> Path:
+        """The scene file."""
+        return self.directory.with_suffix(".toml")
+
+    @property
+    def request_file(self) -> Path:
+        """The engine's further options."""
+        return self.directory.with_suffix(".json")
+
+    @property
+    def log_file(self) -> Path:
+        """The engine's messages."""
+        return self.directory.with_suffix(".log")
+
+    @property
+    def thumbnail_file(self) -> Path:
+        """The thumbnail of the last frame."""
+        return self.directory.with_suffix(".png")
+
+    @property
+    def mesh_file(self) -> Path:
+        """The obstacles of a take that is made of another one."""
+        return self.directory.with_suffix(".stl")
+
+    @property
+    def moving_mesh(self) -> Path:
+        """Obstacles that move: the pattern of numbered files."""
+        return self.directory.with_name(f"{self.directory.name}_####.stl")
+
+    def _moving_files(self) -> list[Path]:
+        return sorted(self.directory.parent.glob(f"{self.directory.name}_{'[0-9]' * 4}*.stl"))
+
+    def _mask_files(self) -> list[Path]:
+        return sorted(self.directory.parent.glob(f"{self.directory.name}_mask*.png"))
+
+    def keep_mask(self, drawn: Path) -> str:
+        """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
+
+        Parameters
+        ----------
+        drawn
+            A picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones.
+
+        Raises
+        ------
+        TakeError
+            If the folder cannot be written to.
+        """
+        beside = self.directory.name
+        files = sorted(drawn.parent.glob(drawn.name.replace("####", "*")))
+        self._write({self.directory.with_name(f"{beside}_{file.name}"): file.read_bytes() for file in files})
+        return f"{beside}_{drawn.name}"
+
+    def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
+        """Write the scene file from its tables, and the engine's further options.
+
+        Raises
+        ------
+        TakeError
+            If the folder cannot be written to.
+        """
+        self._write({self.scene_file: toml_text(tables).encode(), self.request_file: _request(options)})
+
+    def write_directed(
+        self, direction: str, source: Take, options: Sequence[str], meshes: Sequence[bytes] = ()
+    ) -> None:
+        """Write what is made of another take.
+
+        Parameters
+        ----------
+        direction
+            A key of `DIRECTIONS`.
+        source
+            The other take.
+        options
+            The engine's, with those of its values that are numbers.
+        meshes
+            Obstacles, as a binary STL file; one for each frame if they move.
+
+        Raises
+        ------
+        TakeError
+            If the folder cannot be written to.
+        """
+        request = _request(options, direction=direction, source=_relative_path(self.directory.parent, source.directory))
+        name = self.moving_mesh.name.replace("####", "{:04d}")
+        files = {self.directory.with_name(name.format(n)): content for n, content in enumerate(meshes)}
+        if len(meshes) == 1:
+            files = {self.mesh_file: meshes[0]}
+        self._write({**files, self.request_file: request})
+
+    def _write(self, files: Mapping[Path, bytes]) -> None:
+        try:
+            self.directory.parent.mkdir(parents=True, exist_ok=True)
+            for file, content in files.items():
+                file.write_bytes(content)
+        except OSError as error:
+            raise TakeError(
+                f"{self.directory.parent} cannot be written to ({error.strerror}): choose another output folder."
+            ) from error
+
+    def read(self) -> Snapshot:
+        """What its files say now; read again only when one of them has changed: the panel asks with every redraw."""
+        files = (self.request_file, self.directory / INDEX_FILE, self.scene_file)
+        return _snapshot_at(self, *map(_file_state, files))
+
+    def update_moved_files(self, files: Mapping[tuple[str, str], Path]) -> None:
+        """Write today's paths into its scene file for files that are not where they were: the project was moved.
+
+        Parameters
+        ----------
+        files
+            Today's path by the table it is in, and its key there.
+
+        Raises
+        ------
+        TakeError
+            If the scene file is damaged or cannot be written.
+        """
+        try:
+            tables = tomllib.loads(self.scene_file.read_text(encoding="utf-8"))
+            moved = False
+            for (table, key), path in files.items():
+                before = tables.get(table, {}).get(key)
+                if isinstance(before, str) and not self._has(before) and path.is_file():
+                    tables[table][key] = str(path)
+                    moved = True
+        except (OSError, ValueError, AttributeError) as error:
+            raise TakeError(f"{self.scene_file} is missing or damaged: make the smoke again.") from error
+        if moved:
+            self._write({self.scene_file: toml_text(tables).encode()})
+
+    def _has(self, path: str) -> bool:
+        """Whether there is a file of its scene file, or those of a pattern."""
+        file = self.directory.parent / path
+        return file.is_file() or ("#" in file.name and any(file.parent.glob(re.sub("#+", "[0-9]*", file.name))))
+
+    def arguments(self) -> list[str]:
+        """The engine's arguments, which start this take or resume it.
+
+        Raises
+        ------
+        TakeError
+            If its files are missing or damaged, or hold an option that does not decide its result.
+        """
+        now = self.read()
+        direction, source, options = now.direction, now.source, now.options
+        if options is None:
+            raise TakeError(f"{self.request_file} is missing or damaged: make the smoke again.")
+        known = OPTIONS if direction is None else DIRECTIONS[direction]
+        for word in options:
+            # the file may come with somebody else's project, and must not choose what is written where
+            if word.startswith("-") and word.partition("=")[0] not in known and not _NUMBER.fullmatch(word):
+                raise TakeError(f"{self.request_file} asks for {word!r}, which no shot does: make the smoke again.")
+        run = ["--out", str(self.directory), "--resume", "--progress", "json", *options]
+        if direction is None or source is None:
+            return ["reconstruct", str(self.scene_file), "--thumbnail", str(self.thumbnail_file), *run]
+        there = [(self.mesh_file, self.mesh_file.is_file()), (self.moving_mesh, bool(self._moving_files()))]
+        meshes = [word for mesh, is_there in there if is_there for word in ("--mesh", str(mesh))]
+        return [direction, str(source.directory), *run, *meshes]
+
+    def give_title(self, title: str) -> None:
+        """Give it a name.
+
+        Raises
+        ------
+        TakeError
+            If its files are missing or damaged, or the name cannot be written.
+        """
+        try:
+            self._change_request("title", title)
+        except (OSError, ValueError, TypeError, RecursionError) as error:
+            raise TakeError(f"{self.request_file} cannot be changed, so the result keeps its name.") from error
+
+    def note_file(self, blend: Path) -> None:
+        """Keep in mind that a .blend may show it, where it can be written; one of an earlier version knows of none."""
+        known = self.read().files
+        if known is not None and blend.resolve() not in known:
+            folder = self.directory.parent.resolve()
+            with suppress(OSError, ValueError, TypeError, RecursionError):
+                self._change_request(
+                    "files", [_relative_path(folder, file) for file in sorted({*known, blend.resolve()})]
+                )
+
+    def _change_request(self, key: str, value: Any) -> None:
+        request = json.loads(self.request_file.read_text(encoding="utf-8"))
+        self.request_file.write_text(json.dumps({**request, key: value}) + "\n", encoding="utf-8")
+
+    def size(self) -> float:
+        """Size of its sequence on the disk (MB)."""
+        try:
+            return _size_at(self.directory, self.directory.stat().st_mtime_ns)
+        except OSError:
+            return 0.0
+
+    def remove_unless_begun(self) -> None:
+        """Delete its files if the engine never wrote any."""
+        if not self.directory.exists():
+            self.remove()
+
+    def remove(self) -> None:
+        """Delete all its files."""
+        shutil.rmtree(self.directory, ignore_errors=True)
+        own = (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file)
+        for file in (*own, *self._moving_files(), *self._mask_files()):
+            file.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """What the files of a take say at one time.
+
+    Attributes
+    ----------
+    direction
+        What is done to another take, a key of `DIRECTIONS`; None of one that is made from a clip, or damaged.
+    source
+        The other take; None of one that is made from a clip, or damaged.
+    options
+        The engine's further options; None where the request is missing or damaged.
+    title
+        The name that the artist gave it, or its number.
+    index
+        The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one.
+    begun
+        Whether it has what a run needs.
+    files
+        The .blend files that may show it, without links; None of one that an earlier version made, which kept no list.
+    """
+
+    direction: str | None
+    source: Take | None
+    options: list[str] | None
+    title: str
+    index: dict[str, Any] | None
+    begun: bool
+    files: frozenset[Path] | None
+
+    @property
+    def frames(self) -> int:
+        """Number of finished frames."""
+        return len(self.index["frames"]) if self.index else 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether all frames are finished."""
+        return bool(self.index and self.index["complete"])
+
+    @property
+    def resumable(self) -> bool:
+        """Whether the run can go on: it started and is not complete."""
+        return self.begun and not self.complete
+
+
+FileState = tuple[int, int, int] | None
+"""Time, number and size of a file, by which a change is seen; None of one that is missing."""
+
+
+def _file_state(file: Path) -> FileState:
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ino, found.st_size
+
+
+@lru_cache(CACHED)
+def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, scene_state: FileState) -> Snapshot:
+    """The snapshot of a take whose files are in these states."""
+    request, index = _json(take.request_file), _json(take.directory / INDEX_FILE)
+    direction, there, options = (request.get(key) for key in ("direction", "source", "options"))
+    if not isinstance(direction, str) or direction not in DIRECTIONS:
+        direction = None
+    folder = take.directory.parent
+    source = Take(Path(os.path.normpath(folder / there))) if isinstance(there, str) else None
+    if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
+        options = None
+    number = take.directory.name.rpartition("_")[2].lstrip("0")
+    files = request.get("files")
+    return Snapshot(
+        direction=direction,
+        source=source,
+        options=None if options is None else [str(word) for word in options],
+        title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
+        index=index if "complete" in index and isinstance(index.get("frames"), dict) else None,
+        begun=request_state is not None and (direction is not None or scene_state is not None),
+        files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
+    )
+
+
+def _relative_path(folder: Path, path: Path) -> str:
+    """A path as files in a folder keep it: relative, so that a project can be moved, unless it is on another drive."""
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:
+        return str(path)
+
+
+def _request(options: Sequence[str], **further: str) -> bytes:
+    """The content of the request of a new take, which no file shows yet."""
+    return (json.dumps({**further, "options": list(options), "files": []}) + "\n").encode()
+
+
+def _json(file: Path) -> dict[str, Any]:
+    """The object in a file; nothing if that is missing or damaged."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+@lru_cache(CACHED)
+def _size_at(directory: Path, _time: int) -> float:
+    """Size of the files in a directory as of its last change (MB)."""
+    with os.scandir(directory) as files:
+        return sum(file.stat().st_size for file in files) / 1e6
+
+
+def takes(folder: Path) -> list[Take]:
+    """The takes in a folder, oldest first."""
+    return [_take(folder, number) for number in sorted(_numbers(folder))]
+
+
+def new_take(folder: Path) -> Take:
+    """The take with the next free number in a folder."""
+    return _take(folder, max(_numbers(folder), default=0) + 1)
+
+
+def _take(folder: Path, number: int) -> Take:
+    return Take(folder / f"take_{number:04d}")
+
+
+def _numbers(folder: Path) -> set[int]:
+    if not folder.is_dir():
+        return set()
+    return {int(match[1]) for path in folder.iterdir() if (match := _NAME.fullmatch(path.stem))}
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """The text of a TOML file.
+
+    Parameters
+    ----------
+    tables
+        Tables and lists of tables by name; their values are numbers, texts, or nested lists of those.
+    """
+    parts = []
+    for name, content in tables.items():
+        if isinstance(content, list):
+            parts += [_toml_table(f"[[{name}]]", table) for table in content]
+        else:
+            parts.append(_toml_table(f"[{name}]", content))
+    return "\n".join(parts)
+
+
+def _toml_table(header: str, table: Mapping[str, Any]) -> str:
+    return "\n".join([header, *(f"{key} = {_toml_value(value)}" for key, value in table.items())]) + "\n"
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML's texts are JSON's but for this
+    return repr(value)

@@ -1,0 +1,155 @@
+"""Camera, box and light in the tab; and the button that asks where the smoke stands."""
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy_extras import view3d_utils
+from mathutils import Vector
+
+from ..result import shot_check
+from ..scene.blender import ShotError
+from ..scene.box import box_of, framed_box, has_inlet, new_box
+from ..scene.floor import Floor
+from ..scene.shot_setup import show_clip_behind
+from ..scene.smoke import active_smoke
+from .clip_panel import draw_mask
+from .layout import RequiresClip, draw_automatic, draw_closed
+
+
+class SMOKELIFT_OT_make_box(bpy.types.Operator):
+    """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
+
+    bl_idname = "smokelift.make_box"
+    bl_label = "Frame Box"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if active_smoke(context.scene) is None:
+            cls.poll_message_set("Add smoke first")
+            return False
+        if context.scene.camera is None:
+            cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, smoke = context.scene, active_smoke(context.scene)
+        low, high = framed_box(scene)
+        box = box_of(smoke)
+        if box is None:
+            box = new_box()
+            scene.collection.objects.link(box)
+            smoke.smokelift.box = box
+        box.parent = None
+        box.rotation_euler = (0.0, 0.0, 0.0)
+        box.location = (low + high) / 2
+        box.scale = (high - low) / 2
+        shot_check.check_again(context)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
+    """Click in the camera's picture on the floor of the box, right below the smoke: that gives its distance"""
+
+    bl_idname = "smokelift.place"
+    bl_label = "Click Where the Smoke Stands"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        smoke = active_smoke(context.scene)
+        if smoke.smokelift.camera_mode != "SCENE" or box_of(smoke) is None:
+            cls.poll_message_set("Choose Scene Camera and make a Box first: its bottom is the floor")
+            return False
+        if context.area is None or context.area.type != "VIEW_3D":
+            cls.poll_message_set("Use the tab in a 3D View: the click is made there")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        smoke = active_smoke(context.scene)
+        try:
+            self._floor = Floor.of(smoke)
+        except ShotError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        show_clip_behind(context.scene.camera.data, smoke.smokelift.clip)
+        self._view = context.space_data.region_3d
+        self._before = self._view.view_perspective
+        self._view.view_perspective = "CAMERA"
+        context.window.cursor_modal_set("EYEDROPPER")
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type in ("ESC", "RIGHTMOUSE"):
+            self._view.view_perspective = self._before
+            return self._end(context, {"CANCELLED"})
+        if event.type == "MOUSEMOVE":
+            context.workspace.status_text_set(self._said(context, event))
+            return {"RUNNING_MODAL"}
+        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+            return {"PASS_THROUGH"}  # so that the view can be zoomed
+        try:
+            active_smoke(context.scene).smokelift.distance = self._distance(context, event)
+        except ShotError as error:
+            self.report({"ERROR"}, str(error))
+            return self._end(context, {"CANCELLED"})
+        return self._end(context, {"FINISHED"})
+
+    def _said(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
+        """What a click would mean there, for the status bar."""
+        try:
+            return rpt_("Distance: {:.3g} m").format(self._distance(context, event))
+        except ShotError as error:
+            return str(error)
+
+    def _distance(self, context: bpy.types.Context, event: bpy.types.Event) -> float:
+        """The distance of what is under the mouse; ShotError if that is not known."""
+        region = next(region for region in context.area.regions if region.type == "WINDOW")
+        x, y = event.mouse_x - region.x, event.mouse_y - region.y
+        return self._floor.clicked([_pixel_ray(region, self._view, (x, y)), _pixel_ray(region, self._view, (x, y - 1))])
+
+    def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+        shot_check.check_again(context)
+        return outcome
+
+
+def _pixel_ray(region: bpy.types.Region, view: bpy.types.RegionView3D, pixel: tuple[int, int]) -> tuple[Vector, Vector]:
+    """Origin and direction of what a pixel of a view shows."""
+    return (
+        view3d_utils.region_2d_to_origin_3d(region, view, pixel),
+        view3d_utils.region_2d_to_vector_3d(region, view, pixel),
+    )
+
+
+def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    settings = smoke.smokelift
+    row = layout.row(align=True)
+    row.prop(settings, "plate_mode")
+    row.operator("smokelift.plate_from_frame", text="", icon="IMAGE_BACKGROUND")
+    if settings.plate_mode == "FILE":
+        layout.prop(settings, "plate", text=" ")
+    elif settings.plate_mode == "FRAMES":
+        row = layout.row(align=True)
+        row.prop(settings, "plate_frames", text=" ")
+        row.operator("smokelift.clear_plate_frames", text="", icon="X")
+    draw_mask(layout, context, settings)
+    layout.prop(settings, "camera_mode")
+    if settings.camera_mode == "SCENE":
+        layout.prop(settings, "box")
+        known = box_of(smoke) is not None
+        layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
+        layout.prop(settings, "inlet")
+    row = layout.row()
+    row.active = not has_inlet(smoke)  # that says it
+    draw_automatic(row, settings, "distance").operator("smokelift.place", text="", icon="EYEDROPPER")
+    layout.prop(settings, "light_mode")
+    draw_closed(layout, settings)
+
+
+register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_make_box, SMOKELIFT_OT_place))

@@ -1,0 +1,149 @@
+"""What is shown in other editors of Blender: the log of a run, pictures, the page of what was found in the clip."""
+
+import functools
+import time
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import StringProperty
+
+from ..core.take import Take
+from ..scene.smoke import active_smoke
+from .layout import RequiresClip
+
+DRAWN_SECONDS = 0.3
+"""After which a new window has been drawn."""
+
+LONGEST_OPENING = 5.0
+"""Seconds in which a sidebar is drawn for the first time."""
+
+LOG_TEXT = "Smokelift Log"
+
+
+class SMOKELIFT_OT_open_log(bpy.types.Operator):
+    """Show the log of the run in a text editor"""
+
+    bl_idname = "smokelift.open_log"
+    bl_label = "Open Log"
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        log = Take(Path(self.take)).log_file
+        if not log.is_file():
+            self.report({"ERROR"}, rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
+            return {"CANCELLED"}
+        text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
+        text.from_string(log.read_text(encoding="utf-8", errors="replace"))
+        if not bpy.app.background:
+            space = _editor("TEXT_EDITOR").spaces.active
+            space.text, space.top = text, 0
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_show_page(RequiresClip, bpy.types.Operator):
+    """Show on a page all that was found in the clip and assumed: box and light, background, smoke, doubts"""
+
+    bl_idname = "smokelift.show_page"
+    bl_label = "Report"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        state = context.window_manager.smokelift
+        own = state.check_done and state.check_smoke == active_smoke(context.scene).session_uid
+        if not (own and state.check_page and Path(state.check_page).is_file()):
+            cls.poll_message_set("Check the shot first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        page = bpy.data.images.load(context.window_manager.smokelift.check_page, check_existing=True)
+        page.reload()
+        if not bpy.app.background:
+            show_image(page)
+        return {"FINISHED"}
+
+
+def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
+    """Show the whole of a picture in an Image Editor in a mode, so that one that is painted and one of the result stay.
+
+    To view, it is over a checker where it is transparent; to paint, it is shown without its alpha.
+    """
+    area = _editor("IMAGE_EDITOR", mode)
+    space = area.spaces.active
+    space.mode, space.image = mode, image
+    space.display_channels = "COLOR" if mode == "PAINT" else "COLOR_ALPHA"
+    bpy.app.timers.register(functools.partial(_fit, image.name), first_interval=DRAWN_SECONDS)
+    return area
+
+
+def show_mask(clip: bpy.types.MovieClip, mask: bpy.types.Mask) -> bpy.types.Area:
+    """Show a clip in a Clip Editor, with a mask to be drawn over it."""
+    area = _editor("CLIP_EDITOR")
+    space = area.spaces.active
+    space.clip, space.mode, space.mask = clip, "MASK", mask
+    bpy.app.timers.register(functools.partial(_fit_clip, area.as_pointer()), first_interval=DRAWN_SECONDS)
+    return area
+
+
+def _fit_clip(area_pointer: int) -> None:
+    """Show the whole of the clip in a Clip Editor; a timer, as in `_fit`."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.as_pointer() == area_pointer and area.type == "CLIP_EDITOR":
+                region = next(region for region in area.regions if region.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.clip.view_all(fit_view=True)
+
+
+def _fit(name: str) -> None:
+    """Show the whole of a picture in the editor that has it; a timer, as a window has no size before it is drawn."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            image = area.spaces.active.image if area.type == "IMAGE_EDITOR" else None
+            if image is not None and image.name == name:
+                region = next(region for region in area.regions if region.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.image.view_all(fit_view=True)
+
+
+def _editor(kind: str, mode: str = "") -> bpy.types.Area:
+    """An editor of a kind, and of a mode if it has some; in a window of its own if there is none."""
+    manager = bpy.context.window_manager
+    areas = [area for window in manager.windows for area in window.screen.areas]
+    fitting = (area for area in areas if area.type == kind and mode in ("", area.spaces.active.mode))
+    found = next(fitting, None)
+    if found is None:
+        with bpy.context.temp_override(window=manager.windows[0]):  # a timer has none
+            bpy.ops.wm.window_new()
+        found = manager.windows[-1].screen.areas[0]
+        found.type = kind
+    return found
+
+
+def open_tab(area: bpy.types.Area) -> None:
+    """Show the tab in the sidebar of an editor."""
+    area.spaces.active.show_region_ui = True
+    choose = functools.partial(_choose_tab, area.as_pointer(), time.monotonic() + LONGEST_OPENING)
+    bpy.app.timers.register(choose)
+
+
+def _choose_tab(area_pointer: int, end: float) -> float | None:
+    """Choose the tab in the sidebar of an area; a timer, as one that was never open has no tabs before it is drawn."""
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    area = next((area for area in areas if area.as_pointer() == area_pointer), None)
+    if area is None or time.monotonic() > end:
+        return None
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    try:
+        sidebar.active_panel_category = "Smokelift"
+    except (AttributeError, TypeError):
+        return DRAWN_SECONDS
+    area.tag_redraw()
+    return None
+
+
+register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_open_log, SMOKELIFT_OT_show_page))

@@ -1,0 +1,230 @@
+"""The sub-panel Element: the smoke of the clip with alpha, laid over another picture without being made a volume.
+
+The engine writes it as OpenEXR, premultiplied and linear. The strokes that help to tell smoke from background are
+painted in the Image Editor, whose sidebar has their colors.
+"""
+
+import shutil
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ..core.job import Job
+from ..core.take import Take
+from ..result import smoke_takes
+from ..result.side_job import Request, Writes, side_job
+from ..scene.blender import ShotError, relative
+from ..scene.clip import number_in_file, shown_frame
+from ..scene.pictures import write_pictures
+from ..scene.scene_file import footage_tables
+from ..scene.smoke import active_smoke
+from ..scene.strokes import lay_below, new_strokes, saved_strokes
+from .editors import open_tab, show_image
+from .layout import OfClip, RequiresClip, draw_work
+
+STROKES_FILE = "strokes.png"
+"""Name of the image in the folder of the smoke's results."""
+
+COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}
+"""What the engine takes the colors for."""
+
+
+class SMOKELIFT_OT_paint_strokes(RequiresClip, bpy.types.Operator):
+    """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
+
+    bl_idname = "smokelift.paint_strokes"
+    bl_label = "Paint Strokes"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke, now = active_smoke(context.scene), context.scene.frame_current
+        settings = smoke.smokelift
+        try:
+            shown_frame(smoke)
+            if settings.strokes is None:
+                settings.strokes = _strokes(smoke)
+            saved_strokes(settings.strokes, settings.clip)
+            lay_below(
+                settings.strokes, write_pictures(settings.clip, now, now, Path(bpy.app.tempdir) / "smokelift_frame_")
+            )
+        except (ShotError, RuntimeError, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if not bpy.app.background:
+            open_tab(show_image(settings.strokes, "PAINT"))
+            _choose_color(context, "SMOKE")
+        return {"FINISHED"}
+
+
+def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
+    """The strokes beside the smoke's results, or new ones there."""
+    file = smoke_takes.output_folder(smoke) / STROKES_FILE
+    if file.is_file():
+        image = bpy.data.images.load(str(file), check_existing=True)
+    else:
+        image = new_strokes(file, smoke.smokelift.clip.size)
+    image.filepath = relative(file)
+    return image
+
+
+class SMOKELIFT_OT_stroke(bpy.types.Operator):
+    """Paint in the color that says this. With Ctrl, strokes are erased"""
+
+    bl_idname = "smokelift.stroke"
+    bl_label = "Stroke"
+    bl_options = {"INTERNAL"}
+
+    means: EnumProperty(
+        name="Means",
+        description="What is painted",
+        items=[
+            ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
+            ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
+            ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
+        ],
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _choose_color(context, self.means)
+        return {"FINISHED"}
+
+
+def _choose_color(context: bpy.types.Context, means: str) -> None:
+    paint = context.tool_settings.image_paint
+    # since 5.0 each mode of painting has its own
+    unified = getattr(paint, "unified_paint_settings", None) or context.tool_settings.unified_paint_settings
+    unified.use_unified_color, unified.color, unified.secondary_color = True, COLORS[means], (0.0, 0.0, 0.0)
+
+
+class SMOKELIFT_PT_strokes(bpy.types.Panel):
+    """The panel."""
+
+    bl_label = "Smoke Strokes"
+    bl_space_type = "IMAGE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Smokelift"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        shown = context.space_data.image
+        return smoke is not None and shown is not None and shown == smoke.smokelift.strokes
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.column(align=True).operator_enum("smokelift.stroke", "means")
+        layout.operator("smokelift.paint_strokes", text="Show This Frame", icon="FILE_REFRESH")
+
+
+PICTURES = "element_####.exr"
+"""Names of the pictures, numbered as the frames of the clip's file."""
+
+SHOWN = "element.exr"
+"""The picture of a single frame that is shown."""
+
+
+def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
+    """The engine's arguments for the element of all used frames; its scene file lies among Blender's own."""
+    take = Take(Path(bpy.app.tempdir) / "smokelift_element")
+    take.write(footage_tables(smoke), [])
+    return ["extract", str(take.scene_file), "--out", str(folder / PICTURES)]
+
+
+class SMOKELIFT_OT_extract(Writes, RequiresClip, bpy.types.Operator):
+    """Show the smoke of this frame by itself, with alpha, as Render Element would write it"""
+
+    bl_idname = "smokelift.extract"
+    bl_label = "Extract"
+
+    def request(self, smoke: bpy.types.Object) -> Request:
+        folder, number = _frame_folder(), number_in_file(smoke.smokelift.clip, shown_frame(smoke))
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        return [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"], _show_frame
+
+
+def _frame_folder() -> Path:
+    """Where the picture of a single frame is written."""
+    return Path(bpy.app.tempdir) / "smokelift_element"
+
+
+def _show_frame(_smoke: bpy.types.Object, job: Job) -> None:
+    """Show the one picture; always under the same name, so that Blender keeps one of them."""
+    if job.outcome != "done":
+        return
+    (picture,) = _frame_folder().glob(PICTURES.replace("####", "*"))
+    image = bpy.data.images.load(str(picture.replace(_frame_folder() / SHOWN)), check_existing=True)
+    image.reload()
+    if not bpy.app.background:
+        show_image(image)
+
+
+class SMOKELIFT_OT_render_element(Writes, RequiresClip, bpy.types.Operator):
+    """Write the smoke of all frames by itself, with alpha, as an image sequence (OpenEXR, linear, premultiplied)"""
+
+    bl_idname = "smokelift.render_element"
+    bl_label = "Render Element"
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def request(self, smoke: bpy.types.Object) -> Request:
+        folder = Path(self.directory)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ShotError(f"{folder} cannot be written to ({error.strerror}): choose another folder.") from error
+
+        def say(_smoke: bpy.types.Object, job: Job) -> None:
+            if job.outcome == "done":
+                side_job.sentence = rpt_("The element is in {:s}.").format(str(folder))
+
+        return _extract_request(smoke, folder), say
+
+
+class _Element(OfClip):
+    bl_label = "Element"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        smoke = active_smoke(context.scene)
+        row = self.layout.row(align=True)
+        row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
+        row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
+        for operator, icon in (
+            ("smokelift.extract", "IMAGE_RGB_ALPHA"),
+            ("smokelift.render_element", "RENDER_ANIMATION"),
+        ):
+            draw_work(self.layout, context, smoke, operator, icon)
+
+
+class SMOKELIFT_PT_view_element(_Element, bpy.types.Panel):
+    """The panel in the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_element(_Element, bpy.types.Panel):
+    """The panel in the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (
+        SMOKELIFT_OT_paint_strokes,
+        SMOKELIFT_OT_stroke,
+        SMOKELIFT_PT_strokes,
+        SMOKELIFT_OT_extract,
+        SMOKELIFT_OT_render_element,
+        SMOKELIFT_PT_view_element,
+        SMOKELIFT_PT_clip_element,
+    )
+)

@@ -1,0 +1,181 @@
+"""The sub-panel Export: the settings of an export, and the buttons for that, for a proxy and for a copy in time."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+
+from ..core.job import Job
+from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
+from ..result.side_job import Request, Writes
+from ..scene import volume
+from ..scene.blender import PATH_OPTIONS
+from ..scene.smoke import active_smoke
+from .layout import OfResult, RequiresResult, draw_text, draw_work
+
+
+def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
+    size_estimate.ask(settings.id_data)
+
+
+class SmokeliftExport(bpy.types.PropertyGroup):
+    """What is exported of a smoke, on its object."""
+
+    folder: StringProperty(
+        name="Folder",
+        description="Folder for the export; by default export_ and the program's name, beside the results",
+        subtype="DIR_PATH",
+        options=PATH_OPTIONS,
+        update=_changed,
+    )
+    host: EnumProperty(
+        name="For",
+        description="Program that reads the files",
+        items=[
+            ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
+            ("houdini", "Houdini", "Y up, grids density and vel"),
+            ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
+        ],
+        update=_changed,
+    )
+    precision: EnumProperty(
+        name="Precision",
+        description="Bits of each value. Smoke too thin to be seen is left out either way",
+        items=[
+            ("half", "Half", "Floats of 16 bits"),
+            ("quantised", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
+        ],
+        update=_changed,
+    )
+    use_velocity: BoolProperty(
+        name="Velocity", description="Export the velocity, which motion blur needs", default=True, update=_changed
+    )
+    proxy: EnumProperty(
+        name="Proxy",
+        description="Second, coarser sequence for the viewports of those who get the export",
+        items=[
+            ("1", "None", "No proxy"),
+            ("2", "1/2", "Half the resolution, an eighth of the voxels"),
+            ("4", "1/4", "A quarter of the resolution"),
+        ],
+        update=_changed,
+    )
+
+
+class SMOKELIFT_OT_export(Writes, RequiresResult, bpy.types.Operator):
+    """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
+
+    bl_idname = "smokelift.export"
+    bl_label = "Export Smoke"
+
+    def request(self, smoke: bpy.types.Object) -> Request:
+        return arguments(smoke), _complete
+
+
+def _complete(smoke: bpy.types.Object, job: Job) -> None:
+    if job.outcome == "done" and smoke.smokelift_export.host == "blender":
+        write_asset(smoke, folder_of(smoke))
+
+
+class SMOKELIFT_OT_make_proxy(Writes, RequiresResult, bpy.types.Operator):
+    """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
+
+    bl_idname = "smokelift.make_proxy"
+    bl_label = "Make Proxy"
+
+    def request(self, smoke: bpy.types.Object) -> Request:
+        return ["proxy", str(volume.shown_take(smoke).directory)], _show_proxy
+
+
+def _show_proxy(smoke: bpy.types.Object, job: Job) -> None:
+    if job.outcome == "done":
+        volume.show(smoke, volume.shown_take(smoke))
+
+
+class _ExportPanel(OfResult):
+    bl_label = "Export"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        smoke = active_smoke(context.scene)
+        settings = smoke.smokelift_export
+        layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
+        for name in ("host", "precision", "use_velocity", "proxy"):
+            layout.prop(settings, name)
+        if size_estimate.smoke != smoke.session_uid:
+            size_estimate.ask(smoke)
+        elif size_estimate.size:
+            draw_text(layout, context, size_estimate.size, "DISK_DRIVE")
+        draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
+        layout.operator("smokelift.add_instance", icon="DUPLICATE")
+
+
+class SMOKELIFT_PT_view_export(_ExportPanel, bpy.types.Panel):
+    """The panel in the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_export(_ExportPanel, bpy.types.Panel):
+    """The panel in the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+class SMOKELIFT_OT_add_instance(bpy.types.Operator):
+    """Add another object that plays the active Volume's files later or earlier. The material is shared"""
+
+    bl_idname = "smokelift.add_instance"
+    bl_label = "Instance in Time"
+    bl_options = {"REGISTER", "UNDO"}
+
+    offset: IntProperty(
+        name="Time Offset", description="Frames by which the new object plays later; below 0 earlier", default=12
+    )
+    repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        obj = context.object
+        if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
+            cls.poll_message_set("Select a Volume that plays a sequence")
+            return False
+        if obj.data.animation_data is not None and obj.data.animation_data.drivers:
+            cls.poll_message_set("Set Speed to Frame by Frame first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.object
+        instance = copy_later(obj, obj.name, self.offset, self.repeat)
+        context.collection.objects.link(instance)
+        for other in context.selected_objects:
+            other.select_set(False)
+        instance.select_set(True)
+        context.view_layer.objects.active = instance
+        return {"FINISHED"}
+
+
+_CLASSES = (
+    SmokeliftExport,
+    SMOKELIFT_OT_export,
+    SMOKELIFT_OT_make_proxy,
+    SMOKELIFT_OT_add_instance,
+    SMOKELIFT_PT_view_export,
+    SMOKELIFT_PT_clip_export,
+)
+
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+
+
+def register() -> None:
+    """Register the settings, operators and panels."""
+    _register()
+    bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
+
+
+def unregister() -> None:
+    del bpy.types.Object.smokelift_export
+    _unregister()

@@ -1,0 +1,111 @@
+"""The sub-panel Look: presets, the artist's inputs of the material, and how the viewport shows the smoke."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..scene import look, volume
+from ..scene.modifiers import in_viewport, proxy_modifier
+from ..scene.smoke import is_override, smoke_with_look
+from .layout import OfResult, RequiresResult, draw_text, draw_work
+
+SHORT = {"Absorption Color": "Absorption"}
+"""Names of inputs that the sidebar would cut off."""
+
+
+class SMOKELIFT_OT_use_look(RequiresResult, bpy.types.Operator):
+    """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
+
+    bl_idname = "smokelift.use_look"
+    bl_label = "Use Look"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: EnumProperty(
+        name="Preset",
+        description="Kind of smoke",
+        items=[(key, name, description) for key, (name, description, _) in look.PRESETS.items()],
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_override(smoke_with_look(context.scene)) or super().poll(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = smoke_with_look(context.scene)
+        index = volume.shown_take(smoke).read().index
+        if index is None:
+            self.report({"ERROR"}, "The smoke's files are missing: make it again.")
+            return {"CANCELLED"}
+        if not look.use_preset(smoke, self.preset, index["scene"]["medium"]["anisotropy"]):
+            self.report({"ERROR"}, "The smoke's material is your own: remove it and show the result again for presets.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class _Look(OfResult):
+    bl_label = "Look"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_override(smoke_with_look(context.scene)) or super().poll(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        smoke = smoke_with_look(context.scene)
+        override = is_override(smoke)
+        if override:
+            layout.label(text=smoke.name, translate=False, icon="LIBRARY_DATA_OVERRIDE")
+        sockets = look.controls(smoke)
+        if sockets:
+            layout.operator_menu_enum("smokelift.use_look", "preset", text="Presets", icon="PRESET")
+        else:
+            layout.label(text="The material is your own", icon="MATERIAL")
+        if look.is_linked(smoke):
+            draw_text(layout, context, "A preset gives this override a look of its own.", "INFO")
+        else:
+            column = layout.column()
+            for socket in sockets:
+                column.prop(socket, "default_value", text=SHORT.get(socket.name, socket.name))
+        column = layout.column()
+        column.use_property_decorate = False
+        modifier = proxy_modifier(smoke)
+        if not override:
+            column.prop(in_viewport(smoke).display, "density", text="View Density")
+            _draw_render(column, context, smoke)
+        if modifier is not None:
+            column.prop(modifier, "show_viewport", text="Proxy in View", icon="NONE")
+        elif not override:
+            draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
+
+
+def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """How Cycles goes through smoke: since 5.0 by null scattering, unless it is set to march as before."""
+    cycles = getattr(context.scene, "cycles", None)
+    may_choose = hasattr(cycles, "volume_biased")
+    if may_choose:
+        column.prop(cycles, "volume_biased", text="March in Cycles")
+    row = column.row()
+    row.active = not may_choose or cycles.volume_biased
+    row.prop(smoke.data.render, "step_size", text="Render Step")
+    if may_choose and not cycles.volume_biased:
+        text = "Marching has less noise in less time, but its steps make an error."
+        draw_text(column, context, text, "INFO")
+
+
+class SMOKELIFT_PT_view_look(_Look, bpy.types.Panel):
+    """The panel in the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_look(_Look, bpy.types.Panel):
+    """The panel in the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (SMOKELIFT_OT_use_look, SMOKELIFT_PT_view_look, SMOKELIFT_PT_clip_look)
+)

@@ -1,0 +1,136 @@
+"""What a user sets once: the preferences, presets by Blender's own system, and what may be dropped into a window."""
+
+from pathlib import Path
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
+from bpy.props import EnumProperty, IntProperty, StringProperty
+
+from ..core.contract import QUALITIES
+from ..scene.blender import PACKAGE
+from ..scene.smoke import is_smoke
+from .layout import automatic_unless, draw_automatic
+
+MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
+"""The manual, which the extension brings along."""
+
+
+class SmokeliftPreferences(bpy.types.AddonPreferences):
+    """The preferences and their page."""
+
+    bl_idname = PACKAGE
+
+    output: StringProperty(
+        name="Output",
+        description="Folder in which every smoke gets one for its results; by default that is beside the .blend file",
+        subtype="DIR_PATH",
+    )
+    quality: EnumProperty(
+        name="Quality",
+        description="Quality of new smokes",
+        items=[(name, name.capitalize(), "") for name in QUALITIES],
+        default="balanced",
+    )
+    threads: IntProperty(
+        name="Threads",
+        description="Processor threads that make smoke; automatic is all, fewer leave some for Blender",
+        default=0,
+        min=0,
+        soft_max=64,
+        max=1024,
+    )
+    use_threads: automatic_unless("threads", "Threads", 1)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("output", "quality"):
+            layout.prop(self, name)
+        draw_automatic(layout, self, "threads")
+        layout.operator("smokelift.open_manual", icon="HELP")
+
+
+class SMOKELIFT_OT_open_manual(bpy.types.Operator):
+    """Open the manual in the browser; it is a part of the extension and needs no network"""
+
+    bl_idname = "smokelift.open_manual"
+    bl_label = "Manual"
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        if not MANUAL.is_file():
+            self.report({"ERROR"}, "This copy of the add-on has no manual: read docs/blender.md of the source code.")
+            return {"CANCELLED"}
+        return bpy.ops.wm.url_open(url=MANUAL.as_uri())
+
+
+FOLDER = "smokelift"
+"""Below the user's folder of presets."""
+
+SETTINGS = (
+    "quality",
+    "detail",
+    "light_mode",
+    "closed",
+    "longest_side",
+    "transfer",
+    "speed",
+    "device",
+    "use_medium",
+    "extinction",
+    "albedo",
+    "anisotropy",
+)
+"""What does not belong to one clip: no paths, no objects, no frames."""
+
+
+class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):
+    """The menu."""
+
+    bl_label = "Smoke Presets"
+    preset_subdir = FOLDER
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "smokelift.add_preset"
+
+
+class SMOKELIFT_OT_add_preset(AddPresetBase, bpy.types.Operator):
+    """Keep the settings of the active smoke as a preset, or remove one"""
+
+    bl_idname = "smokelift.add_preset"
+    bl_label = "Add Smoke Preset"
+    preset_menu = "SMOKELIFT_PT_presets"
+    preset_subdir = FOLDER
+    # a preset is a script of Blender's, which knows the active object but not this add-on
+    preset_defines = ("settings = bpy.context.object.smokelift",)
+    preset_values = tuple(f"settings.{name}" for name in SETTINGS)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not is_smoke(context.object):
+            cls.poll_message_set("Select the smoke first")
+            return False
+        return True
+
+
+def draw_header(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the menu if the smoke is the active object, which presets change."""
+    if is_smoke(context.object):
+        SMOKELIFT_PT_presets.draw_panel_header(layout)
+
+
+class SMOKELIFT_FH_video(bpy.types.FileHandler):
+    """Blender asks which one is meant, if it can do something else with such a file."""
+
+    bl_idname = "SMOKELIFT_FH_video"
+    bl_label = "Smoke from Video"
+    bl_import_operator = "smokelift.add"
+    bl_file_extensions = ";".join(sorted(bpy.path.extensions_movie))
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type in ("VIEW_3D", "CLIP_EDITOR")
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (SmokeliftPreferences, SMOKELIFT_OT_open_manual, SMOKELIFT_PT_presets, SMOKELIFT_OT_add_preset, SMOKELIFT_FH_video)
+)

@@ -1,0 +1,93 @@
+"""The tab Smokelift in the sidebar of the 3D View and of the Movie Clip Editor."""
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import StringProperty
+
+from ..result import smoke_takes
+from ..scene.smoke import activate, active_smoke, smokes
+from . import preferences
+from .camera_panel import draw_shot
+from .clip_panel import draw_clip
+from .layout import draw_text
+from .quality_panel import draw_qualities
+from .run_panel import draw_run
+
+
+class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
+    """Select this smoke, and show its settings in the tab"""
+
+    bl_idname = "smokelift.show_smoke"
+    bl_label = "Select Smoke"
+    bl_options = {"REGISTER", "UNDO"}
+
+    smoke: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        found = next((obj for obj in smokes(context.scene) if obj.name == self.smoke), None)
+        if found is None:
+            self.report({"ERROR"}, rpt_("The scene has no smoke of the name {:s}.").format(self.smoke))
+            return {"CANCELLED"}
+        activate(found, context.scene)
+        return {"FINISHED"}
+
+
+class _Main:
+    bl_label = "Smokelift"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        preferences.draw_header(self.layout, context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        smoke = active_smoke(context.scene)
+        _draw_smokes(layout, context, smoke)
+        if smoke is None:
+            draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
+            return
+        settings = smoke.smokelift
+        layout.template_ID(settings, "clip", open="clip.open")
+        if settings.clip is None:
+            return
+        draw_clip(layout, context, smoke)
+        draw_shot(layout, context, smoke)
+        draw_qualities(layout, context, smoke)
+        column = layout.column()
+        column.prop(settings, "detail")
+        row = column.row()
+        row.active = settings.detail > 0.0
+        row.prop(settings, "seed")
+        layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
+        draw_run(layout, context, smoke)
+
+
+def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active: bpy.types.Object | None) -> None:
+    """The smokes of the scene if there are several, and the button that adds one."""
+    column = layout.column(align=True)
+    found = smokes(context.scene)
+    if len(found) > 1:
+        for smoke in found:
+            row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
+            row.smoke = smoke.name
+    column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
+
+
+class SMOKELIFT_PT_view(_Main, bpy.types.Panel):
+    """The panel in the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+
+
+class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
+    """The panel in the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (SMOKELIFT_OT_show_smoke, SMOKELIFT_PT_view, SMOKELIFT_PT_clip)
+)

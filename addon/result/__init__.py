@@ -1,0 +1,1 @@
+"""Results: runs of the engine from their check to their end, what is made of a result, and how it is handed on."""

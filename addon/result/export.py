@@ -1,0 +1,158 @@
+"""Hands a smoke on: an export of its files, an asset, a copy at another time, and what an import of USD leaves out.
+
+That is the material, and the unit of the velocity. Blender keeps the time of a sequence in the Volume data-block, so
+that a copy at another time has a data-block of its own.
+"""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
+from ..core.job import EngineMissingError, Job
+from ..scene import volume
+from ..scene.blender import absolute, relative
+from ..scene.look import fit_look
+from ..scene.smoke import find_smoke
+from . import smoke_takes
+from .side_job import again, side_job
+
+REST_SECONDS = 0.4
+"""Time without a change of settings before the size is estimated."""
+
+
+class SizeEstimate:
+    """The size of the next export of a smoke; never saved."""
+
+    def __init__(self) -> None:
+        self.smoke = 0
+        self.size = ""
+
+    def ask(self, smoke: bpy.types.Object) -> None:
+        """Estimate the size once the settings rest. Drawing code may call this."""
+        if not bpy.app.background and not side_job.writing:
+            self.smoke, self.size = smoke.session_uid, ""
+            again(self.start, REST_SECONDS)
+
+    def start(self) -> None:
+        """Start the engine; a timer that runs once."""
+        smoke = find_smoke(self.smoke)
+        if smoke is None or side_job.writing or volume.shown_take(smoke) is None:
+            return
+        try:
+            side_job.start(smoke, ([*arguments(smoke), "--size"], self._keep))
+        except EngineMissingError as error:
+            self.size = str(error)
+
+    def _keep(self, _smoke: bpy.types.Object, job: Job) -> None:
+        done = job.outcome == "done"
+        self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
+
+
+size_estimate = SizeEstimate()
+
+
+def folder_of(smoke: bpy.types.Object) -> Path:
+    """The folder for the export of a smoke."""
+    chosen = smoke.smokelift_export.folder
+    return absolute(chosen) if chosen else smoke_takes.output_folder(smoke) / f"export_{smoke.smokelift_export.host}"
+
+
+def arguments(smoke: bpy.types.Object) -> list[str]:
+    """The engine's arguments for the export of the take that a smoke shows."""
+    settings, take = smoke.smokelift_export, volume.shown_take(smoke)
+    words = ["export", str(take.directory), "--out", str(folder_of(smoke))]
+    words += ["--precision", settings.precision, "--proxy", settings.proxy, "--host", settings.host]
+    return words if settings.use_velocity else [*words, "--no-velocity"]
+
+
+def megabytes(count: float) -> str:
+    """An amount of bytes in words."""
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
+
+
+def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
+    """Write a .blend beside an export with paths to the files there: the smoke as an asset."""
+    copy = copy_of(smoke, smoke.name)
+    copy.delta_location = (0.0, 0.0, 0.0)
+    copy.data.filepath = str(folder / FRAME_FILE.format(_first_frame(folder)))
+    # as it is when the asset is used; nothing of this file but its material goes with it
+    copy.location = (0.0, 0.0, 0.0)
+    copy.asset_mark()
+    copy.asset_data.description = volume.provenance_note(smoke)
+    try:
+        bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
+    finally:
+        bpy.data.volumes.remove(copy.data)  # takes the object with it
+
+
+def _first_frame(folder: Path) -> int:
+    """Number of the first frame of an export."""
+    return int(json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0])
+
+
+def copy_of(obj: bpy.types.Object, name: str) -> bpy.types.Object:
+    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made."""
+    copy = bpy.data.objects.new(name, obj.data.copy())
+    copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
+    copy.matrix_basis = obj.matrix_basis
+    return copy
+
+
+def copy_later(obj: bpy.types.Object, name: str, offset: int, repeat: bool) -> bpy.types.Object:
+    """A copy of a Volume object that plays some frames later; again and again if it repeats or the original does."""
+    copy = copy_of(obj, name)
+    if obj.data.library is not None:
+        copy.data.filepath = relative(absolute(obj.data.filepath, obj.data.library))
+    copy.data.frame_start += offset
+    copy.data.sequence_mode = "REPEAT" if repeat else obj.data.sequence_mode
+    return copy
+
+
+def complete_import(folder: Path) -> None:
+    """Give Volumes that were imported from the USD file of an export what the note beside it says.
+
+    Parameters
+    ----------
+    folder
+        Of the USD file; one without such a note changes nothing.
+    """
+    try:
+        note = json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))
+        grids, _ = note["grids"], note["medium"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return
+    for obj in bpy.data.objects:
+        if obj.type == "VOLUME" and not obj.data.materials and absolute(obj.data.filepath).parent == folder:
+            fit_look(obj, note)
+            obj.data.velocity_unit = "SECOND"
+            obj.data.velocity_grid = next((name for name in grids if name.startswith("vel")), "velocity")
+
+
+class SMOKELIFT_USD_import(getattr(bpy.types, "USDHook", object)):
+    """Completes what is imported."""
+
+    bl_idname = "smokelift.usd_import"
+    bl_label = "Smokelift"
+
+    @staticmethod
+    def on_import(context: object) -> bool:
+        complete_import(Path(context.get_stage().GetRootLayer().realPath).parent)
+        return True
+
+
+def register() -> None:
+    """Register the hook, unless USD or its module is missing: without that Blender ends when it calls a hook."""
+    if hasattr(bpy.types, "USDHook") and importlib.util.find_spec("pxr") is not None:
+        bpy.utils.register_class(SMOKELIFT_USD_import)
+
+
+def unregister() -> None:
+    """Unregister it, and the estimate that waits."""
+    if bpy.app.timers.is_registered(size_estimate.start):
+        bpy.app.timers.unregister(size_estimate.start)
+    if getattr(SMOKELIFT_USD_import, "is_registered", False):
+        bpy.utils.unregister_class(SMOKELIFT_USD_import)

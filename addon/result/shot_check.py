@@ -1,0 +1,226 @@
+"""The check of a shot before its run: the engine's forecast of time, memory and disk, and what it assumes.
+
+It starts by itself once the settings rest, and its result is shown in the panel. A shot that was checked before in this
+session is not measured anew.
+"""
+
+import hashlib
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..core.job import EngineMissingError, Job, engine_command
+from ..core.take import Take, TakeError
+from ..scene.blender import ShotError, absolute, redraw, thread_options
+from ..scene.box import box_corners, box_of
+from ..scene.clip import clip_path
+from ..scene.scene_file import options, shot_tables
+from ..scene.smoke import active_smoke, find_smoke
+
+TICKS = 4
+"""Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
+
+_known: dict[str, tuple[Mapping[str, Any], list[tuple[str, str]]]] = {}
+"""What the engine said of the shots of this session at its end, and its doubts, by their fingerprints."""
+
+WORDS = {
+    "background": "Background",
+    "scale": "Box",
+    "light": "Light",
+    "sun's direction": "Light",
+    "smoke color": "Smoke Color",
+    "axis depth": "Depth",
+}
+"""What the engine knows of a shot and the panel shows, in the panel's words; the page of the report has the rest."""
+
+
+def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
+    """What was found or assumed, in a line each that fits the sidebar.
+
+    Parameters
+    ----------
+    facts
+        The engine's, each with ``what`` it is about and its ``short`` value.
+    """
+    return [f"{WORDS[fact['what']]}: {fact['short']}" for fact in facts if fact["what"] in WORDS]
+
+
+def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
+    """Keep what each quality takes and loses.
+
+    Parameters
+    ----------
+    state
+        Of this session.
+    smoke_uid
+        The smoke that was checked.
+    details
+        What the engine says at the end of a check.
+    """
+    state.costs.clear()
+    for name, cost in details["qualities"].items():
+        row = state.costs.add()
+        row.name, row.resolution = name, cost["resolution"]
+        row.lost = -1.0 if cost["lost"] is None else cost["lost"]
+        row.seconds, row.memory, row.disk = cost["seconds"], cost["memory"] / 2**30, cost["disk"] / 1e6
+    state.costs_smoke, state.memory_free = smoke_uid, details["memory_free"] / 2**30
+
+
+class ShotCheck:
+    """The engine's check of the shot whose settings changed last; its result goes into the state of the session."""
+
+    def __init__(self) -> None:
+        self._job: Job | None = None
+        self._shot = ""
+        self._began = 0.0
+
+    @property
+    def running(self) -> bool:
+        """Whether the engine is at work on it."""
+        return self._job is not None
+
+    def kill(self) -> None:
+        """End the engine at once."""
+        if self._job is not None:
+            self._job.kill()
+            self._job = None
+
+    def poll(self, state: bpy.types.PropertyGroup) -> bool:
+        """Start the check once the settings rest, and read its result; returns whether anything changed."""
+        if state.check_ticks > 0:
+            state.check_ticks -= 1
+            if state.check_ticks > 0:
+                return False
+            self._start(state)
+            return True
+        if self._job is None:
+            return False
+        self._job.poll()
+        if not self._job.ended:
+            before, state.check_seconds = state.check_seconds, int(time.monotonic() - self._began)
+            return state.check_seconds != before
+        job, self._job = self._job, None
+        if job.outcome == "done":
+            _known[self._shot] = job.details, job.doubts
+            _keep(state, *_known[self._shot])
+        else:
+            state.check_error = job.sentence
+        return True
+
+    def _start(self, state: bpy.types.PropertyGroup) -> None:
+        self.kill()
+        smoke = find_smoke(state.check_smoke)
+        state.check_done, state.check_error, state.check_seconds = False, "", 0
+        if smoke is None:
+            return
+        folder = Path(bpy.app.tempdir)
+        try:
+            take, words = Take(folder / "smokelift_check"), options(smoke) + thread_options()
+            take.write(shot_tables(smoke, quick=True), options(smoke))
+            self._shot = _fingerprint(take.scene_file.read_bytes(), words, smoke)
+            page = folder / f"smokelift_inspect_{self._shot}.png"
+            state.check_page = str(page)
+            if self._shot in _known:
+                _keep(state, *_known[self._shot])
+                return
+            arguments = ["inspect", str(take.scene_file), "--page", str(page), "--progress", "json", *words]
+            self._job = Job(engine_command(arguments), take.log_file)
+        except (ShotError, TakeError, EngineMissingError) as error:
+            state.check_error = str(error)
+            return
+        self._began = time.monotonic()
+        self._job.start()
+
+
+def keep_doubts(owner: bpy.types.PropertyGroup, doubts: Iterable[tuple[str, str]]) -> None:
+    """Keep why a result may be wrong, as `Job` has it, in a run or in the state of the session."""
+    owner.doubts.clear()
+    for kind, words in doubts:
+        row = owner.doubts.add()
+        row.kind, row.sentence = kind, words
+
+
+def _keep(state: bpy.types.PropertyGroup, details: Mapping[str, Any], doubts: Iterable[tuple[str, str]]) -> None:
+    """Show what the engine said of the shot."""
+    state.check_done = True
+    keep_doubts(state, doubts)
+    state.notes = "\n".join(found_lines(details.get("facts", ())))
+    keep_costs(state, state.check_smoke, details)
+
+
+def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -> str:
+    """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads."""
+    settings = smoke.smokelift
+    paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]
+    if settings.strokes is not None:
+        paths.append(absolute(settings.strokes.filepath, settings.strokes.library))
+    states = [(path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None for path in paths]
+    return hashlib.sha256(tables + repr((list(words), states)).encode()).hexdigest()[:16]
+
+
+def place(smoke: bpy.types.Object) -> str:
+    """Where the corners of a smoke's box are; empty without one."""
+    box = box_of(smoke) if smoke.smokelift.camera_mode == "SCENE" else None
+    return "" if box is None else " ".join(f"{number:.5g}" for corner in box_corners(box) for number in corner)
+
+
+def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
+    """Whether the last check is of this smoke, whose box has not been moved since: Blender tells of that by drawing."""
+    return state.check_smoke == smoke.session_uid and state.check_place in ("", place(smoke))
+
+
+def check_again(context: bpy.types.Context) -> None:
+    """Forget the last check, for the shot has changed, and begin another if there is a window."""
+    _forget(context.window_manager.smokelift)
+    if not bpy.app.background and context.window is not None and bpy.ops.smokelift.check.poll():
+        bpy.ops.smokelift.check()
+
+
+def _forget(state: bpy.types.PropertyGroup) -> None:
+    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+
+
+@persistent
+def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Forget the check of a smoke whose mask was drawn on; the tab begins another when it is drawn."""
+    manager = bpy.context.window_manager
+    state = manager.smokelift
+    if not state.check_smoke or not depsgraph.id_type_updated("MASK"):
+        return
+    smoke = find_smoke(state.check_smoke)
+    mask = None if smoke is None else smoke.smokelift.drawn_mask
+    if mask is None or smoke.name not in scene.objects:
+        return
+    if any(update.id.original == mask for update in depsgraph.updates):
+        _forget(state)
+        redraw(manager)
+
+
+def check_soon(context: bpy.types.Context) -> None:
+    """Check the active smoke unless it was checked. Drawing code may call this."""
+    state, first = context.window_manager.smokelift, context.window_manager.windows[0]
+    smoke = active_smoke(context.scene)
+    known = smoke is None or is_checked(state, smoke)
+    if not known and context.window == first and not bpy.app.timers.is_registered(_start_check):
+        bpy.app.timers.register(_start_check)  # drawing code may not change data
+
+
+def _start_check() -> None:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        if bpy.ops.smokelift.check.poll():
+            bpy.ops.smokelift.check()
+
+
+def register() -> None:
+    bpy.app.handlers.depsgraph_update_post.append(_when_drawn_on)
+
+
+def unregister() -> None:
+    """End what would start a check."""
+    bpy.app.handlers.depsgraph_update_post.remove(_when_drawn_on)
+    if bpy.app.timers.is_registered(_start_check):
+        bpy.app.timers.unregister(_start_check)

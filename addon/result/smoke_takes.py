@@ -1,0 +1,239 @@
+"""The takes of a smoke: where they lie, how a new one is written, which can be resumed, deleted, and which is on show.
+
+Several .blend files may keep their takes in one folder, since one is saved as another. Every take has a list of the
+files that may show it, to which each of them adds itself when it is saved.
+"""
+
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ..core.job import ENDED, Outcome
+from ..core.take import Take, new_take, takes
+from ..scene import shot_setup, volume
+from ..scene.blender import ShotError, absolute, preferred_output_folder, relative
+from ..scene.clip import clip_path
+from ..scene.scene_file import options as engine_options
+from ..scene.scene_file import shot_tables
+from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes
+from . import directing
+
+
+def output_folder(smoke: bpy.types.Object) -> Path:
+    """The folder of a smoke's takes: the chosen one, else the one that it has, else a new one.
+
+    A new one is in that of the preferences, beside the .blend or beside the clip.
+    """
+    settings = smoke.smokelift
+    for folder in (settings.output, settings.results):
+        if folder:
+            return absolute(folder)
+    common = preferred_output_folder()
+    if common is not None:
+        return common / settings.folder
+    if bpy.data.filepath:
+        return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
+    return clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
+
+
+def own_takes(smoke: bpy.types.Object) -> list[Take]:
+    """The takes in a smoke's folder that belong to this file, oldest first.
+
+    Those are what it shows, what was made or shown in it, and what no file is known of that is there.
+    """
+    here, shown, before = _names_of_file(smoke), volume.directories_on_show(), volume.take_before(smoke)
+
+    def belongs(take: Take) -> bool:
+        files = take.read().files
+        if files is None or take == before or take.directory.resolve() in shown:
+            return True
+        return bool(files & here) or not any(file.is_file() for file in files)
+
+    return [take for take in takes(output_folder(smoke)) if belongs(take)]
+
+
+def foreign_files(smoke: bpy.types.Object, take: Take) -> list[Path] | None:
+    """Other .blend files that may show a take; None where that is unknown."""
+    files = take.read().files
+    return None if files is None else sorted(files - _names_of_file(smoke))
+
+
+def _names_of_file(smoke: bpy.types.Object) -> set[Path]:
+    """The open .blend, and what it was called when it was saved: it may have been copied or renamed."""
+    return {Path(file).resolve() for file in (bpy.data.filepath, smoke.smokelift.saved_as) if file}
+
+
+def takes_of_file() -> list[Take]:
+    """All takes that belong to this file, those of other files that it links included."""
+    with_clip = [obj for obj in bpy.data.objects if is_smoke(obj) and obj.smokelift.clip is not None]
+    own = [take for obj in with_clip for take in own_takes(obj)]
+    return [*own, *map(Take, volume.directories_on_show())]
+
+
+def write_take(smoke: bpy.types.Object) -> Take:
+    """Write the files of a new take.
+
+    Raises
+    ------
+    ShotError, TakeError
+        If the shot is unusable, or the folder cannot be written to.
+    """
+    tables = shot_tables(smoke)
+    if smoke.smokelift.camera_mode == "ESTIMATE":
+        hide_default_cube(scene_of(smoke))
+    take = _next_take(smoke)
+    if smoke.smokelift.drawn_mask is not None:
+        tables["clip"]["mask"] = take.keep_mask(Path(tables["clip"]["mask"]))
+    take.write(tables, engine_options(smoke))
+    _note_file(take)
+    return take
+
+
+def write_directed(smoke: bpy.types.Object) -> Take:
+    """Write the files of a new take that is made of the one on show.
+
+    Raises
+    ------
+    ShotError, TakeError
+        If a setting or an object cannot be used, or the folder cannot be written to.
+    """
+    source = volume.shown_take(smoke)
+    if source is None:
+        raise ShotError("Make smoke first: there is none yet to direct.")
+    if busy(bpy.context.window_manager, source):
+        raise ShotError("The result on show is still being made: wait for its end, or cancel it.")
+    direction, options, meshes = directing.engine_request(smoke)
+    take = _next_take(smoke)
+    take.write_directed(direction, source, options, meshes)
+    _note_file(take, source)
+    return take
+
+
+def _next_take(smoke: bpy.types.Object) -> Take:
+    """The take with the next free number, in a folder that the smoke keeps from now on."""
+    separate_duplicate(smoke)
+    folder = output_folder(smoke)
+    if not smoke.smokelift.output:
+        smoke.smokelift.results = relative(folder)
+    return new_take(folder)
+
+
+def _note_file(*used: Take) -> None:
+    """Keep in mind that the open .blend may show these takes; one that was never saved does so when it is."""
+    if bpy.data.filepath:
+        for take in used:
+            take.note_file(Path(bpy.data.filepath))
+
+
+def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
+    """Write today's paths of clip, mask, plate and strokes into a resumed take's scene file, if the project was moved.
+
+    Raises
+    ------
+    TakeError
+        If its files are damaged.
+    """
+    settings = smoke.smokelift
+    if take.read().direction is None:
+        files = {("clip", "path"): clip_path(settings.clip)}
+        if settings.mask:
+            files["clip", "mask"] = absolute(settings.mask)
+        if settings.plate:
+            files["background", "image"] = absolute(settings.plate)
+        if settings.strokes is not None:
+            files["background", "strokes"] = absolute(settings.strokes.filepath, settings.strokes.library)
+        take.update_moved_files(files)
+
+
+def unfinished(smoke: bpy.types.Object) -> Take | None:
+    """The take that can be resumed: the one on show, else the newest."""
+    if smoke.smokelift.clip is None:
+        return None
+    newest = own_takes(smoke)[-1:]
+    candidates = [take for take in (volume.shown_take(smoke), *newest) if take is not None]
+    return next((take for take in candidates if take.read().resumable), None)
+
+
+def present(smoke: bpy.types.Object, take: Take) -> None:
+    """Show a take's finished frames, and the camera that the engine assumed if it did."""
+    index = take.read().index
+    if volume.show(smoke, take) and index is not None:
+        shot_setup.assumed_camera(smoke, index)
+        shot_setup.follow_range(smoke)
+
+
+def choose(smoke: bpy.types.Object, take: Take) -> None:
+    """Show the take that the artist chose; a run that goes on does not take it back."""
+    present(smoke, take)
+    for row in bpy.context.window_manager.smokelift.jobs:
+        if row.smoke_uid == smoke.session_uid and row.outcome == "running":
+            row.left = row.take != str(take.directory)
+
+
+def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:
+    """Show the frames of a take while it is made, unless the artist has chosen another meanwhile.
+
+    Parameters
+    ----------
+    smoke, take
+        The smoke, and the take that is made for it.
+    before
+        What the smoke showed before; it is shown again if the run fails or is stopped. An undo may bring it back, too.
+    outcome
+        State of the run.
+    """
+    if volume.shown_take(smoke) not in (before, take):
+        return
+    stopped = outcome in ("failed", "cancelled")
+    present(smoke, before if stopped and before is not None else take)
+
+
+def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
+    """Whether a take runs or waits."""
+    return any(row.take == str(take.directory) and row.outcome not in ENDED for row in manager.smokelift.jobs)
+
+
+def earlier_takes(context: bpy.types.Context) -> list[Take]:
+    """The results of this file before the one on show that nothing needs: no Volume, no run, no other result or file.
+
+    What an earlier version of the add-on made stays too, since nothing says which files show it.
+    """
+    smoke = active_smoke(context.scene)
+    own, shown, kept = own_takes(smoke), volume.shown_take(smoke), directories_in_use(context)
+    earlier = own[: own.index(shown)] if shown in own else []
+    doomed = [take for take in earlier if take.directory.resolve() not in kept and foreign_files(smoke, take) == []]
+    while True:  # what is made of a result that goes needs nothing
+        needed = {source for take in _known_takes() if take not in doomed and (source := take.read().source)}
+        if not needed.intersection(doomed):
+            return doomed
+        doomed = [take for take in doomed if take not in needed]
+
+
+def consequences(context: bpy.types.Context, take: Take) -> list[str]:
+    """What the loss of a result would mean for other results and files, a sentence each."""
+    said = []
+    made = [other.read().title for other in _known_takes() if other.read().source == take]
+    if made:
+        said.append(rpt_("Made of it: {:s}.").format(", ".join(made)))
+    files = foreign_files(active_smoke(context.scene), take)
+    if files is None:
+        said.append(rpt_("An earlier version of Smokelift made it: other files may show it."))
+    elif files:
+        said.append(rpt_("It may be shown by {:s}.").format(", ".join(file.name for file in files)))
+    return said
+
+
+def _known_takes() -> list[Take]:
+    """All results in the folders of the file's smokes, also those of other files."""
+    found = [smoke for scene in bpy.data.scenes for smoke in smokes(scene) if smoke.smokelift.clip is not None]
+    folders = {output_folder(smoke) for smoke in found}
+    return [take for folder in folders for take in takes(folder)]
+
+
+def directories_in_use(context: bpy.types.Context) -> set[Path]:
+    """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
+    rows = context.window_manager.smokelift.jobs
+    queued = {Take(Path(row.take)) for row in rows if row.outcome not in ENDED}
+    read = {source for take in queued if (source := take.read().source) is not None}
+    return volume.directories_on_show() | {take.directory.resolve() for take in queued | read}

@@ -1,0 +1,152 @@
+"""What all parts ask of Blender: paths, frames, the user's preferences, and values that follow the newest result."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+from mathutils import Matrix
+
+PACKAGE = __package__.rpartition(".")[0]
+"""The add-on's name, under which Blender keeps its preferences."""
+
+# Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
+PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
+"""Options of properties that hold a path."""
+
+
+def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
+    """The absolute path, without the ``..`` that Blender's relative paths begin with: so it can be compared.
+
+    Parameters
+    ----------
+    path
+        As Blender keeps it; ``//`` is the folder of the .blend, or of the library.
+    library
+        The .blend that the owner of the path is linked from.
+    folder
+        Of the .blend; by default of the open one, or of the library.
+    """
+    found = bpy.path.abspath(path, start=None if folder is None else str(folder), library=library)
+    return Path(os.path.abspath(found))  # noqa: PTH100 - resolve() follows links, which Blender keeps
+
+
+def relative(path: Path, folder: Path | None = None) -> str:
+    """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute.
+
+    Parameters
+    ----------
+    path
+        Absolute.
+    folder
+        Of the .blend; by default of the open one.
+    """
+    if folder is None and not bpy.data.filepath:
+        return str(path)
+    try:
+        return bpy.path.relpath(str(path), start=None if folder is None else str(folder))
+    except ValueError:  # on another drive
+        return str(path)
+
+
+class ShotError(ValueError):
+    """A shot that the engine cannot run; says in one sentence what to do."""
+
+
+@contextmanager
+def at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
+    """The scene evaluated in a frame; restores the current frame afterwards."""
+    before, fraction = scene.frame_current, scene.frame_subframe
+    if frame != before:
+        scene.frame_set(frame)
+    try:
+        layer = scene.view_layers[0]
+        layer.update()
+        yield layer.depsgraph
+    finally:
+        if (scene.frame_current, scene.frame_subframe) != (before, fraction):
+            scene.frame_set(before, subframe=fraction)
+
+
+def frame_rate(scene: bpy.types.Scene) -> float:
+    """Frames a second of a scene."""
+    return scene.render.fps / scene.render.fps_base
+
+
+def _user_preferences() -> bpy.types.AddonPreferences | None:
+    """The user's preferences; None where the add-on runs without being installed."""
+    addon = bpy.context.preferences.addons.get(PACKAGE)
+    return addon.preferences if addon is not None else None
+
+
+def preferred_output_folder() -> Path | None:
+    """Folder in which every smoke has one for its results; None if they lie beside the .blend."""
+    user = _user_preferences()
+    return absolute(user.output) if user is not None and user.output else None
+
+
+def preferred_quality() -> str | None:
+    """Quality of new smokes; None for the usual one."""
+    user = _user_preferences()
+    return user.quality if user is not None else None
+
+
+def thread_options() -> list[str]:
+    """Options of the engine that limit its threads; they change no result."""
+    user = _user_preferences()
+    return ["--threads", str(user.threads)] if user is not None and user.threads else []
+
+
+TOLERANCE = 1e-5
+"""Difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make."""
+
+
+def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
+    """Set a value for the first time, or again if it is still as it was set last.
+
+    Parameters
+    ----------
+    owner
+        Data-block that remembers what was set, in the custom property ``smokelift_NAME``.
+    name
+        Of the value among those of the owner.
+    holder, attribute
+        Where Blender keeps the value: a number, a vector or a matrix.
+    value
+        The value.
+    """
+    before = owner.get(_property_name(name))
+    if before is None or _equal(_numbers(getattr(holder, attribute)), list(before)):
+        set_and_remember(owner, name, holder, attribute, value)
+
+
+def set_and_remember(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
+    """Set a value, whatever it is, so that it follows the newest result from now on; parameters as above."""
+    setattr(holder, attribute, value)
+    owner[_property_name(name)] = _numbers(getattr(holder, attribute))
+
+
+def _property_name(name: str) -> str:
+    return f"smokelift_{name}"
+
+
+def _numbers(value: Any) -> list[float]:
+    if isinstance(value, Matrix):
+        return [number for row in value for number in row]
+    return [float(number) for number in value] if hasattr(value, "__len__") else [float(value)]
+
+
+def _equal(found: list[float], set_last: list[float]) -> bool:
+    return len(found) == len(set_last) and all(
+        abs(a - b) <= TOLERANCE * max(1.0, abs(b)) for a, b in zip(found, set_last, strict=True)
+    )
+
+
+def redraw(manager: bpy.types.WindowManager) -> None:
+    """Redraw every area that shows the panel."""
+    for window in manager.windows:
+        for area in window.screen.areas:
+            if area.type in ("VIEW_3D", "CLIP_EDITOR"):
+                area.tag_redraw()

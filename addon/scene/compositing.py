@@ -1,0 +1,291 @@
+"""The smoke over its clip in Blender's compositor.
+
+The film is transparent. A plane below the smoke catches its shadow, and what is in the collection for holdouts hides
+the smoke. The compositor puts the render over the clean plate, adds the clip's own grain, and shows the clip in front
+of it all where a mask says so. What the artist changes of it stays.
+"""
+
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ..core.take import Take
+from .box import engine_to_world
+from .nodes import Input, feed, file_group
+from .plate import plate_image, play_beside
+from .smoke import scene_of
+
+GROUP = "Smokelift Composite"
+"""Name of the node group, and of its node in the scene's compositor."""
+
+MARK = "smokelift_composite"
+"""Custom property by which the group is known under any name."""
+
+FLOOR = "Smokelift Floor"
+"""Name of the plane that catches the shadow."""
+
+FLOOR_WIDTHS = 2.0
+"""Width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke."""
+
+_ENGINE = "smokelift_engine"
+"""Custom property of the scene: the render engine that it had before."""
+
+HOLDOUTS = "Smokelift Holdouts"
+"""Name of the collection whose objects hide the smoke, and show the plate."""
+
+GRAIN_PIXELS = 4
+"""What is finer than this is grain: the blur that separates it (pixels). Sensor noise differs from pixel to pixel."""
+
+LARGEST_DIFFERENCE = 0.05
+"""Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
+
+_INPUTS = (
+    Input("Render", "NodeSocketColor", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
+    Input(
+        "Plate",
+        "NodeSocketColor",
+        "What is behind the smoke: the clean plate, or another clip",
+        (0.0, 0.0, 0.0, 1.0),
+    ),
+    Input(
+        "Clip", "NodeSocketColor", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)
+    ),
+    Input("Foreground", "NodeSocketFloat", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
+    Input("Grain", "NodeSocketFloat", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
+)
+
+SINCE_5 = bpy.app.version >= (5, 0, 0)
+"""Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
+
+
+def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
+    """Set the compositor up for a smoke; a second time changes the plate and the clip only.
+
+    Parameters
+    ----------
+    smoke
+        Shows its take already.
+    take, index
+        The take on show, and its `sequence.json`.
+    """
+    scene = scene_of(smoke)
+    if scene.render.engine != "CYCLES":
+        scene[_ENGINE] = scene.render.engine
+        scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
+    scene.render.film_transparent = True
+    _catch_shadow(scene, smoke, index["scene"]["domain"])
+    _hold_out(scene)
+    tree, shown = compositor(scene)
+    node = tree.nodes.get(GROUP)
+    if node is None:
+        node = _insert(tree, shown)
+    elif node.mute:
+        _show(scene, node, True)
+    _connect_plate(tree, node, smoke, take, index["scene"])
+    _connect_clip(tree, node, smoke.smokelift.clip)
+
+
+def take_composite_away(scene: bpy.types.Scene) -> None:
+    """Render as if it were not there, and keep it as the artist has it until it is set up again."""
+    tree = scene.compositing_node_group if SINCE_5 else scene.node_tree
+    node = tree.nodes.get(GROUP) if tree is not None else None
+    if node is None or node.mute:
+        return
+    _show(scene, node, False)
+    scene.render.film_transparent = False
+    engine = scene.pop(_ENGINE, None)
+    if engine is not None and scene.render.engine == "CYCLES":
+        scene.render.engine = engine
+
+
+def _show(scene: bpy.types.Scene, node: bpy.types.Node, shown: bool) -> None:
+    """Switch the composite's parts on or off: a muted group shows the render."""
+    node.mute = not shown
+    floor = scene.objects.get(FLOOR)
+    if floor is not None:
+        floor.hide_viewport = floor.hide_render = not shown
+    for layer in scene.view_layers:
+        held = layer.layer_collection.children.get(HOLDOUTS)
+        if held is not None:
+            held.holdout = shown
+
+
+def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[str, Any]) -> None:
+    """A plane at the bottom of the smoke's box, unless the scene has one."""
+    if FLOOR in scene.objects:
+        return
+    low, high = Vector(domain["min"]), Vector(domain["max"])
+    half = FLOOR_WIDTHS * max(high.x - low.x, high.y - low.y) / 2
+    mesh = bpy.data.meshes.new(FLOOR)
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    plane = bpy.data.objects.new(FLOOR, mesh)
+    middle = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z))
+    plane.matrix_basis = engine_to_world(smoke) @ Matrix.Translation(middle)
+    plane.is_shadow_catcher = True
+    # the light that a floor throws back is in what was fitted already
+    plane.visible_volume_scatter = plane.visible_diffuse = plane.visible_shadow = False
+    plane.display_type = "WIRE"
+    scene.collection.objects.link(plane)
+
+
+def _hold_out(scene: bpy.types.Scene) -> None:
+    """A collection for what hides the smoke, unless the scene has one."""
+    if HOLDOUTS in scene.collection.children:
+        return
+    scene.collection.children.link(bpy.data.collections.new(HOLDOUTS))
+    name = scene.collection.children[-1].name
+    for layer in scene.view_layers:
+        layer.layer_collection.children[name].holdout = True
+
+
+def compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.NodeSocket]:
+    """The scene's compositor, made if there is none, and the socket of its output."""
+    if SINCE_5:
+        tree = scene.compositing_node_group
+        if tree is None:
+            tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
+        if not any(item.item_type == "SOCKET" and item.in_out == "OUTPUT" for item in tree.interface.items_tree):
+            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        kind, identifier = "GROUP_OUTPUT", "NodeGroupOutput"
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        kind, identifier = "COMPOSITE", "CompositorNodeComposite"
+    scene.render.use_compositing = True
+    output = next((node for node in tree.nodes if node.type == kind), None) or tree.nodes.new(identifier)
+    return tree, output.inputs[0]
+
+
+def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.Node:
+    """Put our group between the output and what it showed, or the render if it showed nothing."""
+    if shown.links:
+        render = shown.links[0].from_socket
+    else:
+        layers = next((node for node in tree.nodes if node.type == "R_LAYERS"), None)
+        layers = layers or tree.nodes.new("CompositorNodeRLayers")
+        render = layers.outputs["Image"]
+    node = tree.nodes.new("CompositorNodeGroup")
+    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, [("Image", "NodeSocketColor")], _build)
+    node.name = node.label = GROUP
+    node.width = 200.0
+    node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
+    shown.node.location = node.location + Vector((node.width + 60.0, 0.0))
+    tree.links.new(render, node.inputs["Render"])
+    tree.links.new(node.outputs[0], shown)
+    return node
+
+
+def _connect_plate(
+    tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object, take: Take, tables: dict[str, Any]
+) -> None:
+    """Feed the plate's socket, whose source has our name unless the artist put another there."""
+    background, socket = tables.get("background") or {}, node.inputs["Plate"]
+    name = f"{GROUP} Plate"
+    if socket.links and tree.nodes.get(name) is None:
+        return
+    if "image" not in background:
+        if tree.nodes.get(name) is not None:
+            tree.nodes.remove(tree.nodes[name])
+        socket.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
+        return
+    source = tree.nodes.get(name)
+    if source is None:
+        source = _source(tree, "CompositorNodeImage", name, node, -300.0, socket)
+    source.image = plate_image(take, background["image"])
+    play_beside(source.image, source, smoke.smokelift.clip, "matrices" in tables["camera"])
+
+
+def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
+    name, socket = f"{GROUP} Clip", node.inputs["Clip"]
+    source = tree.nodes.get(name)
+    if source is None:
+        if socket.links:
+            return
+        source = _source(tree, "CompositorNodeMovieClip", name, node, -600.0, socket)
+    source.clip = clip
+
+
+def _source(
+    tree: bpy.types.NodeTree, kind: str, name: str, node: bpy.types.Node, down: float, socket: bpy.types.NodeSocket
+) -> bpy.types.Node:
+    """A node of pictures that feeds a socket of ours."""
+    source = tree.nodes.new(kind)
+    source.name = source.label = name
+    source.location = node.location + Vector((-300.0, down))
+    tree.links.new(source.outputs["Image"], socket)
+    return source
+
+
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the group's nodes: the render over the plate, with the clip's grain, and the clip's foreground over both."""
+    given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    source = given.outputs
+    over = tree.nodes.new("CompositorNodeAlphaOver")
+    below, above = (over.inputs[0], over.inputs[1]) if SINCE_5 else (over.inputs[1], over.inputs[2])
+    plate, clip = _at_render_size(tree, source["Plate"]), _at_render_size(tree, source["Clip"])
+    tree.links.new(plate, below)
+    tree.links.new(source["Render"], above)
+    grain = _grain(tree, clip, plate)
+    grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], grain)
+    front = _mix(tree, "MIX", source["Foreground"], grainy, clip)
+    tree.links.new(front, output.inputs[0])
+    for place, node in enumerate(tree.nodes):
+        node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
+
+
+def _grain(tree: bpy.types.NodeTree, clip: bpy.types.NodeSocket, plate: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """The clip's own grain, frame by frame.
+
+    The plate has no grain, and the same edges as the clip: their difference less its blur is grain. Where the blurred
+    difference is large the clip shows smoke, and the grain fades out.
+    """
+    differs = _mix(tree, "SUBTRACT", 1.0, clip, plate)
+    blurred = _blurred(tree, differs)
+    fine = _mix(tree, "SUBTRACT", 1.0, differs, blurred)
+    steep = (*[1.0 / LARGEST_DIFFERENCE] * 3, 1.0)
+    ratio = _mix(tree, "MULTIPLY", 1.0, blurred, steep)
+    smoky = _mix(tree, "MULTIPLY", 1.0, ratio, ratio)
+    clear = _mix(tree, "SUBTRACT", 1.0, (1.0, 1.0, 1.0, 1.0), smoky, clamp=True)
+    return _mix(tree, "MULTIPLY", 1.0, fine, clear)
+
+
+def _at_render_size(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("CompositorNodeScale")
+    if "Type" in node.inputs:  # since 5.0
+        node.inputs["Type"].default_value = "Render Size"
+    else:
+        node.space = "RENDER_SIZE"
+    tree.links.new(picture, node.inputs["Image"])
+    return node.outputs[0]
+
+
+def _mix(
+    tree: bpy.types.NodeTree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = False
+) -> bpy.types.NodeSocket:
+    """Two pictures in one; from 0 to 1 if it is clamped."""
+    if SINCE_5:
+        node = tree.nodes.new("ShaderNodeMix")
+        node.data_type, node.clamp_factor, node.clamp_result = "RGBA", False, clamp
+        sockets = [
+            next(s for s in node.inputs if s.identifier == name) for name in ("Factor_Float", "A_Color", "B_Color")
+        ]
+        result = next(s for s in node.outputs if s.identifier == "Result_Color")
+    else:
+        node = tree.nodes.new("CompositorNodeMixRGB")
+        node.use_clamp = clamp
+        sockets, result = list(node.inputs), node.outputs[0]
+    node.blend_type = blend
+    for socket, value in zip(sockets, (factor, a, b), strict=True):
+        feed(tree, socket, value)
+    return result
+
+
+def _blurred(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("CompositorNodeBlur")
+    if "Size" in node.inputs and node.inputs["Size"].type == "VECTOR":  # since 4.5
+        node.inputs["Size"].default_value = [GRAIN_PIXELS] * len(node.inputs["Size"].default_value)
+    else:
+        node.size_x = node.size_y = GRAIN_PIXELS
+    tree.links.new(picture, node.inputs["Image"])
+    return node.outputs[0]

@@ -1,0 +1,80 @@
+"""The floor of a smoke's box as the camera shows it: where a click on it is."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+from mathutils import Matrix, Vector
+
+from .blender import ShotError, at_frame
+from .box import box_of, sides_of
+from .camera import camera_table, scene_camera
+from .clip import start_frame
+from .smoke import scene_of
+
+COARSEST = 0.08
+"""Share of the box's depth that a pixel may show where the click still tells more than the box alone, which knows the
+depth to 0.165 of its half (docs/experiments/density-axis.md)."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The floor of a smoke's box before the camera, in the engine's axes: those of the box.
+
+    Attributes
+    ----------
+    rotation
+        From the engine's axes to Blender's (3x3).
+    low, high
+        Corners of the box.
+    eye, along
+        Where the camera stands in the first frame, and the level direction in which it looks.
+    """
+
+    rotation: Matrix
+    low: Vector
+    high: Vector
+    eye: Vector
+    along: Vector
+
+    @classmethod
+    def of(cls, smoke: bpy.types.Object) -> "Floor":
+        """The floor of a smoke that has a box; ShotError if the camera cannot be used."""
+        box, scene = box_of(smoke), scene_of(smoke)
+        rotation = box.matrix_world.to_quaternion().to_matrix()
+        with at_frame(scene, start_frame(smoke.smokelift)) as depsgraph:
+            pose = Matrix(camera_table(smoke, scene_camera(scene, depsgraph), depsgraph, rotation)["matrix"])
+        up, back = Vector((0.0, 0.0, 1.0)), pose.col[2].to_3d()
+        if abs(back.z) > math.sqrt(0.5):  # as the engine takes a camera that looks steeply up or down
+            up = pose.col[1].to_3d()
+        along = (back.dot(up) * up - back).normalized()
+        return cls(rotation, *sides_of(box, rotation), pose.translation, along)
+
+    def place(self, origin: Vector, direction: Vector) -> Vector:
+        """Where a ray in Blender's world meets the floor, in the engine's axes; ShotError if it does not."""
+        start, way = self.rotation.inverted() @ origin, self.rotation.inverted() @ direction
+        steps = (self.low.z - start.z) / way.z if way.z else -1.0
+        if steps <= 0.0:
+            raise ShotError("The floor of the box is not seen there: click lower, right below the smoke.")
+        return start + steps * way
+
+    def distance(self, place: Vector) -> float:
+        """Level distance of a place from the camera, straight ahead."""
+        return (place - self.eye).dot(self.along)
+
+    def clicked(self, rays: Sequence[tuple[Vector, Vector]]) -> float:
+        """The distance of where the first of two rays, of neighboring pixels, meets the floor.
+
+        Raises
+        ------
+        ShotError
+            If that is outside the box, or so flat that a pixel more is much nearer.
+        """
+        place, beside = (self.place(*ray) for ray in rays)
+        if not all(self.low[axis] <= place[axis] <= self.high[axis] for axis in (0, 1)):
+            raise ShotError("That is outside the box: click in the box, or move the box so that it holds the smoke.")
+        depth = sum(abs(self.along[axis]) * (self.high[axis] - self.low[axis]) for axis in range(3))
+        if abs(self.distance(beside) - self.distance(place)) > COARSEST * depth:
+            raise ShotError("The camera is too near to the floor to show depth there: enter the Distance by hand.")
+        return self.distance(place)

@@ -1,0 +1,112 @@
+"""The lights in a scene file: suns, point lights, and the picture that lights the world."""
+
+import math
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ..core.contract import PANORAMA_SUFFIXES
+from .blender import ShotError, absolute
+
+
+def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> list[dict[str, Any]]:
+    """The scene's suns and point lights, and the picture that lights its world."""
+    to_engine = rotation.inverted()
+    tables = []
+    unusable = []
+    for obj in scene.objects:
+        if obj.type != "LIGHT" or obj.hide_render:
+            continue
+        light = obj.data
+        matrix = obj.evaluated_get(depsgraph).matrix_world
+        if light.type == "SUN":
+            direction = to_engine @ -matrix.to_3x3().col[2].normalized()
+            tables.append({"type": "directional", "direction": list(direction), "irradiance": sun_irradiance(light)})
+        elif light.type == "POINT":
+            position = to_engine @ matrix.translation
+            tables.append({"type": "point", "position": list(position), "intensity": point_intensity(light)})
+        else:
+            unusable.append(obj.name)
+    tables += _world_tables(scene, rotation)
+    if not tables:
+        others = f" ({', '.join(unusable)} cannot be used)" if unusable else ""
+        raise ShotError(
+            f"The scene has no sun, point light or world picture{others}: add one, or choose light From the Clip."
+        )
+    return tables
+
+
+def sun_irradiance(light: bpy.types.Light) -> list[float]:
+    """Irradiance (W/m^2) of a sun, red, green and blue: Blender's strength."""
+    return [light.energy * part for part in _emitted(light)]
+
+
+def point_intensity(light: bpy.types.Light) -> list[float]:
+    """Intensity (W/sr) of a point light, red, green and blue: its power over the sphere's 4 pi."""
+    return [light.energy * part / (4 * math.pi) for part in _emitted(light)]
+
+
+def _emitted(light: bpy.types.Light) -> list[float]:
+    """Strength in red, green and blue. Older versions of Blender lack exposure and temperature."""
+    factor = 2.0 ** getattr(light, "exposure", 0.0)
+    warmth = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
+    return [factor * a * b for a, b in zip(light.color, warmth, strict=True)]
+
+
+def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, Any]]:
+    """The equirectangular picture of the world's background, if there is one.
+
+    Blender rotates a direction before it reads the picture; a rotated box adds its own rotation.
+    """
+    world = scene.world
+    if world is None or world.node_tree is None:
+        return []
+    backgrounds = [node for node in world.node_tree.nodes if node.type == "BACKGROUND"]
+    for node in backgrounds:
+        links = node.inputs["Color"].links
+        source = links[0].from_node if links else None
+        strength = node.inputs["Strength"].default_value
+        if source is None or source.type != "TEX_ENVIRONMENT" or source.image is None or strength == 0.0:
+            continue
+        path = absolute(source.image.filepath, source.image.library)
+        if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in PANORAMA_SUFFIXES:
+            raise ShotError(
+                f"The world's picture {source.image.name} cannot be used: it has to be an .exr or .hdr panorama."
+            )
+        if not path.is_file():
+            raise ShotError(f"The world's picture {path} is not there: choose it again, or unpack it.")
+        yaw, tilt = _yaw(_mapping(source) @ rotation)
+        if tilt > 1e-3:
+            raise ShotError("The box is tilted against the world's picture: stand it upright, or choose other lights.")
+        return [
+            {"type": "environment", "image": str(path), "rotation_degrees": math.degrees(yaw), "strength": strength}
+        ]
+    return []
+
+
+def _mapping(texture: bpy.types.ShaderNode) -> Matrix:
+    """Rotation (3x3) of a texture's Mapping node."""
+    links = texture.inputs["Vector"].links
+    node = links[0].from_node if links else None
+    if node is None or node.type != "MAPPING":
+        return Matrix.Identity(3)
+    rotation = node.inputs["Rotation"].default_value.to_matrix()
+    return rotation.inverted() if node.vector_type == "TEXTURE" else rotation
+
+
+def _yaw(rotation: Matrix) -> tuple[float, float]:
+    """Angle of a rotation about Z, and the tilt of Z (radians)."""
+    up = rotation @ Vector((0.0, 0.0, 1.0))
+    return math.atan2(rotation[1][0], rotation[0][0]), up.angle(Vector((0.0, 0.0, 1.0)))
+
+
+def require_lights_outside(tables: dict[str, Any]) -> None:
+    """Refuse a point light inside the box."""
+    domain = tables.get("domain")
+    for light in tables["lights"]:
+        if domain is None or light["type"] != "point":
+            continue
+        sides = zip(domain["min"], light["position"], domain["max"], strict=True)
+        if all(low <= place <= high for low, place, high in sides):
+            raise ShotError("A point light is inside the box: move it out, or hide it from renders.")

@@ -1,0 +1,336 @@
+"""How smoke looks: a material with one node group, whose inputs are what the clip says and what the artist likes.
+
+What was fitted to the clip (extinction, albedo, anisotropy) follows the newest result; what the artist sets
+(density, brightness, colors, edges) is never touched by a run.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from .blender import set_and_remember, set_unless_changed
+from .nodes import Input, add_node, file_group
+
+NODE = "Smokelift"
+"""Name of the node that holds the values; a material without it is the artist's own."""
+
+GROUP = "Smokelift Look"
+"""Name of the node group."""
+
+MARK = "smokelift_look"
+"""Custom property by which the group is known under any name."""
+
+BLACKBODY_KELVIN = 1000.0
+"""Temperature that a grid's value of 1 stands for; that of Blender's Principled Volume."""
+
+MIN_RATIO = 1e-3
+"""Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Values of the inputs that belong to the artist; as in the clip by default.
+
+    ``anisotropy`` is the fitted one where it is None.
+    """
+
+    density: float = 1.0
+    brightness: float = 1.0
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    edge_contrast: float = 1.0
+    absorption_color: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    evaporation: float = 0.0
+    anisotropy: float | None = None
+
+    def inputs(self) -> dict[str, Any]:
+        """Values by name of the input."""
+        values = {
+            "Density": self.density,
+            "Brightness": self.brightness,
+            "Color": (*self.color, 1.0),
+            "Edge Contrast": self.edge_contrast,
+            "Absorption Color": (*self.absorption_color, 1.0),
+            "Evaporation": self.evaporation,
+        }
+        return values if self.anisotropy is None else values | {"Anisotropy": self.anisotropy}
+
+
+# Steam and mist are droplets of water, which absorb no light. One droplet scatters it forward (anisotropy about 0.85);
+# many make it lose its direction, and a render that follows it to the first one only would show them black: with 0.25
+# the lamp behind the camera gives half as much light as with 0, and the lamp before it twice as much. Steam is dense
+# where it comes out, and dry air takes it away as it rises, from its edges inwards.
+PRESETS = {
+    "SMOKE": ("Smoke", "As in the clip", Look()),
+    "STEAM": (
+        "Steam",
+        "White where it comes out, dries up as it rises, bright against the light",
+        Look(density=1.2, brightness=100.0, edge_contrast=1.3, evaporation=3.0, anisotropy=0.25),
+    ),
+    "SOOT": ("Soot", "Black and thick", Look(density=2.5, color=(0.05, 0.045, 0.04))),
+    "DUST": (
+        "Dust",
+        "The color of sand, which reddens the light that passes through",
+        Look(density=1.2, color=(0.7, 0.55, 0.4), edge_contrast=1.4, absorption_color=(0.25, 0.1, 0.03)),
+    ),
+    "MIST": (
+        "Mist",
+        "White, thin and without edges",
+        Look(density=0.3, brightness=100.0, edge_contrast=0.3, anisotropy=0.25),
+    ),
+}
+"""Name, description and look of each preset."""
+
+CONTROLS = (*Look().inputs(), "Anisotropy")
+"""Names of the inputs that the tab shows."""
+
+_INPUTS = (
+    Input("Density", "NodeSocketFloat", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
+    Input(
+        "Brightness",
+        "NodeSocketFloat",
+        "Below 1 darker; above 1 the share of light that the smoke absorbs is divided by this",
+        1.0,
+        0.0,
+        1e3,
+    ),
+    Input("Color", "NodeSocketColor", "Times the albedo: the color of the smoke in white light", (1.0, 1.0, 1.0, 1.0)),
+    Input("Edge Contrast", "NodeSocketFloat", "Above 1 thin smoke gets thinner, below 1 thicker", 1.0, 0.0, 10.0),
+    Input(
+        "Absorption Color", "NodeSocketColor", "Color of the light that gets through the smoke", (0.0, 0.0, 0.0, 1.0)
+    ),
+    Input(
+        "Evaporation",
+        "NodeSocketFloat",
+        "Smoke that is gone at the top of the clip's box, in Edge Densities: the higher it is the more of it, from its "
+        "edges inwards",
+        0.0,
+        0.0,
+        1e3,
+    ),
+    Input("Anisotropy", "NodeSocketFloat", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
+    Input("Extinction", "NodeSocketFloat", "Per meter of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
+    Input("Albedo", "NodeSocketColor", "Scattered share of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
+    Input(
+        "Edge Density",
+        "NodeSocketFloat",
+        "Density below which smoke counts as thin: where Edge Contrast changes it",
+        0.1,
+        1e-9,
+        1e9,
+    ),
+    Input("Floor", "NodeSocketFloat", "Height in the smoke where evaporation begins; fitted", 0.0, -1e6, 1e6),
+    Input("Height", "NodeSocketFloat", "From there to where all of it counts; fitted", 1.0, 1e-6, 1e6),
+    Input(
+        "Flame Strength",
+        "NodeSocketFloat",
+        "Times the light of the grid flame, if there is one; 1 is as bright as in the clip",
+        1.0,
+        0.0,
+        1e6,
+    ),
+    Input(
+        "Flame Color",
+        "NodeSocketColor",
+        "Color of the light of the grid flame; fitted to the clip",
+        (1.0, 0.35, 0.08, 1.0),
+    ),
+    Input("Blackbody Intensity", "NodeSocketFloat", "Glow of the grid temperature, if there is one", 1.0, 0.0, 1.0),
+    Input(
+        "Temperature",
+        "NodeSocketFloat",
+        "Kelvin that a value of 1 in the grid temperature stands for",
+        BLACKBODY_KELVIN,
+        0.0,
+        1e5,
+    ),
+)
+
+
+def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
+    """Give a smoke a material of what was fitted to the clip.
+
+    Parameters
+    ----------
+    smoke
+        Its Volume gets a material if it has none; of one that has no node of ours, nothing is changed.
+    scene
+        Tables of a take's scene: its medium and its domain.
+    """
+    volume = smoke.data
+    if not volume.materials or volume.materials[0] is None:
+        volume.materials.clear()
+        volume.materials.append(_new_material(volume.name))
+    material, node = material_of(smoke), node_of(smoke)
+    if node is None:
+        return
+    medium, domain = scene["medium"], scene["domain"]
+    width = min(high - low for low, high in zip(domain["min"], domain["max"], strict=True))
+    fitted = {
+        "Extinction": medium["extinction"],
+        "Albedo": (*[medium["albedo"] * share for share in medium["color"]], 1.0),
+        "Anisotropy": medium["anisotropy"],
+        # smoke that could fill the box and would still let 1/e of the light through
+        "Edge Density": 1.0 / (medium["extinction"] * width),
+        "Floor": domain["min"][2],
+        "Height": domain["max"][2] - domain["min"][2],
+    }
+    if "flame_color" in medium:
+        fitted["Flame Color"] = (*medium["flame_color"], 1.0)
+    for name, value in fitted.items():
+        if name in node.inputs:  # a file's own node group may be older
+            set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
+
+
+def material_of(smoke: bpy.types.Object) -> bpy.types.Material | None:
+    """The material that a smoke is rendered with: its Volume's, or one of the object's own."""
+    return smoke.material_slots[0].material if smoke.material_slots else None
+
+
+def node_of(smoke: bpy.types.Object) -> bpy.types.ShaderNode | None:
+    """The node with the values of a smoke; None if its material is the artist's own."""
+    material = material_of(smoke)
+    node = material.node_tree.nodes.get(NODE) if material is not None and material.node_tree else None
+    return node if node is not None and node.type == "GROUP" else None
+
+
+def is_linked(smoke: bpy.types.Object) -> bool:
+    """Whether the material of a smoke belongs to another file, and cannot be changed in this one."""
+    material = material_of(smoke)
+    return material is not None and material.library is not None
+
+
+def controls(smoke: bpy.types.Object) -> list[bpy.types.NodeSocket]:
+    """What the tab shows of a smoke's look: inputs that no other node feeds."""
+    node = node_of(smoke)
+    found = [node.inputs.get(name) for name in CONTROLS] if node is not None else []
+    return [socket for socket in found if socket is not None and not socket.is_linked]
+
+
+def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> bool:
+    """Set the artist's inputs to a preset's; returns whether the material has them.
+
+    A material of another file is copied to the object first.
+    """
+    if node_of(smoke) is None:
+        return False
+    if is_linked(smoke):
+        own = material_of(smoke).copy()
+        smoke.material_slots[0].link = "OBJECT"
+        smoke.material_slots[0].material = own
+    node = node_of(smoke)
+    socket = node.inputs["Anisotropy"]
+    set_and_remember(material_of(smoke), _key(socket.name), socket, "default_value", fitted_anisotropy)
+    for key, value in PRESETS[name][2].inputs().items():
+        if key in node.inputs:
+            node.inputs[key].default_value = value
+    return True
+
+
+def _key(name: str) -> str:
+    return name.lower().replace(" ", "_")
+
+
+def _new_material(name: str) -> bpy.types.Material:
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # since 5.0 there always is one
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    node = _add_group(tree)
+    node.name = node.label = NODE
+    node.location = (-300.0, 0.0)
+    tree.links.new(node.outputs[0], output.inputs["Volume"])
+    return material
+
+
+def _add_group(tree: bpy.types.NodeTree) -> bpy.types.ShaderNode:
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")], _build)
+    node.width = 220.0
+    return node
+
+
+class _Formulas:
+    """Adds nodes that compute, at places (column, row), and gives their results."""
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self._tree = tree
+
+    def grid(self, name: str, row: int) -> bpy.types.NodeSocket:
+        """The values of a grid of the Volume; 0 where it has none of that name."""
+        return add_node(self._tree, "ShaderNodeAttribute", 0, row, attribute_name=name).outputs["Fac"]
+
+    def height(self, column: int, row: int) -> bpy.types.NodeSocket:
+        """The height in the smoke's own space."""
+        place = add_node(self._tree, "ShaderNodeTexCoord", column, row).outputs["Object"]
+        return add_node(self._tree, "ShaderNodeSeparateXYZ", column, row + 1, place).outputs["Z"]
+
+    def math(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """A number of two numbers."""
+        return add_node(self._tree, "ShaderNodeMath", column, row, a, b, operation=operation).outputs[0]
+
+    def vector(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """A vector of two vectors."""
+        node = add_node(self._tree, "ShaderNodeVectorMath", column, row, a, b, operation=operation)
+        return node.outputs["Vector"]
+
+    def scaled(self, column: int, row: int, a: Any, factor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        """A vector times a number."""
+        node = add_node(self._tree, "ShaderNodeVectorMath", column, row, a, operation="SCALE")
+        self._tree.links.new(factor, node.inputs["Scale"])
+        return node.outputs["Vector"]
+
+
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the group's nodes."""
+    given = tree.nodes.new("NodeGroupInput")
+    given.location = (-200.0, -600.0)
+    source, formulas = given.outputs, _Formulas(tree)
+    feeds = {
+        "Density": _extinction(formulas, source),
+        "Color": _albedo(formulas, source),
+        "Absorption Color": source["Absorption Color"],
+        "Anisotropy": source["Anisotropy"],
+        "Emission Strength": formulas.math("MULTIPLY", 1, 7, formulas.grid("flame", 7), source["Flame Strength"]),
+        "Emission Color": source["Flame Color"],
+        "Blackbody Intensity": source["Blackbody Intensity"],
+        "Temperature": formulas.math("MULTIPLY", 1, 8, formulas.grid("temperature", 8), source["Temperature"]),
+    }
+    shader = add_node(tree, "ShaderNodeVolumePrincipled", 6, 0)
+    for name in ("Density Attribute", "Color Attribute", "Temperature Attribute"):
+        shader.inputs[name].default_value = ""
+    for name, socket in feeds.items():
+        tree.links.new(socket, shader.inputs[name])
+    add_node(tree, "NodeGroupOutput", 8, 0, shader.outputs[0])
+
+
+def _extinction(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+    """The extinction times density x min(density / edge density, 1) ^ (edge contrast - 1), of what is not dried up."""
+    density = _remaining(formulas, source)
+    ratio = formulas.math("DIVIDE", 1, 0, density, source["Edge Density"])
+    thin = formulas.math("MAXIMUM", 2, 0, formulas.math("MINIMUM", 1, 1, ratio, 1.0), MIN_RATIO)
+    exponent = formulas.math("SUBTRACT", 2, 1, source["Edge Contrast"], 1.0)
+    shape = formulas.math("POWER", 3, 0, thin, exponent)
+    amount = formulas.math("MULTIPLY", 3, 1, source["Extinction"], source["Density"])
+    return formulas.math("MULTIPLY", 5, 0, formulas.math("MULTIPLY", 4, 0, density, shape), amount)
+
+
+def _remaining(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+    """The density less evaporation x edge density x (z - floor) / height: high smoke is old, thin smoke goes first."""
+    above = formulas.math("SUBTRACT", -2, 2, formulas.height(-3, 2), source["Floor"])
+    age = formulas.math("MAXIMUM", -1, 2, formulas.math("DIVIDE", -1, 3, above, source["Height"]), 0.0)
+    most = formulas.math("MULTIPLY", -2, 3, source["Evaporation"], source["Edge Density"])
+    left = formulas.math("SUBTRACT", 0, 1, formulas.grid("density", 0), formulas.math("MULTIPLY", 0, 2, age, most))
+    return formulas.math("MAXIMUM", 1, 2, left, 0.0)
+
+
+def _albedo(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+    """1 - (1 - a min(brightness, 1)) / max(brightness, 1) of the tinted albedo a: it stays between black and white."""
+    white = (1.0, 1.0, 1.0)
+    tinted = formulas.vector("MULTIPLY", 1, 3, source["Albedo"], source["Color"])
+    darker = formulas.scaled(2, 3, tinted, formulas.math("MINIMUM", 1, 4, source["Brightness"], 1.0))
+    share = formulas.math("DIVIDE", 2, 5, 1.0, formulas.math("MAXIMUM", 1, 5, source["Brightness"], 1.0))
+    absorbed = formulas.scaled(4, 3, formulas.vector("SUBTRACT", 3, 3, white, darker), share)
+    return formulas.vector("SUBTRACT", 5, 3, white, absorbed)

@@ -1,0 +1,220 @@
+"""Modifiers whose node group reads a second Volume: the proxy of a large smoke, and frames between two of a take.
+
+The proxy acts in viewports alone, where it gives the smoke the grids of coarse copies of its files. So every render
+uses the smoke itself, also in a Blender without the add-on, and no viewport reads the smoke's own files.
+
+Between two frames, where the speed asks for that, the smoke of the frame before is moved on with its velocity and that
+of the frame after back, and they are mixed, by geometry nodes that Blender has since 5.0.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from ..core.contract import PROXY_FILE, PROXY_VOXELS
+from ..core.take import Take
+from .nodes import Input, add_node, get_input, input_path, new_group, own_group, set_input
+
+
+@dataclass(frozen=True)
+class SecondVolume:
+    """A kind of modifier, of which a smoke has one or none.
+
+    Attributes
+    ----------
+    name
+        Of the modifier; the name of the second Volume ends in `socket`.
+    mark
+        Custom property by which its node group is known under any name.
+    socket
+        Input of the group that is the second Volume's object.
+    new_group
+        Makes a new node group with that mark.
+    """
+
+    name: str
+    mark: str
+    socket: str
+    new_group: Callable[[], bpy.types.NodeTree]
+
+    def modifier(self, smoke: bpy.types.Object) -> bpy.types.Modifier | None:
+        """The modifier of a smoke."""
+        groups = ((each, each.node_group) for each in smoke.modifiers if each.type == "NODES")
+        return next((modifier for modifier, group in groups if group is not None and group.get(self.mark)), None)
+
+    def volume(self, smoke: bpy.types.Object) -> bpy.types.Volume | None:
+        """The second Volume of a smoke."""
+        modifier = self.modifier(smoke)
+        obj = get_input(modifier, self.socket) if modifier is not None else None
+        return obj.data if obj is not None else None
+
+    def add(self, smoke: bpy.types.Object) -> bpy.types.Modifier:
+        """Give a smoke the modifier unless it has it, with a Volume of its own that has the smoke's materials."""
+        modifier = self.modifier(smoke)
+        if modifier is None:
+            modifier = smoke.modifiers.new(self.name, "NODES")
+            modifier.node_group = own_group(self.mark) or self.new_group()
+            smoke.modifiers.move(len(smoke.modifiers) - 1, 0)  # those of the artist act on what it makes
+        obj = get_input(modifier, self.socket)
+        if obj is None or obj.users > 1:  # that of the smoke that this one is a duplicate of
+            obj = bpy.data.objects.new(f"{smoke.name} {self.socket}", smoke.data.copy())
+            set_input(modifier, self.socket, obj)
+        if list(obj.data.materials) != list(smoke.data.materials):
+            obj.data.materials.clear()
+            for material in smoke.data.materials:
+                obj.data.materials.append(material)
+        return modifier
+
+    def remove(self, smoke: bpy.types.Object) -> None:
+        """Take the modifier and its Volume away."""
+        modifier = self.modifier(smoke)
+        if modifier is None:
+            return
+        obj = get_input(modifier, self.socket)
+        set_input(modifier, self.socket, None)  # Blender 5.2 would go on counting it as used
+        smoke.modifiers.remove(modifier)
+        if obj is not None and obj.users == 0:  # else it is that of a duplicate, too
+            bpy.data.volumes.remove(obj.data)  # takes the object with it
+
+
+PROXY = "Smokelift Proxy"
+"""Name of the node group, and of the modifier."""
+
+_PROXY_INPUTS = (
+    Input("Smoke", "NodeSocketGeometry", "The smoke itself"),
+    Input("Proxy", "NodeSocketObject", "Volume that is shown in its place"),
+)
+
+
+def proxy_modifier(smoke: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The modifier that shows the proxy of a smoke, and is its switch; None where there is no proxy."""
+    return _PROXY.modifier(smoke)
+
+
+def proxy_of(smoke: bpy.types.Object) -> bpy.types.Volume | None:
+    """The Volume that is the proxy of a smoke, whether it is on show or not."""
+    return _PROXY.volume(smoke)
+
+
+def in_viewport(smoke: bpy.types.Object) -> bpy.types.Volume:
+    """The Volume that viewports show of a smoke, which has the settings for that."""
+    modifier, proxy = proxy_modifier(smoke), proxy_of(smoke)
+    return proxy if proxy is not None and modifier.show_viewport else smoke.data
+
+
+def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
+    """Whether a smoke is large for a viewport and has no proxy, as an earlier result; ``index`` is that of its take."""
+    return proxy_modifier(smoke) is None and math.prod(index["scene"]["domain"]["resolution"]) >= PROXY_VOXELS
+
+
+def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
+    """Give a smoke a proxy if its take has files of one with these numbers, else none. Whether it is on show stays."""
+    if {PROXY_FILE.format(number) for number in numbers} <= {file.name for file in take.directory.iterdir()}:
+        _PROXY.add(smoke).show_render = False
+    else:
+        _PROXY.remove(smoke)
+
+
+def _proxy_group() -> bpy.types.NodeTree:
+    tree = new_group(PROXY, "GeometryNodeTree", _PROXY.mark, _PROXY_INPUTS, [("Shown", "NodeSocketGeometry")])
+    given = add_node(tree, "NodeGroupInput", 0, 0)
+    shown = add_node(tree, "GeometryNodeObjectInfo", 1, 0, given.outputs["Proxy"])
+    add_node(tree, "NodeGroupOutput", 2, 0, shown.outputs["Geometry"])
+    return tree
+
+
+_PROXY = SecondVolume(PROXY, "smokelift_proxy", "Proxy", _proxy_group)
+
+INTERPOLATION = "Smokelift Frames Between"
+"""Name of the node group, and of the modifier."""
+
+CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)
+"""Whether this Blender has nodes that move grids."""
+
+GRIDS = ("density", "flame")
+"""What is moved, where the files have it."""
+
+_INTERPOLATION_INPUTS = (
+    Input("Smoke", "NodeSocketGeometry", "The frame before"),
+    Input("Next Frame", "NodeSocketObject", "Volume that plays the same files a frame earlier"),
+    Input("Part", "NodeSocketFloat", "How far it is from the frame before, 0, to the frame after, 1", 0.0, 0.0, 1.0),
+    Input("Seconds", "NodeSocketFloat", "From the frame before to the frame after", 1.0, 0.0),
+)
+
+
+def next_frame_volume(smoke: bpy.types.Object) -> bpy.types.Volume | None:
+    """The Volume that plays the frame after the one that a smoke plays; None without frames between."""
+    return _INTERPOLATION.volume(smoke)
+
+
+def fit_interpolation(smoke: bpy.types.Object, wanted: bool) -> None:
+    """Give a smoke frames between, or take them away."""
+    if not wanted or not CAN_INTERPOLATE:
+        _INTERPOLATION.remove(smoke)
+        return
+    modifier = _INTERPOLATION.add(smoke)
+    # before the proxy, which takes the place of all; where that is on show, nothing need be computed
+    smoke.modifiers.move(list(smoke.modifiers).index(modifier), 0)
+    modifier.show_viewport = in_viewport(smoke) == smoke.data
+
+
+def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> None:
+    """Say where in the take a smoke is in a frame of the scene.
+
+    Parameters
+    ----------
+    smoke
+        With or without frames between.
+    place
+        The place in frames, as an expression for a driver.
+    seconds
+        From one frame to the next.
+    """
+    modifier = _INTERPOLATION.modifier(smoke)
+    if modifier is None:
+        return
+    set_input(modifier, "Seconds", seconds)
+    path = input_path(modifier, "Part")
+    smoke.driver_remove(path)
+    driver = smoke.driver_add(path).driver
+    driver.type = "SCRIPTED"
+    driver.expression = f"fmod({place},1)"
+
+
+def _interpolation_group() -> bpy.types.NodeTree:
+    tree = new_group(
+        INTERPOLATION, "GeometryNodeTree", _INTERPOLATION.mark, _INTERPOLATION_INPUTS, [("Smoke", "NodeSocketGeometry")]
+    )
+    given = add_node(tree, "NodeGroupInput", 0, 0).outputs
+    later = add_node(tree, "GeometryNodeObjectInfo", 1, 3, given["Next Frame"]).outputs["Geometry"]
+
+    def math(operation: str, column: int, row: int, *values: Any) -> bpy.types.NodeSocket:
+        return add_node(tree, "ShaderNodeMath", column, row, *values, operation=operation).outputs[0]
+
+    def moved(volume: bpy.types.NodeSocket, name: str, row: int, seconds: Any, share: Any) -> bpy.types.NodeSocket:
+        """A grid that went on with its velocity for some seconds, times a number."""
+        grid, velocity = (
+            add_node(tree, "GeometryNodeGetNamedGrid", 2, place, volume, grid_name, False, data_type=kind)
+            for grid_name, kind, place in ((name, "FLOAT", row), ("velocity", "VECTOR", row + 1))
+        )
+        there = (grid.outputs["Grid"], velocity.outputs["Grid"], seconds)
+        advected = add_node(tree, "GeometryNodeGridAdvect", 4, row, *there, data_type="FLOAT")
+        return math("MULTIPLY", 5, row, advected.outputs[0], share)
+
+    rest = math("SUBTRACT", 1, 5, 1.0, given["Part"])
+    forth = math("MULTIPLY", 2, 8, given["Part"], given["Seconds"])
+    back = math("MULTIPLY", 3, 9, math("MULTIPLY", 2, 9, rest, given["Seconds"]), -1.0)
+    result = given["Smoke"]
+    for number, name in enumerate(GRIDS):
+        row = 4 * number
+        before = moved(given["Smoke"], name, row, forth, rest)
+        mixed = math("ADD", 6, row, before, moved(later, name, row + 2, back, given["Part"]))
+        result = add_node(tree, "GeometryNodeStoreNamedGrid", 7 + number, row, result, name, mixed).outputs[0]
+    add_node(tree, "NodeGroupOutput", 7 + len(GRIDS), 0, result)
+    return tree
+
+
+_INTERPOLATION = SecondVolume(INTERPOLATION, "smokelift_between", "Next Frame", _interpolation_group)

@@ -1,0 +1,130 @@
+"""The clean plate: the background in a scene file, and a picture in Blender in step with the clip."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+from mathutils import Vector
+
+from ..core.take import Take
+from .blender import ShotError, absolute, relative
+from .clip import frame_count, number_in_file
+from .strokes import saved_strokes
+
+
+def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
+    """The table; empty where the engine estimates the background.
+
+    Raises
+    ------
+    ShotError
+        If a picture is missing, or the clip does not have the frames.
+    """
+    settings, table = smoke.smokelift, {}
+    if settings.plate_mode == "FILE":
+        table["image"] = str(_plate(settings.plate))
+    elif settings.plate_mode == "FRAMES":
+        table["frame"] = [number_in_file(settings.clip, number) for number in _clean_frames(settings)]
+    if settings.strokes is not None:
+        table["strokes"] = str(saved_strokes(settings.strokes, settings.clip))
+    return table
+
+
+def _plate(path: str) -> Path:
+    if not path:
+        raise ShotError("Choose the clean plate, or choose From the Clip.")
+    file = absolute(path)
+    if not file.is_file():
+        raise ShotError(f"The clean plate {file} is not there: choose it again.")
+    return file
+
+
+def _clean_frames(settings: bpy.types.PropertyGroup) -> list[int]:
+    """The chosen frames, counted from 1 as in the panel."""
+    words = settings.plate_frames.replace(",", " ").split()
+    if not words:
+        raise ShotError("Go to a frame without smoke and press Plate from This Frame, or choose another Background.")
+    count = frame_count(settings.clip)
+    if not all(word.isdecimal() and 1 <= int(word) <= count for word in words):
+        raise ShotError(
+            f"Frames {settings.plate_frames} are not in the clip: it has frames 1 to {count}, separated by commas."
+        )
+    return sorted({int(word) for word in words})
+
+
+def plate_image(take: Take, path: str) -> bpy.types.Image:
+    """The plate of a take, by a path relative to the .blend where there is one."""
+    file = Path(path)
+    file = file if file.is_absolute() else take.directory / file
+    image = bpy.data.images.load(str(file), check_existing=True)
+    if image.filepath != relative(file):
+        image.filepath = relative(file)
+    return image
+
+
+def show_plate(
+    tree: bpy.types.NodeTree,
+    shader: bpy.types.ShaderNode,
+    place: Callable[[], bpy.types.NodeSocket],
+    take: Take,
+    background: dict[str, Any],
+) -> bpy.types.ShaderNode | None:
+    """Have a shader show the clean plate, or one color if the background is that.
+
+    Parameters
+    ----------
+    tree, shader
+        The shader, which has an input Color.
+    place
+        Makes coordinates in the plate; asked for them only if no texture is connected yet.
+    take, background
+        The take that the plate belongs to, and the table of its background.
+
+    Returns
+    -------
+    The texture node, or None for one color.
+    """
+    color = shader.inputs["Color"]
+    if "image" not in background:
+        for link in list(color.links):
+            tree.links.remove(link)
+        color.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
+        return None
+    if not color.links:
+        texture, coordinates = tree.nodes.new("ShaderNodeTexImage"), place()
+        texture.extension = "EXTEND"
+        tree.links.new(coordinates, texture.inputs["Vector"])
+        tree.links.new(texture.outputs["Color"], color)
+        for node, left in ((texture, 300.0), (coordinates.node, 500.0)):
+            node.location = shader.location - Vector((left, 0.0))
+    node = color.links[0].from_node
+    node.image = plate_image(take, background["image"])
+    return node
+
+
+def play_beside(image: bpy.types.Image, user: Any, clip: bpy.types.MovieClip, tracked: bool) -> None:
+    """Keep a plate of many pictures in step with the clip.
+
+    Parameters
+    ----------
+    image
+        The plate.
+    user
+        What says which of its frames is shown: an image user, or a node of the compositor.
+    clip
+        The clip that it belongs to.
+    tracked
+        Whether the camera moves, so that every frame has a plate of its own.
+    """
+    number = re.search(r"(\d+)\.\w+$", image.filepath)
+    if tracked and image.source == "FILE" and number:
+        image.source = "SEQUENCE"
+    if image.source == "FILE":
+        return
+    # Blender counts the images of a sequence by the numbers in their names, and the frames of a video from 1
+    before = int(number[1]) - 1 if number and image.source == "SEQUENCE" else 0
+    user.frame_start, user.frame_duration = clip.frame_start, clip.frame_duration
+    user.frame_offset = before + clip.frame_offset
+    user.use_auto_refresh = True

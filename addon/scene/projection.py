@@ -1,0 +1,201 @@
+"""The clean plate, projected from where the clip was filmed, on a card or on geometry of the artist.
+
+It stays where it is while the camera of the render moves, and looks as in the clip from where that was filmed,
+whatever it lies on. It is computed for every point that is shaded, so no mesh has to be subdivided for it.
+"""
+
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ..core.take import Take
+from .blender import set_unless_changed
+from .box import engine_to_world
+from .nodes import Input, add_node, file_group
+from .plate import play_beside, show_plate
+from .smoke import scene_of
+from .volume import frames_before
+
+MATERIAL = "Smokelift Projection"
+"""Name of the material, and of the node group in it."""
+
+MARK = "smokelift_projection"
+"""Custom property by which material and group are known under any name."""
+
+PROJECTOR = "Smokelift Projector"
+"""Name of the camera that stands where the clip was filmed from."""
+
+CARD = "Smokelift Card"
+"""Name of the plane that the plate is projected on."""
+
+_INPUTS = (
+    Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
+    Input("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
+    Input("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
+    Input("Perspective", "NodeSocketFloat", "1 for a perspective camera, 0 for an orthographic one"),
+)
+
+CARD_BEHIND = 1.1
+"""Distance of the card from the projector over that of the box's farthest corner."""
+
+CARD_WIDTHS = 2.0
+"""Width of the card over the picture's there: room for a camera that moves aside."""
+
+
+def project(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
+    """Set the projection up; a second time changes the plate and what the artist left as it was.
+
+    Parameters
+    ----------
+    smoke
+        Shows its take already.
+    take, index
+        The take on show, and its `sequence.json`.
+    """
+    scene, tables = scene_of(smoke), index["scene"]
+    scene.render.film_transparent = False
+    projector = _projector(smoke, index)
+    material = _material(projector, tables["camera"])
+    shader = material.node_tree.nodes[MATERIAL]
+    placed = material.node_tree.nodes[f"{MATERIAL} Place"].outputs[0]
+    plate = show_plate(material.node_tree, shader, lambda: placed, take, tables.get("background") or {})
+    if plate is not None:
+        play_beside(plate.image, plate.image_user, smoke.smokelift.clip, "matrices" in tables["camera"])
+    if CARD not in scene.objects:
+        _add_card(smoke, projector, tables, material)
+
+
+def show_card(scene: bpy.types.Scene, shown: bool) -> None:
+    """Show or hide the card, if the scene has one: it would hide a plate that is put elsewhere."""
+    card = scene.objects.get(CARD)
+    if card is not None:
+        card.hide_viewport = card.hide_render = not shown
+
+
+def _poses(smoke: bpy.types.Object, table: dict[str, Any]) -> list[Matrix]:
+    """Where the clip was filmed from, in Blender's world: one matrix, or one for every frame."""
+    return [engine_to_world(smoke) @ Matrix(pose) for pose in table.get("matrices") or [table["matrix"]]]
+
+
+def _projector(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object:
+    """The camera that projects, made or moved; its place stays where the artist changed it."""
+    scene, table = scene_of(smoke), index["scene"]["camera"]
+    projector = scene.objects.get(PROJECTOR)
+    if projector is None or projector.type != "CAMERA":
+        projector = bpy.data.objects.new(PROJECTOR, bpy.data.cameras.new(PROJECTOR))
+        scene.collection.objects.link(projector)
+    # its own picture only shows the clip's; what is projected is computed from the table
+    (width, height), longest = table["size"], max(table["size"])
+    lens = projector.data
+    lens.type = "ORTHO" if table["type"] == "orthographic" else "PERSP"
+    lens.lens, lens.ortho_scale = table["fx"] * lens.sensor_width / longest, longest / table["fx"]
+    lens.shift_x, lens.shift_y = (width / 2 - table["cx"]) / longest, (table["cy"] - height / 2) / longest
+    poses = _poses(smoke, table)
+    if len(poses) == 1:
+        set_unless_changed(projector, "place", projector, "matrix_basis", poses[0])
+    else:
+        first = smoke.smokelift.clip.frame_start + frames_before(smoke.smokelift, index)
+        _animate(projector, poses, first)
+    return projector
+
+
+def _animate(obj: bpy.types.Object, poses: list[Matrix], first: int) -> None:
+    """Key the place of an object in every frame from the first on."""
+    obj.animation_data_clear()
+    obj.rotation_mode = "QUATERNION"
+    before = None
+    for frame, pose in enumerate(poses, first):
+        obj.matrix_basis = pose
+        if before is not None:
+            turned = obj.rotation_quaternion.copy()
+            turned.make_compatible(before)
+            obj.rotation_quaternion = turned
+        before = obj.rotation_quaternion.copy()
+        for path in ("location", "rotation_quaternion"):
+            obj.keyframe_insert(path, frame=frame)
+
+
+def _add_card(
+    smoke: bpy.types.Object, projector: bpy.types.Object, tables: dict[str, Any], material: bpy.types.Material
+) -> None:
+    """A plane behind the smoke's box, across the view of the clip's first frame and beyond its edges."""
+    table, domain = tables["camera"], tables["domain"]
+    pose = _poses(smoke, table)[0]
+    low, high = domain["min"], domain["max"]
+    corners = [Vector((x, y, z)) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    to_camera = pose.inverted() @ engine_to_world(smoke)
+    distance = CARD_BEHIND * max(-(to_camera @ corner).z for corner in corners)
+    spread = 1.0 if table["type"] == "orthographic" else distance
+    width, height = (size * spread / table[focal] for size, focal in zip(table["size"], ("fx", "fy"), strict=True))
+    right = (table["size"][0] / 2 - table["cx"]) * spread / table["fx"]
+    up = (table["cy"] - table["size"][1] / 2) * spread / table["fy"]
+    x, y = CARD_WIDTHS * width / 2, CARD_WIDTHS * height / 2
+    mesh = bpy.data.meshes.new(CARD)
+    mesh.from_pydata([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(material)
+    card = bpy.data.objects.new(CARD, mesh)
+    card.matrix_basis = pose @ Matrix.Translation((right, up, -distance))
+    scene_of(smoke).collection.objects.link(card)
+
+
+def _material(projector: bpy.types.Object, table: dict[str, Any]) -> bpy.types.Material:
+    """The material: the file's own, which the artist may have changed, else a new one; with the clip's lens."""
+    material = next((known for known in bpy.data.materials if known.library is None and known.get(MARK)), None)
+    material = material or _new_material()
+    nodes = material.node_tree.nodes
+    nodes[PROJECTOR].object = projector
+    place, (width, height) = nodes[f"{MATERIAL} Place"], table["size"]
+    place.inputs["Focal Length"].default_value = (table["fx"] / width, table["fy"] / height, 0.0)
+    # Blender counts the rows of a picture from below
+    place.inputs["Center"].default_value = (table["cx"] / width, 1.0 - table["cy"] / height, 0.0)
+    place.inputs["Perspective"].default_value = 0.0 if table["type"] == "orthographic" else 1.0
+    return material
+
+
+def _new_material() -> bpy.types.Material:
+    """A material that the camera sees, and which neither lights the smoke nor takes light from it."""
+    material = bpy.data.materials.new(MATERIAL)
+    material[MARK] = True
+    if material.node_tree is None:  # since 5.0 there always is one
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+
+    def new(kind: str, left: float, name: str = "", down: float = 0.0) -> bpy.types.ShaderNode:
+        node = tree.nodes.new(kind)
+        node.location = (-left, -down)
+        if name:
+            node.name = node.label = name
+        return node
+
+    output, mix = new("ShaderNodeOutputMaterial", 0.0), new("ShaderNodeMixShader", 200.0)
+    rays, clear = new("ShaderNodeLightPath", 400.0, down=-320.0), new("ShaderNodeBsdfTransparent", 400.0)
+    shader = new("ShaderNodeEmission", 400.0, MATERIAL, down=120.0)
+    place = new("ShaderNodeGroup", 900.0, f"{MATERIAL} Place", down=120.0)
+    outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
+    place.node_tree = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
+    place.width = 180.0
+    projector = new("ShaderNodeTexCoord", 1100.0, PROJECTOR, down=120.0)
+    tree.links.new(projector.outputs["Object"], place.inputs["Point"])
+    tree.links.new(place.outputs["In Front"], shader.inputs["Strength"])
+    tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(clear.outputs[0], mix.inputs[1])
+    tree.links.new(shader.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    material.cycles.emission_sampling = "NONE"
+    return material
+
+
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the nodes of center + focal length x (point / depth); a camera looks along its -Z axis."""
+    source = add_node(tree, "NodeGroupInput", 0, 0).outputs
+    z = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0, source["Point"]).outputs["Z"]
+    depth = add_node(tree, "ShaderNodeMath", 2, 0, z, -1.0, operation="MULTIPLY").outputs[0]
+    # depth ^ 0 = 1 for an orthographic camera
+    divisor = add_node(tree, "ShaderNodeMath", 3, 0, depth, source["Perspective"], operation="POWER").outputs[0]
+    slope = add_node(tree, "ShaderNodeVectorMath", 4, 0, source["Point"], divisor, operation="DIVIDE").outputs[0]
+    factors = (slope, source["Focal Length"], source["Center"])
+    point = add_node(tree, "ShaderNodeVectorMath", 5, 0, *factors, operation="MULTIPLY_ADD")
+    in_front = add_node(tree, "ShaderNodeMath", 5, 1.25, depth, 0.0, operation="GREATER_THAN")
+    add_node(tree, "NodeGroupOutput", 6, 0, point.outputs[0], in_front.outputs[0])

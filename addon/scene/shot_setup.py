@@ -1,0 +1,264 @@
+"""Set Up Shot: size, speed, camera, background, light and colors of the clip for the Blender scene.
+
+Everything made here is found again by its name, so a second set-up changes nothing.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ..core.take import Take
+from . import volume
+from .blender import set_and_remember, set_unless_changed
+from .clip import used_range
+from .compositing import composite, take_composite_away
+from .plate import play_beside, show_plate
+from .projection import project, show_card
+from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
+
+NAME = "Smokelift"
+
+NEW_RANGE = (1, 250)
+"""Frames of a new file of Blender."""
+
+SENSOR_WIDTH = 36.0
+"""Millimeters; Blender's default."""
+
+BOUNCES = 128
+"""How often Cycles scatters light in smoke that was fitted with scattering of all orders."""
+
+NEW_SAMPLES = 4096
+"""Cycles' samples per pixel in a new file."""
+
+SAMPLES = 32
+"""Samples per pixel of a set-up in a new file: marching through smoke and denoised, the example's 640 x 960 pixels take
+two slow cores a minute, and differ from the clip by 2 of 255 (root mean square)."""
+
+
+def match_clip(smoke: bpy.types.Object) -> None:
+    """Give the smoke's scene the clip's size and frame rate, and the length of what is used or made of it."""
+    clip, scene = smoke.smokelift.clip, scene_of(smoke)
+    render = scene.render
+    render.resolution_x, render.resolution_y = clip.size
+    if clip.source == "MOVIE" and clip.fps > 0.0:
+        render.fps = math.ceil(clip.fps - 1e-3)
+        render.fps_base = render.fps / clip.fps
+    _set_range(scene, set_and_remember)
+
+
+def follow_range(smoke: bpy.types.Object) -> None:
+    """Give the scene the length of its results, unless the artist gave it another than that of a new file or a clip."""
+    scene, clip = scene_of(smoke), smoke.smokelift.clip
+    of_clip = (clip.frame_start, clip.frame_start + clip.frame_duration - 1) if clip is not None else NEW_RANGE
+    if "smokelift_frame_end" in scene or (scene.frame_start, scene.frame_end) in (NEW_RANGE, of_clip):
+        _set_range(scene, set_unless_changed)
+
+
+def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, Any, str, Any], None]) -> None:
+    """Set the scene's range to that of the results on show, and of the used frames of clips that have none yet."""
+    ranges = [volume.shown_range(smoke) or used_range(smoke.smokelift) for smoke in smokes(scene)]
+    found = [each for each in ranges if each is not None]
+    if found:
+        firsts, lasts = zip(*found, strict=True)
+        set_value(scene, "frame_end", scene, "frame_end", max(lasts))
+        set_value(scene, "frame_start", scene, "frame_start", min(firsts))
+
+
+def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> tuple[bool, list[str]]:
+    """Make a render from the camera match the clip, in the parts that are ticked.
+
+    Parameters
+    ----------
+    smoke
+        Shows its take already.
+    take, index
+        The take on show, and its `sequence.json`.
+
+    Returns
+    -------
+    Whether the lamp of a new file was hidden, and the names of further lights beside those of the clip.
+    """
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    hidden, further = False, []
+    if settings.set_up_plate:
+        _take_away_plates(smoke)  # first: what it gives back may be set up anew
+    if settings.set_up_range:
+        match_clip(smoke)
+    if settings.set_up_camera:
+        scene.camera = assumed_camera(smoke, index) or scene.camera
+        show_clip_behind(scene.camera.data, settings.clip)
+    if settings.set_up_light:
+        scene.render.engine = "CYCLES"
+        _sample_for_a_minute(scene)
+        _scatter_as_fitted(scene, index)
+        estimated = settings.light_mode == "ESTIMATE"
+        _estimated_suns(scene, index, index["scene"]["lights"] if estimated else [])
+        if estimated:
+            hidden = hide_default_lamp(scene)
+            lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
+            further = [obj.name for obj in lights if not _is_estimated(obj)]
+    if settings.set_up_plate:
+        _set_up_plate(smoke, take, index)
+    if settings.set_up_colors:
+        scene.view_settings.view_transform = "Standard"
+        scene.view_settings.look = "None"
+        scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+    return hidden, further
+
+
+def _take_away_plates(smoke: bpy.types.Object) -> None:
+    """Undo what an earlier set-up did to show the plate elsewhere than it is shown now."""
+    scene, place = scene_of(smoke), smoke.smokelift.plate_place
+    if place != "COMPOSITE":
+        take_composite_away(scene)
+    show_card(scene, place == "PROJECTION")
+    tree = scene.world.node_tree if scene.world is not None else None
+    if tree is not None and NAME in tree.nodes:
+        tree.nodes[NAME].mute = place != "WORLD"  # a muted Mix Shader shows what the world was before
+
+
+def _set_up_plate(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
+    """Show the clean plate where it was chosen to be."""
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    place = settings.plate_place
+    if place == "COMPOSITE":
+        composite(smoke, take, index)
+    elif place == "PROJECTION":
+        project(smoke, take, index)
+    else:
+        scene.render.film_transparent = False
+        _set_world(scene, settings.clip, take, index["scene"])
+
+
+def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object | None:
+    """The camera that the engine assumed, made or moved; None if the engine used the scene's own.
+
+    Its place and its lens stay where the artist changed them.
+    """
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    if settings.camera_mode != "ESTIMATE":
+        return None
+    table = index["scene"]["camera"]
+    camera = settings.assumed_camera
+    if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
+        camera = bpy.data.objects.new(ASSUMED_CAMERA, bpy.data.cameras.new(ASSUMED_CAMERA))
+        camera.data.sensor_fit, camera.data.sensor_width = "AUTO", SENSOR_WIDTH
+        scene.collection.objects.link(camera)
+    settings.assumed_camera = camera
+    set_unless_changed(camera, "place", camera, "matrix_basis", Matrix(table["matrix"]))
+    lens = table["fx"] * camera.data.sensor_width / max(table["size"])
+    set_unless_changed(camera.data, "lens", camera.data, "lens", lens)
+    if scene.camera is None:
+        scene.camera = camera
+    return camera
+
+
+def show_clip_behind(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> None:
+    """Show a clip in the view through a camera, behind everything."""
+    camera.show_background_images = True
+    if any(image.source == "MOVIE_CLIP" and image.clip == clip for image in camera.background_images):
+        return
+    image = camera.background_images.new()
+    image.source = "MOVIE_CLIP"
+    image.clip = clip
+    image.alpha = 1.0
+    image.display_depth = "BACK"
+
+
+def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
+    """Let light bounce in smoke as often as in the model that the smoke was fitted with; by default it does once."""
+    bounces = BOUNCES if _scattering(index) == "multiple" else 0
+    set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
+    if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
+        scene.cycles.max_bounces = max(scene.cycles.max_bounces, bounces)
+
+
+def _sample_for_a_minute(scene: bpy.types.Scene) -> None:
+    """Let Cycles end soon, unless the artist chose how many samples it takes."""
+    if scene.cycles.samples == NEW_SAMPLES:
+        scene.cycles.samples = SAMPLES
+        if hasattr(scene.cycles, "volume_biased"):  # null scattering takes four times as many for the same noise
+            scene.cycles.volume_biased = True
+
+
+def _scattering(index: dict[str, Any]) -> str | None:
+    """The model of scattering that the smoke was fitted with, where the take says it."""
+    return index["scene"]["medium"].get("scattering")
+
+
+def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[dict[str, Any]]) -> None:
+    """The suns that the engine estimated, and none of an earlier result besides.
+
+    They cast shadows where the smoke was fitted with them.
+    """
+    names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))][: len(tables)]
+    for name, table in zip(names, tables, strict=True):
+        sun = scene.objects.get(name)
+        if sun is None or sun.type != "LIGHT":
+            sun = bpy.data.objects.new(name, bpy.data.lights.new(name, "SUN"))
+            scene.collection.objects.link(sun)
+        strongest = max(table["irradiance"]) or 1.0
+        sun.data.energy = strongest
+        sun.data.color = [part / strongest for part in table["irradiance"]]
+        sun.data.use_shadow = _scattering(index) in ("multiple", "single")
+        sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
+    for sun in [each for each in scene.objects if _is_estimated(each) and each.name not in names]:
+        bpy.data.objects.remove(sun)
+
+
+def _is_estimated(obj: bpy.types.Object) -> bool:
+    """Whether an object is a light of ours."""
+    return f"{obj.name} ".startswith(f"{NAME} Light ")
+
+
+def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, tables: dict[str, Any]) -> None:
+    """A world that shows the camera the clean plate, and lights the smoke as the scene's own world does."""
+    world = scene.world
+    if world is None or not world.name.startswith(NAME):
+        _remove_unused_worlds()
+        if world is None:
+            world = bpy.data.worlds.new(NAME)
+        else:
+            world.use_fake_user = True  # or it would not be saved any more
+            world = world.copy()
+            world.name, world.use_fake_user = NAME, False
+        scene.world = world
+    if world.node_tree is None:  # since 5.0 there always is one
+        world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    output = next((node for node in nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
+    output = output or nodes.new("ShaderNodeOutputWorld")
+    mix = nodes.get(NAME)
+    if mix is None:
+        mix = nodes.new("ShaderNodeMixShader")
+        mix.name = mix.label = NAME
+        mix.location = output.location - Vector((0.0, 200.0))
+        if output.inputs["Surface"].links:
+            links.new(output.inputs["Surface"].links[0].from_socket, mix.inputs[1])
+        links.new(mix.outputs[0], output.inputs["Surface"])
+        rays = nodes.new("ShaderNodeLightPath")
+        links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
+        background = nodes.new("ShaderNodeBackground")
+        links.new(background.outputs[0], mix.inputs[2])
+        for node, left in ((rays, 400.0), (background, 200.0)):
+            node.location = mix.location - Vector((left, 200.0))
+    background = mix.inputs[2].links[0].from_node
+    tree = world.node_tree
+    plate = show_plate(tree, background, lambda: _window(tree), take, tables.get("background") or {})
+    if plate is not None:
+        play_beside(plate.image, plate.image_user, clip, "matrices" in tables["camera"])
+
+
+def _remove_unused_worlds() -> None:
+    """Remove the worlds of earlier set-ups, which the artist took out of their scenes."""
+    for world in list(bpy.data.worlds):
+        if world.users == 0 and world.node_tree is not None and NAME in world.node_tree.nodes:
+            bpy.data.worlds.remove(world)
+
+
+def _window(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    """Coordinates in the picture that is rendered."""
+    return tree.nodes.new("ShaderNodeTexCoord").outputs["Window"]

@@ -1,0 +1,144 @@
+"""The smokes of a scene: Volume objects with the settings that they are made with."""
+
+import itertools
+import os.path
+from pathlib import Path
+
+import bpy
+from mathutils import Matrix, Vector
+
+from .blender import preferred_quality
+
+LAMP_OF_A_NEW_FILE = (4.0762453, 1.0054539, 5.9038620), 1000.0
+"""Place (m) and power (W) of the point light that Blender's own new file begins with."""
+
+ASSUMED_CAMERA = "Smokelift Camera"
+"""Name of a camera that stands where the engine assumed the clip's."""
+
+
+def is_smoke(obj: bpy.types.Object | None) -> bool:
+    """Whether an object is a smoke that can be made: one that is linked from another file is finished."""
+    if obj is None or obj.type != "VOLUME" or obj.library is not None or obj.data.library is not None:
+        return False
+    return obj.override_library is None and obj.smokelift.is_smoke
+
+
+def is_override(obj: bpy.types.Object | None) -> bool:
+    """Whether an object is the override of a smoke that is linked from another file: only its look can be changed."""
+    return obj is not None and obj.type == "VOLUME" and obj.override_library is not None and obj.smokelift.is_smoke
+
+
+def smokes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The smokes of a scene."""
+    return [obj for obj in scene.objects if is_smoke(obj)]
+
+
+def active_smoke(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The smoke in the tab: the active object, else that whose box, inlet, camera or child it is, else the first."""
+    active = _layer(scene).objects.active
+    if is_smoke(active):
+        return active
+    found = smokes(scene)
+    if active is not None:
+        for obj in found:
+            settings = obj.smokelift
+            if active in (settings.box, settings.inlet, settings.assumed_camera) or active.parent == obj:
+                return obj
+    return found[0] if found else None
+
+
+def smoke_with_look(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The smoke whose look is in the tab: the active override of a linked one, else as above."""
+    active = _layer(scene).objects.active
+    return active if is_override(active) else active_smoke(scene)
+
+
+def find_smoke(uid: int) -> bpy.types.Object | None:
+    """A smoke by its number of this session, also after a new name; None if it was deleted."""
+    return next((obj for scene in bpy.data.scenes for obj in smokes(scene) if obj.session_uid == uid), None)
+
+
+def scene_of(smoke: bpy.types.Object) -> bpy.types.Scene:
+    """The scene of a smoke: the one at the window if it is in several."""
+    scenes = smoke.users_scene
+    return bpy.context.scene if bpy.context.scene in scenes else scenes[0]
+
+
+def new_smoke(scene: bpy.types.Scene, clip: bpy.types.MovieClip | None = None) -> bpy.types.Object:
+    """A new smoke, selected and active, which has no result yet."""
+    name = f"Smoke {clip.name}" if clip else "Smoke"
+    obj = bpy.data.objects.new(name, bpy.data.volumes.new(name))
+    scene.collection.objects.link(obj)
+    obj.smokelift.is_smoke = True
+    if clip is not None:
+        obj.smokelift.clip = clip
+    activate(obj, scene)
+    obj.smokelift.quality = preferred_quality() or obj.smokelift.quality
+    return obj
+
+
+def activate(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Select and activate an object, unless the artist works inside another."""
+    layer = _layer(scene)
+    active = layer.objects.active
+    if active is not None and active.mode != "OBJECT":
+        return
+    for other in layer.objects.selected:
+        other.select_set(False, view_layer=layer)
+    obj.select_set(True, view_layer=layer)
+    layer.objects.active = obj
+
+
+def free_folder(smoke: bpy.types.Object) -> str:
+    """A name for the folder of a smoke's takes that no other smoke has: its clip's, with a number if need be."""
+    taken = {obj.smokelift.folder for obj in bpy.data.objects if obj != smoke and obj.smokelift.is_smoke}
+    stem = bpy.path.clean_name(Path(smoke.smokelift.clip.filepath).stem)
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    return next(name for name in names if name not in taken)
+
+
+def separate_duplicate(smoke: bpy.types.Object) -> None:
+    """Give a duplicate of another smoke a folder, and a Volume, of its own before it gets a take of its own.
+
+    The duplicate is the younger one; what both show stays where it is.
+    """
+    settings = smoke.smokelift
+    twins = [obj for obj in bpy.data.objects if is_smoke(obj) and obj.smokelift.folder == settings.folder]
+    if all(obj.session_uid >= smoke.session_uid for obj in twins):
+        return
+    settings.folder, settings.results = free_folder(smoke), ""
+    if settings.output:
+        settings.output = os.path.join(settings.output, settings.folder)  # noqa: PTH118 - a Path would lose the // of Blender
+    if smoke.data.users > 1:
+        smoke.data = smoke.data.copy()
+
+
+def _layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    return bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
+
+
+def hide_default_cube(scene: bpy.types.Scene) -> None:
+    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place."""
+    cube = scene.objects.get("Cube")
+    if cube is None or cube.type != "MESH" or cube.matrix_basis != Matrix.Identity(4):
+        return
+    if cube.parent or cube.children or cube.modifiers or cube.constraints or cube.animation_data:
+        return
+    places = {tuple(vertex.co) for vertex in cube.data.vertices}
+    if places == {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
+        cube.hide_viewport = cube.hide_render = True
+
+
+def hide_default_lamp(scene: bpy.types.Scene) -> bool:
+    """Hide the lamp of a new file, which would light smoke that has its own light; returns whether it was seen."""
+    lamp = scene.objects.get("Light")
+    if lamp is None or lamp.type != "LIGHT" or lamp.data.type != "POINT" or lamp.hide_render:
+        return False
+    if lamp.parent or lamp.children or lamp.constraints or lamp.animation_data or lamp.data.animation_data:
+        return False
+    place, power = LAMP_OF_A_NEW_FILE
+    same_place = (lamp.location - Vector(place)).length < 1e-4
+    if not same_place or lamp.data.energy != power or tuple(lamp.data.color) != (1.0, 1.0, 1.0):
+        return False
+    lamp.hide_viewport = lamp.hide_render = True
+    return True

@@ -1,0 +1,109 @@
+"""Strokes over a frame of the clip: where smoke is, where none is, and where the background is seen.
+
+Blender shows no picture below one that is painted. So the frame is in the image itself, in pale colors: what has a
+strong color is a stroke. The file has the strokes alone, with alpha. It is written whenever the engine is about to read
+it.
+"""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import numpy.typing as npt
+
+from .blender import ShotError, absolute
+
+SATURATION = 0.25
+"""Fraction of the frame's saturation that is kept below the strokes."""
+
+MIN_STROKE = 0.5
+"""Smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below."""
+
+WRITTEN = "smokelift_written"
+"""Custom property of an image that has a frame below: the time of its file when its strokes were written."""
+
+Pixels = npt.NDArray[np.float32]
+"""Red, green, blue and alpha of an image, (pixels, 4)."""
+
+
+def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
+    """The file of the strokes on a clip, with what was painted last.
+
+    Raises
+    ------
+    ShotError
+        If there is no file, it cannot be written, or it is of another size than the clip.
+    """
+    file = absolute(image.filepath, image.library)
+    try:
+        if WRITTEN in image:
+            if image.is_dirty or image[WRITTEN] != _time(file):
+                _write(image, file)
+        elif image.is_dirty and image.filepath and image.packed_file is None:
+            image.save()
+    except RuntimeError as error:
+        raise ShotError(f"The strokes {file} cannot be written: save them elsewhere in the Image Editor.") from error
+    if not file.is_file():
+        raise ShotError(f"The strokes {image.name} are in no file: save them in the Image Editor, or clear Strokes.")
+    if tuple(image.size) != tuple(clip.size):
+        raise ShotError(
+            f"The strokes have {image.size[0]} x {image.size[1]} pixels, and the clip {clip.size[0]} x {clip.size[1]}: "
+            "paint new ones, or clear Strokes."
+        )
+    return file
+
+
+def new_strokes(file: Path, size: tuple[int, int]) -> bpy.types.Image:
+    """A file without any stroke, as an image."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    _save(np.zeros((size[0] * size[1], 4), np.float32), size, file)
+    return bpy.data.images.load(str(file))
+
+
+def lay_below(image: bpy.types.Image, picture: Path) -> None:
+    """Put a picture of its size below the strokes of an image whose file has them all."""
+    filmed = bpy.data.images.load(str(picture))
+    values, strokes = _pixels(filmed), strokes_in(_pixels(image))
+    bpy.data.images.remove(filmed)
+    gray = values[:, :3].mean(1, keepdims=True)
+    values[:, :3] = gray + SATURATION * (values[:, :3] - gray)
+    painted = strokes[:, 3] > 0.0
+    values[painted] = strokes[painted]
+    image.pixels.foreach_set(values.ravel())
+    image.update()
+    image[WRITTEN] = _time(absolute(image.filepath))
+
+
+def strokes_in(values: Pixels) -> Pixels:
+    """The strokes in an image, in pure colors, and transparent elsewhere."""
+    colors = values[:, :3]
+    painted = (values[:, 3] > MIN_STROKE) & (np.ptp(colors, axis=1) > MIN_STROKE)
+    strokes = np.zeros_like(values)
+    strokes[painted, colors.argmax(1)[painted]] = strokes[painted, 3] = 1.0
+    return strokes
+
+
+def _write(image: bpy.types.Image, file: Path) -> None:
+    if image.is_dirty:
+        image.save()  # or Blender asks for it at its end
+    _save(strokes_in(_pixels(image)), tuple(image.size), file)
+    image[WRITTEN] = _time(file)
+
+
+def _save(values: Pixels, size: tuple[int, int], file: Path) -> None:
+    image = bpy.data.images.new(file.stem, *size, alpha=True)
+    image.pixels.foreach_set(values.ravel())
+    image.filepath_raw, image.file_format = str(file), "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+
+
+def _pixels(image: bpy.types.Image) -> Pixels:
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(-1, 4)
+
+
+def _time(file: Path) -> str:
+    """When a file was changed last, as a text: Blender's properties hold 32 bits."""
+    return str(file.stat().st_mtime_ns) if file.is_file() else ""

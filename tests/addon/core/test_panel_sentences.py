@@ -1,0 +1,89 @@
+"""What the engine says, in the words of the panel."""
+
+import re
+import sys
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+from addon.core.sentences import SENTENCES, match, sentence, spent
+from smokelift.report.sentences import SENTENCES as OWN
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "tools"))
+from messages import all_messages
+
+TOPICS = (
+    "Clip and background",
+    "Set-up of the shot",
+    "Shot and result",
+    "Density and rendering",
+    "Velocity and transport",
+    "Sequence and files",
+    "Directed smoke",
+)
+"""What a run or a check of a shot can say; the add-on writes scene files and options itself, which are not wrong."""
+
+FOREIGN = ("smokelift inspect", "pip install", "--npz")
+"""Words of sentences that the panel has its own for, and of libraries that the extension brings with it."""
+
+
+def figures(words: str) -> set[str]:
+    """Names of what a sentence fills in."""
+    return {name for _, name, _, _ in Formatter().parse(words) if name}
+
+
+@pytest.mark.parametrize("kind", SENTENCES)
+def test_the_engine_gives_the_figures_of_the_panels_sentences(kind) -> None:
+    assert figures(SENTENCES[kind]) <= figures(OWN[kind])
+
+
+def test_no_word_of_a_scene_file_or_of_an_option_is_in_the_others() -> None:
+    messages = all_messages()
+    said = [text for topic in TOPICS for text in messages[topic] if not any(words in text for words in FOREIGN)]
+    assert [text for text in said if re.search(r"\[[a-z]|--[a-z]|scene file|[cC]olour", text)] == []
+
+
+def test_only_sentences_of_the_panels_own_name_a_command() -> None:
+    assert {kind for kind, words in OWN.items() if "smokelift inspect" in words} <= set(SENTENCES)
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ({"text": "As it is."}, "As it is."),
+        ({"text": "As it is.", "kind": "black background", "figures": {}}, "As it is."),
+        (
+            {"text": "", "kind": "reconstructed", "figures": {"frames": 12, "seconds": 28.2, "psnr": 26.44}},
+            "Match to the clip: fair (26.4 dB). 12 frames in 28 s.",
+        ),
+        (
+            {"text": "", "kind": "looped", "figures": {"frames": 1, "seconds": 9, "first": 1, "last": 2}},
+            "1 frame in 9 s, which repeat.",
+        ),
+        (
+            {"text": "", "kind": "cut", "figures": {"before": 4, "after": 5, "first": 0, "last": 9}},
+            "The picture changes at once between frames 5 and 6, as at a cut, so no single background fits both sides. "
+            "Choose Frames 1 to 5 or 6 to 10.",
+        ),
+    ],
+)
+def test_a_sentence(message, said) -> None:
+    assert sentence(message) == said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.2, "1 s"), (59.4, "59 s"), (59.6, "1 min 0 s"), (387, "6 min 27 s"), (7380, "2 h 3 min")]
+)
+def test_a_time_in_words(seconds, said) -> None:
+    assert spent(seconds) == said
+
+
+@pytest.mark.parametrize(("psnr", "said"), [(41.0, "very good"), (34.0, "very good"), (33.9, "good"), (9.0, "poor")])
+def test_a_match_in_words(psnr, said) -> None:
+    assert match(psnr) == said
+
+
+def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
+    message = {"text": "", "kind": "dissolving smoke", "figures": {"frame": 70, "room": 8.0}}
+    assert sentence(message, before=39).startswith("From frame 109 on")

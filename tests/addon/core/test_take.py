@@ -1,0 +1,177 @@
+"""The files of a run: numbered, never overwritten, found again."""
+
+import json
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from addon.core.take import Take, TakeError, new_take, takes
+
+TABLES = {"clip": {"path": "/a b/clip.mp4", "frames": [0, 9]}}
+
+
+def begun(folder: Path) -> Take:
+    take = new_take(folder)
+    take.write(TABLES, ["--quality", "draft"])
+    return take
+
+
+def with_sequence(take: Take, frames: int, complete: bool) -> None:
+    take.directory.mkdir()
+    index = {"complete": complete, "frames": {str(n): {} for n in range(1, frames + 1)}}
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+
+
+def test_takes_are_numbered_and_never_overwritten(tmp_path) -> None:
+    """The next is one above the highest, also where one was taken away or only some of its files are left."""
+    folder = tmp_path / "new" / "folder"
+    assert takes(folder) == []
+    first, second = begun(folder), begun(folder)
+    assert [take.directory.name for take in (first, second)] == ["take_0001", "take_0002"]
+    first.remove()
+    (folder / "take_0007.log").write_text("all that is left")
+    (folder / "holiday.jpg").write_text("not ours")
+    assert new_take(folder).directory.name == "take_0008"
+    assert [take.directory.name for take in takes(folder)] == ["take_0002", "take_0007"]
+
+
+def test_a_take_knows_how_the_engine_is_called(tmp_path) -> None:
+    take = begun(tmp_path)
+    assert tomllib.loads(take.scene_file.read_text()) == TABLES
+    arguments = Take(take.directory).arguments()  # as another session would
+    assert arguments[:2] == ["reconstruct", str(take.scene_file)]
+    assert arguments[arguments.index("--out") + 1] == str(take.directory)
+    assert "--resume" in arguments
+    assert arguments[-2:] == ["--quality", "draft"]
+    assert arguments[arguments.index("--progress") + 1] == "json"
+
+
+def test_frames_and_completeness(tmp_path) -> None:
+    take = begun(tmp_path)
+    assert (take.read().frames, take.read().complete, take.read().resumable) == (0, False, True)
+    with_sequence(take, 3, complete=False)
+    assert (take.read().frames, take.read().complete, take.read().resumable) == (3, False, True)
+    (take.directory / "sequence.json").write_text('{"complete": true, "frames": {"1": {}}}')
+    assert (take.read().frames, take.read().complete, take.read().resumable) == (1, True, False)
+    (take.directory / "sequence.json").write_text("half a fi")
+    assert (take.read().frames, take.read().complete) == (0, False)
+
+
+@pytest.mark.parametrize("foreign", ['{"format": 1}', '{"frames": [], "complete": true}', "[]", '{"frames": {}}'])
+def test_the_index_of_another_program_is_none(tmp_path, foreign) -> None:
+    take = begun(tmp_path)
+    take.directory.mkdir()
+    (take.directory / "sequence.json").write_text(foreign)
+    assert (take.read().index, take.read().frames, take.read().complete) == (None, 0, False)
+    assert [found.read().frames for found in takes(tmp_path)] == [0]
+
+
+def test_a_redraw_reads_no_file_that_has_not_changed(tmp_path, monkeypatch) -> None:
+    take = begun(tmp_path)
+    with_sequence(take, 3, complete=False)
+    before = (take.read().frames, take.read().title, take.size())
+    with monkeypatch.context() as blocked:
+        blocked.setattr(Path, "read_text", None)
+        blocked.setattr(os, "scandir", None)
+        assert (take.read().frames, take.read().title, take.size()) == before
+    index = {"complete": True, "frames": {str(n): {} for n in range(1, 5)}}
+    (take.directory / "sequence.json.tmp").write_text(json.dumps(index))
+    (take.directory / "sequence.json.tmp").replace(take.directory / "sequence.json")
+    assert (take.read().frames, take.read().complete) == (4, True)
+    assert take.size() > before[2]
+
+
+def test_what_is_made_of_a_take(tmp_path) -> None:
+    """It knows the other take, also after both were moved, and its obstacles; numbers may be below zero."""
+    source = begun(tmp_path / "old" / "first")
+    take = new_take(tmp_path / "old" / "second")
+    assert (take.read().direction, take.read().source) == (None, None)
+    take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], [b"mesh"])
+    (tmp_path / "old").rename(tmp_path / "new")
+    take, source = (Take(tmp_path / "new" / t.directory.relative_to(tmp_path / "old")) for t in (take, source))
+    assert (take.read().direction, take.read().source, take.read().title) == ("continue", source, "Continued 1")
+    arguments = take.arguments()
+    assert arguments[:2] == ["continue", str(source.directory)]
+    assert arguments[arguments.index("--mesh") + 1] == str(take.mesh_file)
+    assert arguments[arguments.index("--wind") + 1] == "-1.5"
+    assert "--resume" in arguments
+    assert take.read().resumable
+    take.give_title("Windy")
+    assert (take.read().title, take.read().direction) == ("Windy", "continue")
+    take.remove()
+    assert list(take.directory.parent.iterdir()) == []
+
+
+def test_obstacles_that_move(tmp_path) -> None:
+    source = begun(tmp_path / "first")
+    take = new_take(tmp_path / "second")
+    take.write_directed("continue", source, ["--frames", "2"], [b"one", b"two", b"three"])
+    arguments = take.arguments()
+    assert arguments[arguments.index("--mesh") + 1 :] == [str(take.directory) + "_####.stl"]
+    assert [path.read_bytes() for path in sorted(take.directory.parent.glob("*.stl"))] == [b"one", b"two", b"three"]
+    assert new_take(take.directory.parent).directory.name == "take_0002"
+    take.remove()
+    assert list(take.directory.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        *(({"options": words}, "asks for") for words in (["--out", "/etc"], ["--ou=/etc"], ["--npz"], ["-h"])),
+        ({"direction": "continue", "source": "x", "options": ["--mesh", "/etc"]}, "asks for"),
+        ({"direction": "retime", "source": "x", "options": ["--wind", "1"]}, "asks for"),
+        ({"direction": "doctor", "source": "x", "options": []}, "damaged"),
+        ({"direction": "loop", "source": 3, "options": []}, "damaged"),
+        ({"direction": "loop", "options": []}, "damaged"),
+        *((damage, "damaged") for damage in ("", "{", "[]", '{"options": 3}')),
+    ],
+)
+def test_nothing_but_what_decides_the_result_reaches_the_engine(tmp_path, request_, said) -> None:
+    take = begun(tmp_path)
+    take.request_file.write_text(request_ if isinstance(request_, str) else json.dumps(request_))
+    with pytest.raises(TakeError, match=said):
+        take.arguments()
+
+
+def test_a_scene_file_is_told_where_its_files_went(tmp_path) -> None:
+    (tmp_path / "plate.png").write_text("picture")
+    take = new_take(tmp_path)
+    tables = {
+        "clip": {"path": str(tmp_path / "gone" / "clip.mp4"), "mask": str(tmp_path / "gone" / "mask.png")},
+        "background": {"image": str(tmp_path / "plate.png")},
+    }
+    take.write(tables, [])
+    files = {
+        ("clip", "path"): tmp_path / "clip.mp4",
+        ("clip", "mask"): tmp_path / "mask.png",
+        ("background", "image"): tmp_path / "other.png",
+    }
+    take.update_moved_files(files)
+    assert tomllib.loads(take.scene_file.read_text()) == tables
+    for name in ("clip.mp4", "mask.png", "other.png"):
+        (tmp_path / name).write_text("found")
+    take.update_moved_files(files)
+    tables["clip"] = {"path": str(tmp_path / "clip.mp4"), "mask": str(tmp_path / "mask.png")}
+    assert tomllib.loads(take.scene_file.read_text()) == tables
+    take.scene_file.write_text("[clip")
+    with pytest.raises(TakeError, match="make the smoke again"):
+        take.update_moved_files(files)
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(TakeError, match=r"file cannot be written to.*choose another output folder"):
+        Take(tmp_path / "file" / "take_0001").write(TABLES, [])
+
+
+def test_removing_takes_all_files_of_one_take(tmp_path) -> None:
+    first, second = begun(tmp_path), begun(tmp_path)
+    for take in (first, second):
+        with_sequence(take, 1, complete=True)
+        take.log_file.write_text("log")
+        take.thumbnail_file.write_text("picture")
+    first.remove()
+    assert {path.name[:9] for path in tmp_path.iterdir()} == {"take_0002"}
+    assert second.read().frames == 1

@@ -1,0 +1,100 @@
+"""The element of a clip: what the engine is asked for, and what Blender shows of it."""
+
+import json
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from addon.result import side_job
+from tests.example_shot import smoke
+
+ENGINE = """
+import json, shutil, sys
+from pathlib import Path
+words = sys.argv[1:]
+Path({said!r}).write_text(json.dumps(words))
+out = words[words.index("--out") + 1]
+first, last = words[words.index("--frames") + 1].split(":") if "--frames" in words else ("20", "31")
+for number in range(int(first), int(last) + 1):
+    shutil.copy({picture!r}, out.replace("####", f"{{number:04d}}"))
+print(json.dumps({{"event": "note", "text": "The plate is noisy.", "doubt": True}}))
+print(json.dumps({{"event": "done", "text": "Written."}}))
+"""
+"""Stands in for the engine: writes the same picture for every frame that it is asked for."""
+
+
+@pytest.fixture
+def asked(shot, tmp_path, monkeypatch) -> Callable[[], tuple[list[str], dict[str, Any]]]:
+    """Gives what the engine was asked for: its arguments, and the tables of the scene file."""
+    image = bpy.data.images.new("red", 2, 2, alpha=True, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"  # or it is written as displayed
+    image.pixels.foreach_set([0.25, 0.0, 0.0, 0.5] * 4)
+    image.filepath_raw, image.file_format = str(tmp_path / "red.exr"), "OPEN_EXR"
+    image.save()
+    said = tmp_path / "asked.json"
+    script = ENGINE.format(said=str(said), picture=str(tmp_path / "red.exr"))
+    monkeypatch.setattr(side_job, "engine_command", lambda words: [sys.executable, "-I", "-c", script, *words])
+    smoke(shot).smokelift.output = str(tmp_path / "out")
+
+    def read() -> tuple[list[str], dict[str, Any]]:
+        words = json.loads(said.read_text())
+        return words, tomllib.loads(Path(words[1]).read_text())
+
+    return read
+
+
+def test_extract_shows_the_element_of_this_frame(shot, asked) -> None:
+    shot.frame_set(24)
+    smoke(shot).smokelift.camera_mode = "SCENE"
+    smoke(shot).smokelift.box = None  # it takes no box to see the element
+    assert bpy.ops.smokelift.extract() == {"FINISHED"}
+    words, tables = asked()
+    folder = Path(bpy.app.tempdir) / "smokelift_element"
+    scene, out = str(folder.with_suffix(".toml")), str(folder / "element_####.exr")
+    assert words == ["extract", scene, "--out", out, "--frames", "23:23", "--progress", "json"]
+    assert sorted(tables) == ["background", "clip"]
+    image = bpy.data.images["element.exr"]
+    assert image.alpha_mode == "PREMUL"
+    assert list(image.pixels)[:4] == pytest.approx([0.25, 0.0, 0.0, 0.5])
+    assert side_job.side_job.doubts == [("", "The plate is noisy.")]
+    shot.frame_set(25)
+    assert bpy.ops.smokelift.extract() == {"FINISHED"}
+    assert [image.name for image in bpy.data.images if "element" in image.name] == ["element.exr"]
+
+
+def test_a_frame_without_the_clip_has_no_element(shot, asked) -> None:
+    clip = smoke(shot).smokelift.clip
+    clip.frame_start = 11
+    shot.frame_set(10)
+    with pytest.raises(RuntimeError, match=f"not seen in frame 10: go to one from 11 to {10 + clip.frame_duration}"):
+        bpy.ops.smokelift.extract()
+
+
+def test_render_element_writes_all_frames_that_are_used(shot, asked, tmp_path) -> None:
+    settings = smoke(shot).smokelift
+    settings.first, settings.last = 21, 32
+    folder = tmp_path / "new" / "element"
+    assert bpy.ops.smokelift.render_element(directory=str(folder)) == {"FINISHED"}
+    words, tables = asked()
+    scene = str(Path(bpy.app.tempdir) / "smokelift_element.toml")
+    assert words == ["extract", scene, "--out", str(folder / "element_####.exr"), "--progress", "json"]
+    assert tables["clip"]["frames"] == [20, 31]
+    assert sorted(path.name for path in folder.iterdir()) == [f"element_{n:04d}.exr" for n in range(20, 32)]
+    assert side_job.side_job.sentence == f"The element is in {folder}."
+
+
+def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
+    class Running:
+        def kill(self) -> None:
+            """Unregistering ends it."""
+
+    monkeypatch.setattr(side_job.side_job, "job", Running())
+    monkeypatch.setattr(side_job.side_job, "operator", "smokelift.render_element")
+    assert not bpy.ops.smokelift.extract.poll()
+    assert bpy.ops.smokelift.stop_writing() == {"FINISHED"}
+    assert bpy.ops.smokelift.extract.poll()

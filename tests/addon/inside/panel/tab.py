@@ -1,0 +1,235 @@
+"""The tab: what is in it, in Blender's words, at the width that Blender gives it."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+
+from addon.core.contract import QUALITIES
+from addon.panel import advanced_panel, direct_panel, element_panel, tab
+from addon.result import command_line, shot_check
+from addon.scene import volume
+from addon.scene.clip import clip_table
+from conftest import changed, made
+from tests.example_shot import smoke
+
+WIDTH = 258
+"""Pixels of the sidebar in a new window."""
+
+LETTERS = 34
+"""Of a label without an icon, at most, at that width."""
+
+
+class Layout:
+    """Keeps the texts that are drawn and the buttons, as ``[identifier]``, in place of Blender's layout."""
+
+    def __init__(self, texts: list[str]) -> None:
+        object.__setattr__(self, "texts", texts)
+
+    def __getattr__(self, name: str) -> Any:
+        def draw(*values: Any, text: str = "", icon: str = "NONE", **_settings: Any) -> Layout:
+            if name == "operator":
+                self.texts.append(f"[{values[0].removeprefix('smokelift.')}]")
+            self.texts.append(text if icon == "NONE" else f"{text}    ")
+            return self
+
+        return draw
+
+    def __setattr__(self, _name: str, _value: Any) -> None:
+        """Blender's layout has settings; here they change nothing."""
+
+
+def drawn(scene: bpy.types.Scene, *panels: type) -> list[str]:
+    texts: list[str] = []
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    context = SimpleNamespace(
+        scene=scene,
+        region=SimpleNamespace(width=WIDTH),
+        preferences=preferences,
+        window_manager=bpy.context.window_manager,
+    )
+    for kind in panels:
+        kind.draw(SimpleNamespace(layout=Layout(texts)), context)
+    return texts
+
+
+def drawn_with(scene: bpy.types.Scene, plate_mode: str, *panels: type) -> list[str]:
+    """The texts with a kind of background; the check stays done."""
+    state = bpy.context.window_manager.smokelift
+    kept = {name: getattr(state, name) for name in ("check_smoke", "check_done", "notes")}
+    smoke(scene).smokelift.plate_mode = plate_mode
+    for name, value in kept.items():
+        setattr(state, name, value)
+    return drawn(scene, *panels)
+
+
+def test_no_line_is_cut_off(shot) -> None:
+    manager = bpy.context.window_manager
+    state = manager.smokelift
+    state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Background: a picture"
+    know_costs(shot, seconds=86000.0, memory=112.4, disk=99900.0, lost=0.123)
+    state.memory_free = 11.8
+    for outcome in ("waiting", "running", "done", "failed"):
+        row = manager.smokelift.jobs.add()
+        row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
+        row.done, row.total, row.seconds_left = 1250, 2500, 80000.0
+        shot_check.keep_doubts(row, [("not all is smoke", "This is a doubt. " * 5)])
+    panels = (tab.SMOKELIFT_PT_view, element_panel.SMOKELIFT_PT_view_element, advanced_panel.SMOKELIFT_PT_view_advanced)
+    texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES") for text in drawn_with(shot, mode, *panels)]
+    bpy.ops.smokelift.new_mask()
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    texts += drawn(shot, *panels)
+    assert {"24 h", "112 G", "100 G", "12%"} <= set(texts)
+    assert [text for text in texts if len(text) > LETTERS] == []
+
+
+def know_costs(scene: bpy.types.Scene, **figures: float) -> None:
+    """All qualities were estimated, each with these figures."""
+    state = bpy.context.window_manager.smokelift
+    usual = {"resolution": (48, 48, 64), "seconds": 12.0, "memory": 0.4, "disk": 30.0, "lost": 0.0772}
+    for quality in QUALITIES:
+        row = state.costs.add()
+        row.name = quality
+        for name, value in {**usual, **figures}.items():
+            setattr(row, name, value)
+    state.costs_smoke = smoke(scene).session_uid
+
+
+def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
+    offer = "This smoke is large"
+    assert not [text for text in drawn(shot, tab.SMOKELIFT_PT_view) if text.startswith(offer)]
+    with changed(take) as index:
+        index["scene"]["domain"]["resolution"] = [160, 160, 240]
+    assert [text for text in drawn(shot, tab.SMOKELIFT_PT_view) if text.startswith(offer)]
+
+
+@pytest.mark.parametrize("name", ["longest_side", "fps", "overlap"])
+def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
+    settings = smoke(shot).smokelift.directing if name == "overlap" else smoke(shot).smokelift
+    smoke(shot).smokelift.directing.direction = "loop"
+    panels = (advanced_panel.SMOKELIFT_PT_view_advanced, direct_panel.SMOKELIFT_PT_view_direct)
+
+    def words() -> int:
+        return [text.strip() for text in drawn(shot, *panels)].count("Automatic")
+
+    before = words()
+    setattr(settings, f"use_{name}", True)
+    assert getattr(settings, name) > 0
+    assert words() == before - 1
+    setattr(settings, f"use_{name}", False)
+    assert getattr(settings, name) == 0
+
+
+def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> None:
+    """And those that Blender does not know of because they were written after it read the first ones."""
+    image = bpy.data.images.new("frame", 48, 32)
+    for number in (17, 18, 20, 21, 22):
+        image.save(filepath=str(tmp_path / f"frame_{number:04d}.png"))
+    settings = smoke(scene).smokelift
+    settings.clip = bpy.data.movieclips.load(str(tmp_path / "frame_0017.png"))
+
+    def said() -> str:
+        bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
+        return " ".join(text.strip() for text in drawn(scene, tab.SMOKELIFT_PT_view))
+
+    assert (settings.first, settings.last) == (1, 2)
+    assert "Missing: frame_0019.png." in said() and "Blender sees 2 of 6 frames." in said()
+    command_line._smoke(command_line._parser().parse_args([]))
+    assert "up to its frame 1 of 5 (frame_0019.png missing)" in capsys.readouterr().out
+    assert bpy.ops.smokelift.use_all_files() == {"FINISHED"}
+    assert clip_table(smoke(scene))["frames"] == [0, 5]
+    assert "Missing: frame_0019.png." in said() and "Blender sees" not in said()
+    image.save(filepath=str(tmp_path / "frame_0023.png"))
+    assert "Blender sees 2 of 7 frames." in said()
+    (tmp_path / "frame_0019.png").touch()
+    bpy.ops.smokelift.use_all_files()
+    assert "Missing" not in said() and "Blender sees" not in said()
+    settings.last = 1
+    assert "Missing" not in said()
+
+
+def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
+    """Also while another setting is estimated; nothing of another smoke, nor of a shot that is refused."""
+    state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
+    each |= {"lost": 0.0772}
+    shot_check.keep_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
+    cells = ("12 s", "0.2 G", "30 M", "8%")
+
+    def shown() -> list[int]:
+        texts = drawn(shot, tab.SMOKELIFT_PT_view)
+        return [texts.count(cell) for cell in cells]
+
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    assert shown() == [4, 4, 4, 4]
+    smoke(shot).smokelift.albedo = 0.5
+    assert not state.check_done
+    state.check_smoke = smoke(shot).session_uid
+    assert shown() == [4, 4, 4, 4]
+    state.check_smoke, state.check_error = smoke(shot).session_uid, "The box is flat."
+    assert shown() == [0, 0, 0, 0]
+    state.check_error, state.costs_smoke = "", state.costs_smoke + 1
+    assert shown() == [0, 0, 0, 0]
+
+
+def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_it(shot) -> None:
+    """Beside the forecast, and not while it is made anew; without a forecast in the window the tab stays as it was."""
+    state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
+    details = {**each, "qualities": dict.fromkeys(QUALITIES, each)}
+    state.check_smoke = smoke(shot).session_uid
+    shot_check._keep(state, details, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")])
+    texts = [text.strip() for text in drawn(shot, tab.SMOKELIFT_PT_view)]
+    place = texts.index("A person moves.")
+    assert "[new_mask]" in texts[:place]  # beside Mask
+    assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
+    assert "There is a cut." in texts[place + 3 : place + 6]
+    assert texts.index("There is a cut.") < texts.index("[run]")
+    smoke(shot).smokelift.albedo = 0.5
+    state.check_smoke = smoke(shot).session_uid
+    assert "A person moves." not in [text.strip() for text in drawn(shot, tab.SMOKELIFT_PT_view)]
+
+
+def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
+    state = bpy.context.window_manager.smokelift
+    volume.show(smoke(shot), made(tmp_path))
+    for outcome in ("done", "waiting"):
+        row = state.jobs.add()
+        row.smoke_uid, row.outcome, row.sentence = (
+            smoke(shot).session_uid,
+            outcome,
+            "Match to the clip: good (29.0 dB).",
+        )
+    state.check_smoke = smoke(shot).session_uid
+    texts = [text.strip() for text in drawn(shot, tab.SMOKELIFT_PT_view) if text.strip()]
+    end = texts.index("[set_up]")
+    assert texts[end - 4 : end] == ["[open_log]", "Queued", "[cancel]", "Cancel"]
+    assert "Smoke from Video..." in texts
+
+
+def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
+    def said() -> bool:
+        bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
+        return "inside its lines" in " ".join(map(str.strip, drawn(shot, tab.SMOKELIFT_PT_view)))
+
+    assert not said()
+    bpy.ops.smokelift.new_mask()
+    assert said()
+
+
+def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    assert shot_check.is_checked(state, smoke(shot))
+    smoke(shot).smokelift.box.scale.x *= 1.1
+    bpy.context.view_layer.update()
+    assert not shot_check.is_checked(state, smoke(shot))
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    smoke(shot).smokelift.box.scale.x *= 1.1
+    bpy.context.view_layer.update()
+    assert shot_check.is_checked(state, smoke(shot))

@@ -1,0 +1,47 @@
+"""Another object that plays a smoke's files at its own time."""
+
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon.scene import volume
+from conftest import FRAMES, made
+from smokelift.scene import Medium
+from tests.example_shot import smoke
+
+
+@pytest.fixture
+def shown(scene, tmp_path) -> bpy.types.Object:
+    """A smoke of `made`, active."""
+    obj = volume.show(smoke(scene), made(tmp_path, medium=Medium(4.0, 0.8)))
+    bpy.context.view_layer.objects.active = obj
+    return obj
+
+
+def played(obj: bpy.types.Object, frame: int) -> str:
+    """The file that a Volume shows in a frame; none before and after its frames."""
+    bpy.context.scene.frame_set(frame)
+    data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    data.grids.load()
+    return Path(data.grids.frame_filepath).name
+
+
+def test_an_instance_plays_later_once_or_again(shown) -> None:
+    start = shown.data.frame_start
+    assert bpy.ops.smokelift.add_instance(offset=2) == {"FINISHED"}
+    once = bpy.context.object
+    assert once != shown and not once.smokelift.is_smoke
+    assert once.data.materials[0] == shown.data.materials[0]
+    assert (once.location, once.delta_location) == (shown.location, shown.delta_location)
+    assert [played(once, start + n) for n in (0, 2, 4)] == ["", "smoke_0001.vdb", "smoke_0003.vdb"]
+    assert played(shown, start + 4) == "smoke_0005.vdb"
+    bpy.context.view_layer.objects.active = shown
+    assert bpy.ops.smokelift.add_instance(offset=3, repeat=True) == {"FINISHED"}
+    again = bpy.context.object
+    expected = [f"smoke_{FRAMES - 1:04d}.vdb", "smoke_0004.vdb"]
+    assert [played(again, start + n) for n in (1, FRAMES)] == expected
+
+
+def test_only_a_sequence_has_instances(scene) -> None:
+    assert not bpy.ops.smokelift.add_instance.poll()

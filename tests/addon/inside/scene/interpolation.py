@@ -1,0 +1,121 @@
+"""Frames between those of a take: where the smoke is, and that renders have it and its motion blur."""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.core.take import Take
+from addon.scene import modifiers, volume
+from conftest import rendered
+from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
+from smokelift.scene import Domain, Medium, Scene, scene_to_dict
+from tests.example_shot import EXAMPLE, add_camera, smoke
+
+DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (32, 32, 48))
+FRAMES, FPS, VOXELS_A_FRAME = 4, 24.0, 4.0
+needs_nodes = pytest.mark.skipif(not modifiers.CAN_INTERPOLATE, reason="Blender moves grids since 5.0")
+
+
+def ball(place: float) -> np.ndarray:
+    """A soft ball at a place along x, in voxels."""
+    x, y, z = np.meshgrid(*[np.arange(n) + 0.5 for n in DOMAIN.resolution], indexing="ij")
+    distance = np.sqrt((x - place) ** 2 + (y - 16.0) ** 2 + (z - 24.0) ** 2)
+    return np.clip(1.5 - distance / 4.0, 0.0, 1.0).astype(np.float32)
+
+
+def flying(folder: Path, *, fire: bool = False, proxies: bool = False) -> Take:
+    """A take of a ball that flies along x."""
+    take = Take(folder / "take_0001")
+    take.directory.mkdir(parents=True)
+    velocity = np.zeros((*DOMAIN.resolution, 3), np.float32)
+    velocity[..., 0] = VOXELS_A_FRAME * DOMAIN.voxel_size * FPS
+    for number in range(1, FRAMES + 1):
+        rho = ball(8.0 + VOXELS_A_FRAME * (number - 1))
+        flame = 2.0 * rho if fire else None
+        write_vdb(take.directory / f"smoke_{number:04d}.vdb", rho, velocity, DOMAIN, flame=flame)
+        if proxies:
+            write_proxy(take.directory / f"proxy_{number:04d}.vdb", rho, DOMAIN)
+    scene = scene_to_dict(Scene(domain=DOMAIN, medium=Medium(20.0, 0.8)))
+    scene["clip"] = {"path": str(EXAMPLE / "clip.mp4"), "fps": FPS}
+    frames = {str(number): {} for number in range(1, FRAMES + 1)}
+    index = {"complete": True, "scene": scene, "settings": {}, "frames": frames}
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+    return take
+
+
+@pytest.fixture
+def slow(shot) -> bpy.types.Object:
+    """A smoke at half its speed, with frames between."""
+    shot.render.fps = 48
+    settings = smoke(shot).smokelift
+    settings.speed, settings.between = "REAL", True
+    return smoke(shot)
+
+
+def seen(obj: bpy.types.Object, frame: int, name: str = "density") -> np.ndarray:
+    """A grid as the viewport shows it in a frame."""
+    bpy.context.scene.frame_set(frame)
+    data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    data.grids.load()
+    assert data.grids.save("seen.vdb")
+    values = np.zeros(DOMAIN.resolution, np.float32)
+    vdb_module().read("seen.vdb", gridname=name).copyToArray(values)
+    return values
+
+
+@needs_nodes
+def test_the_smoke_is_where_it_would_be(slow, tmp_path) -> None:
+    volume.show(slow, flying(tmp_path, fire=True))
+    for frame in range(1, 2 * FRAMES + 1):
+        place = min((frame - 1) / 2, FRAMES - 1)
+        wanted = ball(8.0 + VOXELS_A_FRAME * place)
+        np.testing.assert_allclose(seen(slow, frame), wanted, atol=4e-3)
+        np.testing.assert_allclose(seen(slow, frame, "flame"), 2.0 * wanted, atol=8e-3)
+
+
+@needs_nodes
+def test_a_render_has_them_and_their_motion_blur(slow, tmp_path) -> None:
+    """What the ball hides is half a frame further, and wider with motion blur: the shutter is open for a frame."""
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples, scene.cycles.seed = "CYCLES", 32, 1
+    scene.render.resolution_x, scene.render.resolution_y, scene.cycles.use_denoising = 32, 12, False
+    camera = add_camera(scene, (0.0, -4.0, 1.5), (np.pi / 2, 0.0, 0.0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    bpy.data.objects["Sun"].hide_render = True
+    volume.show(slow, flying(tmp_path))
+    found = []
+    for blur in (False, True):
+        scene.render.use_motion_blur, scene.render.motion_blur_shutter = blur, 2.0
+        scene.frame_set(4)
+        hidden = 1.0 - rendered(scene, tmp_path / "out.exr").mean((0, 2))
+        columns = np.arange(len(hidden)) + 0.5
+        middle = (hidden * columns).sum() / hidden.sum()
+        found.append((middle, np.sqrt((hidden * (columns - middle) ** 2).sum() / hidden.sum())))
+    (middle, width), (blurred, wider) = found
+    assert middle == pytest.approx(8.0 + 1.5 * VOXELS_A_FRAME, abs=0.5)
+    assert blurred == pytest.approx(middle, abs=0.5)
+    assert wider**2 - width**2 == pytest.approx(VOXELS_A_FRAME**2 / 12, rel=0.3), "as of a box as wide as it moves"
+
+
+@needs_nodes
+def test_only_renders_have_them_while_the_viewport_shows_a_proxy(slow, tmp_path) -> None:
+    volume.show(slow, flying(tmp_path, proxies=True))
+    first, second = slow.modifiers
+    assert (first.name, first.show_viewport, first.show_render) == (modifiers.INTERPOLATION, False, True)
+    assert (second, second.show_render) == (modifiers.proxy_modifier(slow), False)
+
+
+def test_they_are_taken_away(slow, tmp_path) -> None:
+    """Where they are switched off, and where every frame of the scene has a file; or where Blender lacks the nodes."""
+    volume.show(slow, flying(tmp_path))
+    assert bool(slow.modifiers) == modifiers.CAN_INTERPOLATE
+    for name, on, off in (("between", True, False), ("speed", "REAL", "FRAMES")):
+        setattr(slow.smokelift, name, off)
+        assert not slow.modifiers and list(bpy.data.volumes) == [slow.data]
+        assert not slow.animation_data or not slow.animation_data.drivers
+        setattr(slow.smokelift, name, on)
+    assert bool(slow.modifiers) == modifiers.CAN_INTERPOLATE

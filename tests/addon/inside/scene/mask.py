@@ -1,0 +1,190 @@
+"""A mask that is drawn in Blender: the pictures that the engine gets, and whose they are."""
+
+import tomllib
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.core.take import Take
+from addon.result import smoke_takes
+from addon.scene import mask
+from addon.scene.blender import ShotError
+from addon.scene.scene_file import footage_tables, shot_tables
+from smokelift.footage.clip import Clip
+from smokelift.scene import Scene
+from tests.example_shot import smoke
+
+RECTANGLE = ((0.3, 0.1), (0.7, 0.1), (0.7, 0.4), (0.3, 0.4))
+"""Corners in shares of the picture's longer side, from its middle column and its lower edge."""
+
+
+def draw(scene: bpy.types.Scene, corners: tuple[tuple[float, float], ...] = RECTANGLE) -> bpy.types.MaskSpline:
+    """Press New Mask and draw a closed line with sharp corners."""
+    assert bpy.ops.smokelift.new_mask() == {"FINISHED"}
+    line = smoke(scene).smokelift.drawn_mask.layers[0].splines.new()
+    line.points.add(len(corners) - len(line.points))
+    line.use_cyclic = True
+    put(line, corners)
+    return line
+
+
+def put(line: bpy.types.MaskSpline, corners: tuple[tuple[float, float], ...]) -> None:
+    for point, corner in zip(line.points, corners, strict=True):
+        point.handle_type = "VECTOR"
+        point.co = point.handle_left = point.handle_right = corner
+
+
+def white(picture: Path) -> np.ndarray:
+    """Where a picture is white, row 0 at the top; it has hardly any other value than black."""
+    image = bpy.data.images.load(str(picture))
+    image.colorspace_settings.name = "Non-Color"
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    width, height = image.size
+    bpy.data.images.remove(image)
+    values = values.reshape(height, width, -1)[::-1, :, 0]
+    assert np.minimum(values, 1 - values).mean() < 0.01
+    return values > 0.5
+
+
+def box_of(seen: np.ndarray) -> tuple[float, ...]:
+    """First and last column, first and last row that are white, in pixels."""
+    rows, columns = np.nonzero(seen)
+    return columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
+
+
+def test_inside_its_lines_smoke_may_be(shot) -> None:
+    """Where Blender's Mask node has them: a mask is measured from the middle, in shares of the longer side."""
+    settings = smoke(shot).smokelift
+    settings.mask = "//no such file.png"  # what is drawn comes first
+    draw(shot)
+    table = footage_tables(smoke(shot))["clip"]
+    width, height = settings.clip.size
+    seen = white(Path(table["mask"]))
+    assert seen.shape == (height, width)
+    wanted = (*(width / 2 + height * x for x in (-0.2, 0.2)), 0.6 * height, 0.9 * height)
+    assert box_of(seen) == pytest.approx(wanted, abs=1)
+    assert seen.mean() == pytest.approx(0.4 * height * 0.3 * height / (width * height), rel=0.02)
+    assert footage_tables(smoke(shot))["clip"] == table  # drawn once
+    settings.drawn_mask.layers[0].invert = True
+    assert (white(Path(footage_tables(smoke(shot))["clip"]["mask"])) == ~seen).mean() > 0.995
+    assert len(bpy.data.scenes) == 1
+
+
+def test_the_engine_hides_what_is_black(shot, tmp_path) -> None:
+    draw(shot)
+    take = Take(tmp_path / "take_0001")
+    take.write(shot_tables(smoke(shot)), [])
+    with Clip.open(Scene.load(take.scene_file).clip) as clip:
+        seen = clip.seen(0, *clip.size)
+    assert (seen == white(mask.mask_path(smoke(shot)))).all()
+
+
+def move(scene: bpy.types.Scene, line: bpy.types.MaskSpline, keys: dict[int, tuple[float, float]]) -> None:
+    """Give a line shape keys: how far it is moved in some frames."""
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    area.type = "CLIP_EDITOR"
+    space, settings = area.spaces.active, smoke(scene).smokelift
+    space.clip, space.mode, space.mask = settings.clip, "MASK", settings.drawn_mask
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    for frame, (right, up) in keys.items():
+        scene.frame_set(frame)
+        put(line, tuple((x + right, y + up) for x, y in RECTANGLE))
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            for point in line.points:
+                point.select = True
+            assert bpy.ops.mask.shape_key_insert() == {"FINISHED"}
+
+
+def test_a_mask_that_moves_has_a_picture_for_every_frame_of_the_file(shot) -> None:
+    """By the numbers that the engine counts the frames by; a check takes the current frame's alone."""
+    settings = smoke(shot).smokelift
+    settings.clip.frame_start, settings.clip.frame_offset = 101, 3
+    settings.first, settings.last = 5, 9
+    line = draw(shot)
+    move(shot, line, {105: (0.0, 0.0), 109: (0.0, 0.4)})
+    shot.frame_set(107)
+    pattern = Path(footage_tables(smoke(shot))["clip"]["mask"])
+    assert pattern.name == "mask_####.png"
+    height = settings.clip.size[1]
+
+    def lower_edge(number: int) -> float:
+        return 1 - box_of(white(Path(str(pattern).replace("####", f"{number:04d}"))))[3] / height
+
+    assert len(list(pattern.parent.iterdir())) == 3 + settings.clip.frame_duration
+    # the frame 105 of the scene is the clip's fifth, which is number 7 of the file
+    found = [lower_edge(number) for number in (0, 7, 9, 11, 30)]
+    assert found == pytest.approx([0.1, 0.1, 0.3, 0.5, 0.5], abs=0.01)
+    quick = Path(shot_tables(smoke(shot), quick=True)["clip"]["mask"])
+    assert quick.name == "mask.png"
+    assert 1 - box_of(white(quick))[3] / height == pytest.approx(0.3, abs=0.01)
+    assert shot.frame_current == 107
+
+
+def test_a_line_that_is_not_closed_says_what_to_do(shot) -> None:
+    line = draw(shot)
+    line.use_cyclic = False
+    with pytest.raises(ShotError, match="no closed line yet"):
+        footage_tables(smoke(shot))
+    smoke(shot).smokelift.drawn_mask = None
+    assert "mask" not in footage_tables(smoke(shot))["clip"]
+    smoke(shot).smokelift.mask = "//no such file.png"
+    with pytest.raises(ShotError, match=r"no such file\.png is not there"):
+        footage_tables(smoke(shot))
+
+
+def test_new_mask_opens_the_one_that_there_is(shot) -> None:
+    draw(shot)
+    found = smoke(shot).smokelift.drawn_mask
+    assert bpy.ops.smokelift.new_mask() == {"FINISHED"}
+    assert smoke(shot).smokelift.drawn_mask == found
+    assert len(bpy.data.masks) == 1
+    assert not shot.frame_current_final < found.frame_start
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_result_keeps_the_mask_that_it_was_made_with(shot, tmp_path, moves) -> None:
+    """Also where its folder is moved, or another file was chosen meanwhile; it goes with the result."""
+    settings = smoke(shot).smokelift
+    settings.output = str(tmp_path / "out")
+    line = draw(shot)
+    if moves:
+        move(shot, line, {1: (0.0, 0.0), 11: (0.0, 0.4)})
+    take = smoke_takes.write_take(smoke(shot))
+    own = "take_0001_mask_####.png" if moves else "take_0001_mask.png"
+    first = tmp_path / "out" / own.replace("####", "0000")
+    before = first.read_bytes()
+
+    def in_file() -> str:
+        return tomllib.loads(take.scene_file.read_text())["clip"]["mask"]
+
+    assert in_file() == own
+    line.use_cyclic = False
+    settings.drawn_mask, settings.mask = None, str(first)
+    smoke_takes.update_moved_files(smoke(shot), take)
+    assert in_file() == own and first.read_bytes() == before
+    (tmp_path / "out").rename(tmp_path / "moved")
+    moved = Take(tmp_path / "moved" / "take_0001")
+    with Clip.open(Scene.load(moved.scene_file).clip) as clip:
+        assert clip.seen(0, *clip.size).mean() < 0.5
+    moved.remove()
+    assert list((tmp_path / "moved").iterdir()) == []
+
+
+def test_a_mask_that_is_drawn_on_is_checked_anew(shot) -> None:
+    """But not one that only moves because the clip plays, nor another one."""
+    line, state = draw(shot), bpy.context.window_manager.smokelift
+    other = bpy.data.masks.new("Other").layers.new(name="Other").splines.new()
+    bpy.context.view_layer.update()
+    state.check_smoke = smoke(shot).session_uid
+    shot.frame_set(7)
+    other.use_cyclic = True
+    bpy.context.view_layer.update()
+    shot_tables(smoke(shot), quick=True)
+    assert state.check_smoke
+    line.points[0].co = (0.2, 0.1)
+    bpy.context.view_layer.update()
+    assert not state.check_smoke

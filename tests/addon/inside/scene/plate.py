@@ -1,0 +1,156 @@
+"""The background that an artist gives: frames of the clip without smoke, and strokes painted on its frames."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.core.take import Take
+from addon.panel import element_panel
+from addon.result.smoke_takes import output_folder
+from addon.scene.blender import ShotError
+from addon.scene.scene_file import footage_tables, shot_tables
+from smokelift.scene import Scene
+from tests.example_shot import EXAMPLE, smoke
+
+# frames of the clip as the clean plate
+
+
+def test_frames_without_smoke_are_the_plate(shot, tmp_path) -> None:
+    settings = smoke(shot).smokelift
+    settings.clip.frame_start, settings.clip.frame_offset = 101, 3
+    for frame in (103, 101, 103):
+        shot.frame_set(frame)
+        assert bpy.ops.smokelift.plate_from_frame() == {"FINISHED"}
+    assert (settings.plate_mode, settings.plate_frames) == ("FRAMES", "3, 1")
+    assert footage_tables(smoke(shot))["background"] == {"frame": [3, 5]}
+    assert bpy.ops.smokelift.clear_plate_frames() == {"FINISHED"}
+    assert (settings.plate_mode, settings.plate_frames) == ("ESTIMATE", "")
+    assert "background" not in footage_tables(smoke(shot))
+
+
+def test_frames_that_the_clip_does_not_have_are_refused(shot) -> None:
+    settings = smoke(shot).smokelift
+    settings.plate_mode = "FRAMES"
+    for text, said in (("", "press Plate from This Frame"), ("0", "has frames 1 to"), ("2, x", "Frames 2, x are not")):
+        settings.plate_frames = text
+        with pytest.raises(ShotError, match=said):
+            footage_tables(smoke(shot))
+    shot.frame_set(-5)
+    with pytest.raises(RuntimeError, match="not seen in frame -5"):
+        bpy.ops.smokelift.plate_from_frame()
+    settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+    assert settings.plate_frames == ""
+
+
+# strokes
+
+
+def pixels_of(image: bpy.types.Image) -> np.ndarray:
+    """The colors and the alpha of an image, row 0 at the top."""
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], 4)[::-1]
+
+
+def paint(image: bpy.types.Image, color: tuple[float, float, float], opacity: float, rows: slice) -> None:
+    """Paint some rows of an image, as a brush does."""
+    values = pixels_of(image).copy()
+    values[rows, :, :3] += opacity * (color - values[rows, :, :3])
+    image.pixels.foreach_set(values[::-1].ravel())
+
+
+def in_file(file: Path) -> np.ndarray:
+    """The strokes that the engine reads."""
+    image = bpy.data.images.load(str(file))
+    values = pixels_of(image)
+    bpy.data.images.remove(image)
+    return values
+
+
+def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
+    """Below them is the clip; the file has the strokes alone, and follows before a run."""
+    settings = smoke(shot).smokelift
+    settings.output = str(tmp_path / "out")
+    shot.frame_set(20)
+    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
+    image, file = settings.strokes, output_folder(smoke(shot)) / "strokes.png"
+    assert Path(bpy.path.abspath(image.filepath)) == file
+    first = pixels_of(image).copy()
+    assert first[..., 3].min() == 1.0 and first[..., :3].max() > 0.5
+    assert footage_tables(smoke(shot))["background"] == {"image": str(EXAMPLE / "plate.png"), "strokes": str(file)}
+    assert not in_file(file).any()
+    green, red, black = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for color, opacity, rows in ((green, 0.8, slice(9)), (red, 1.0, slice(9, 12)), (black, 1.0, slice(4))):
+        paint(image, color, opacity, rows)
+    footage_tables(smoke(shot))
+    found = in_file(file)
+    assert (found[4:9] == (*green, 1.0)).all() and (found[9:12] == (*red, 1.0)).all()
+    assert not found[:4].any() and not found[12:].any()
+    assert not image.is_dirty
+    # another frame below: the strokes stay, and the frame is seen where they were erased
+    shot.frame_set(40)
+    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
+    second = pixels_of(image)
+    assert (second[4:9] == (*green, 1.0)).all() and second[..., 3].min() == 1.0
+    assert np.abs(second[12:] - first[12:]).max() > 0.05
+    image.save()  # by the artist, with the frame below
+    footage_tables(smoke(shot))
+    assert (in_file(file) == found).all()
+    assert len(bpy.data.scenes) == 1
+    assert [each for each in bpy.data.images if each.source != "VIEWER"] == [image]
+    # they are opened again where they were made
+    bpy.data.images.remove(image)
+    assert settings.strokes is None
+    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
+    assert (pixels_of(settings.strokes)[4:9] == (*green, 1.0)).all()
+
+
+def test_other_images_are_strokes_too(shot, tmp_path) -> None:
+    image = bpy.data.images.new("mine", *smoke(shot).smokelift.clip.size, alpha=True)
+    image.filepath_raw, image.file_format = str(tmp_path / "mine.png"), "PNG"
+    image.save()
+    smoke(shot).smokelift.strokes = image
+    paint(image, (0.3, 0.6, 0.3), 1.0, slice(4))
+    assert footage_tables(smoke(shot))["background"]["strokes"] == str(tmp_path / "mine.png")
+    assert in_file(tmp_path / "mine.png")[:4, :, 1] == pytest.approx(0.6, abs=0.01)
+
+
+def test_the_engine_reads_frames_and_strokes(shot, tmp_path) -> None:
+    smoke(shot).smokelift.output = str(tmp_path / "out")
+    bpy.ops.smokelift.paint_strokes()
+    bpy.ops.smokelift.plate_from_frame()
+    take = Take(tmp_path / "take_0001")
+    take.write(shot_tables(smoke(shot)), [])
+    background = Scene.load(take.scene_file).background
+    assert background.frame == (0,)
+    assert background.strokes == tmp_path / "out" / "strokes.png"
+
+
+def test_strokes_that_cannot_be_written_are_named(shot, tmp_path) -> None:
+    smoke(shot).smokelift.output = str(tmp_path / "out")
+    bpy.ops.smokelift.paint_strokes()
+    (tmp_path / "file").touch()
+    smoke(shot).smokelift.strokes.filepath_raw = str(tmp_path / "file" / "strokes.png")
+    with pytest.raises(ShotError, match=r"strokes\.png cannot be written"):
+        footage_tables(smoke(shot))
+
+
+@pytest.mark.parametrize(("size", "saved", "said"), [((8, 8), True, "8 x 8 pixels"), ((256, 384), False, "in no file")])
+def test_an_image_that_does_not_fit_is_refused(shot, tmp_path, size, saved, said) -> None:
+    image = bpy.data.images.new("mine", *size, alpha=True)
+    if saved:
+        image.filepath_raw, image.file_format = str(tmp_path / "mine.png"), "PNG"
+        image.save()
+    smoke(shot).smokelift.strokes = image
+    with pytest.raises(ShotError, match=said):
+        footage_tables(smoke(shot))
+
+
+@pytest.mark.parametrize("means", element_panel.COLORS)
+def test_a_stroke_has_the_color_that_says_it(shot, means) -> None:
+    assert bpy.ops.smokelift.stroke(means=means) == {"FINISHED"}
+    paint = shot.tool_settings.image_paint
+    holder = getattr(paint, "unified_paint_settings", None) or shot.tool_settings.unified_paint_settings
+    assert tuple(holder.color) == element_panel.COLORS[means]

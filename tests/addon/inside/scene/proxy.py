@@ -1,0 +1,150 @@
+"""The proxy: what viewports show and renders use, when it plays, and whose it is."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.core.take import Take
+from addon.scene import modifiers, volume
+from conftest import FRAMES, changed, made, rendered
+from smokelift.output.vdb import write_proxy
+from smokelift.scene import Domain
+from tests.example_shot import add_camera, smoke
+
+DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
+
+
+def with_proxy(folder: Path, number: int = 1) -> Take:
+    """A take of `made` beside whose files lie coarse copies, of smoke everywhere."""
+    take = made(folder, number=number)
+    for n in range(1, FRAMES + 1):
+        write_proxy(take.directory / f"proxy_{n:04d}.vdb", np.ones(DOMAIN.resolution, np.float32), DOMAIN)
+    return take
+
+
+@pytest.fixture
+def obj(scene, tmp_path) -> bpy.types.Object:
+    """A smoke with a proxy."""
+    return volume.show(smoke(scene), with_proxy(tmp_path))
+
+
+def in_viewport(obj: bpy.types.Object, frame: int) -> str:
+    """Name of the file that the viewport shows in a frame; empty where it shows none."""
+    bpy.context.scene.frame_set(frame)
+    data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    data.grids.load()
+    return Path(data.grids.frame_filepath).name
+
+
+def in_render(obj: bpy.types.Object) -> list[str]:
+    """Names of the files that a render of the current frame uses."""
+    found: list[str] = []
+
+    def look(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        if depsgraph.mode == "RENDER":
+            found.append(Path(obj.evaluated_get(depsgraph).data.filepath).name)
+
+    bpy.app.handlers.frame_change_post.append(look)
+    bpy.app.handlers.depsgraph_update_post.append(look)
+    try:
+        rendered(bpy.context.scene, Path("out.exr").absolute())
+    finally:
+        bpy.app.handlers.frame_change_post.remove(look)
+        bpy.app.handlers.depsgraph_update_post.remove(look)
+    return found
+
+
+def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) -> None:
+    scene.render.engine, scene.cycles.samples, scene.cycles.seed = "CYCLES", 2, 1
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    add_camera(scene, (0.44, -3.0, 1.62), (np.pi / 2, 0.0, 0.0)).data.ortho_scale = 0.5
+    assert [in_viewport(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_0001.vdb", "proxy_0003.vdb", ""]
+    scene.frame_set(3)
+    assert set(in_render(obj)) == {"smoke_0001.vdb"}
+    picture = rendered(scene, tmp_path / "with.exr")
+    obj.modifiers.clear()
+    np.testing.assert_array_equal(rendered(scene, tmp_path / "without.exr"), picture)
+
+
+def test_it_has_a_switch(obj, tmp_path) -> None:
+    modifiers.proxy_modifier(obj).show_viewport = False
+    volume.show(obj, volume.shown_take(obj))
+    volume.show(obj, with_proxy(tmp_path, number=2))
+    assert in_viewport(obj, 3) == "smoke_0003.vdb"
+    assert modifiers.in_viewport(obj) == obj.data
+    modifiers.proxy_modifier(obj).show_viewport = True
+    assert in_viewport(obj, 3) == "proxy_0003.vdb"
+    assert modifiers.in_viewport(obj) == modifiers.proxy_of(obj)
+
+
+@pytest.mark.parametrize("speed", ["FRAMES", "REAL"])
+def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, speed) -> None:
+    """From the first used frame of the clip's own numbers, say; the frames themselves count from 1."""
+    take = with_proxy(tmp_path)
+    for kind in ("smoke", "proxy"):
+        for n in range(FRAMES, 0, -1):
+            (take.directory / f"{kind}_{n:04d}.vdb").rename(take.directory / f"{kind}_{n + 1000}.vdb")
+    with changed(take) as index:
+        index["start_number"] = 1001
+    scene.render.fps, smoke(scene).smokelift.speed = 24, speed
+    obj = volume.show(smoke(scene), take)
+    assert [in_viewport(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_1001.vdb", "proxy_1003.vdb", ""]
+    modifiers.proxy_modifier(obj).show_viewport = False
+    assert [in_viewport(obj, frame) for frame in (1, 3)] == ["smoke_1001.vdb", "smoke_1003.vdb"]
+    assert volume.shown_numbers(obj) == list(range(1, FRAMES + 1))
+    assert volume.number_at(obj, 3) == 3
+    scene.render.fps = 48
+    volume.keep_step()
+    later = "smoke_1002.vdb" if speed == "REAL" else "smoke_1003.vdb"
+    assert in_viewport(obj, 3) == later
+
+
+def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
+    settings = smoke(shot).smokelift
+    shot.render.fps, settings.speed = 48, "REAL"
+    obj = volume.show(smoke(shot), with_proxy(tmp_path))
+    assert [in_viewport(obj, frame) for frame in (1, 2, 3)] == ["proxy_0001.vdb"] * 2 + ["proxy_0002.vdb"]
+    settings.clip.frame_start = 101
+    volume.keep_step()
+    assert [in_viewport(obj, frame) for frame in (1, 103)] == ["", "proxy_0002.vdb"]
+
+
+def test_a_result_without_one_is_shown_itself(scene, obj, tmp_path) -> None:
+    volume.show(obj, made(tmp_path, number=2))
+    assert in_viewport(obj, 3) == "smoke_0003.vdb"
+    assert list(bpy.data.volumes) == [obj.data] and not obj.modifiers
+    assert modifiers.proxy_of(obj) is None
+
+
+def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
+    twin = obj.copy()
+    twin.data = obj.data.copy()
+    scene.collection.objects.link(twin)
+    volume.show(twin, with_proxy(tmp_path, number=2))
+    beside = volume.show_beside(obj, with_proxy(tmp_path, number=3))
+    proxies = [modifiers.proxy_of(each) for each in (obj, twin, beside)]
+    assert len(set(proxies)) == 3
+    assert [volume.take_of(data).directory.name for data in proxies] == ["take_0001", "take_0002", "take_0003"]
+    assert len({tuple(data.materials) for data in proxies}) == 1
+
+
+def test_it_is_saved_with_the_file(scene, obj, tmp_path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    (again,) = [obj for obj in bpy.context.scene.objects if obj.type == "VOLUME"]
+    assert in_viewport(again, 3) == "proxy_0003.vdb"
+
+
+def test_it_follows_a_run(scene, tmp_path) -> None:
+    take = with_proxy(tmp_path)
+    for number in range(3, FRAMES + 1):
+        (take.directory / f"proxy_{number:04d}.vdb").unlink()
+    index = (take.directory / "sequence.json").read_text()
+    obj = smoke(scene)
+    volume.show(obj, take)
+    assert modifiers.proxy_modifier(obj) is None
+    (take.directory / "sequence.json").write_text(index.replace(', "3": {}, "4": {}, "5": {}, "6": {}', ""))
+    volume.show(obj, take)
+    assert in_viewport(obj, 2) == "proxy_0002.vdb"

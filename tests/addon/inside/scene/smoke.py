@@ -1,0 +1,269 @@
+"""Smokes are objects: several in a scene, each with its own clip, settings and results."""
+
+import shutil
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon.core.take import Take, takes
+from addon.result import run_queue, smoke_takes
+from addon.scene import shot_setup, volume
+from addon.scene.blender import absolute
+from addon.scene.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke
+from conftest import changed, made
+from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
+
+
+@pytest.fixture
+def clip(blender) -> bpy.types.MovieClip:
+    """The example's."""
+    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+
+
+def test_new_smoke_is_a_volume_that_is_selected_and_active(scene, clip) -> None:
+    camera = add_camera(scene, (0.0, 0.0, 0.0))
+    camera.select_set(True)
+    obj = new_smoke(scene, clip)
+    assert (obj.type, obj.name) == ("VOLUME", "Smoke clip.mp4")
+    assert bpy.context.view_layer.objects.active == obj
+    assert [other for other in scene.objects if other.select_get()] == [obj]
+    assert (obj.smokelift.first, obj.smokelift.last) == (1, clip.frame_duration)
+
+
+def test_the_active_smoke_is_that_of_the_active_object(scene, clip) -> None:
+    first, second = new_smoke(scene, clip), new_smoke(scene, clip)
+    box = second.smokelift.box = add_box(scene, (0, 0, 0), (1, 1, 1))
+    layer = bpy.context.view_layer
+    for active, wanted in ((first, first), (second, second), (box, second), (add_camera(scene, (0, 0, 0)), first)):
+        layer.objects.active = active
+        assert active_smoke(scene) == wanted
+    bpy.data.objects.remove(first)
+    bpy.data.objects.remove(second)
+    assert active_smoke(scene) is None
+
+
+def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    first, second = new_smoke(scene, clip), new_smoke(scene, clip)
+    second.name = "Other"
+    folders = [smoke_takes.output_folder(obj) for obj in (first, second)]
+    assert folders == [tmp_path / "smokelift" / name for name in ("clip", "clip_2")]
+    second.smokelift.clip = clip
+    assert smoke_takes.output_folder(second) == folders[1]
+
+
+def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    take = smoke_takes.write_take(obj)
+    uid = obj.session_uid
+    assert find_smoke(uid) == obj
+    scene.collection.objects.unlink(obj)
+    assert find_smoke(uid) is None
+    rows = bpy.context.window_manager.smokelift.jobs
+    row = rows.add()
+    row.take, row.smoke_uid = str(take.directory), uid
+    run_queue.work(bpy.context)
+    assert rows[0].outcome == "cancelled"
+    assert take.read().resumable
+
+
+def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    rows, written = bpy.context.window_manager.smokelift.jobs, [smoke_takes.write_take(obj) for _ in range(3)]
+    for take in written:
+        row = rows.add()
+        row.take, row.smoke_uid = str(take.directory), obj.session_uid
+    rows[0].outcome = "running"
+    assert bpy.ops.smokelift.cancel(take=str(written[1].directory)) == {"FINISHED"}
+    assert [row.take for row in rows] == [str(written[0].directory), str(written[2].directory)]
+    assert takes(tmp_path) == [written[0], written[2]]
+    assert bpy.ops.smokelift.cancel() == {"FINISHED"}
+    assert [row.cancel for row in rows] == [True, False]
+
+
+@pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
+def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
+    cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
+    if change == "location":
+        cube.location.x = 3.0
+    elif change == "name":
+        cube.name = "Crate"
+    elif change == "vertex":
+        cube.data.vertices[0].co.x = -2.0
+    hide_default_cube(scene)
+    assert cube.hide_render == cube.hide_viewport == (change is None)
+
+
+@pytest.mark.parametrize("change", [None, "location", "energy", "animated", "hidden", "scene"])
+def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(scene, clip, tmp_path, change) -> None:
+    """Set Up Shot hides it and says so; a lamp that anybody changed, or that the smoke was made with, stays."""
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    lamp, obj = scene.objects["Light"], new_smoke(scene, bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4")))
+    for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
+        setattr(obj.smokelift, name, False)
+    if change == "location":
+        lamp.location.x += 1.0
+    elif change == "energy":
+        lamp.data.energy = 100.0
+    elif change == "animated":
+        lamp.keyframe_insert("location", frame=1)
+    elif change == "hidden":
+        lamp.hide_render = True
+    elif change == "scene":
+        obj.smokelift.light_mode = "SCENE"
+    take = made(tmp_path)
+    with changed(take) as index:
+        index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
+    volume.show(obj, take)
+    hidden, further = shot_setup.set_up(obj, take, take.read().index)
+    assert hidden == (change is None)
+    assert lamp.hide_viewport == (change is None)
+    assert lamp.hide_render == (change in (None, "hidden"))
+    assert further == (["Light"] if change in ("location", "energy", "animated") else [])
+    assert scene.cycles.samples == shot_setup.SAMPLES
+
+
+def test_samples_that_the_artist_chose_stay(shot, tmp_path) -> None:
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    for samples, wanted in ((4096, shot_setup.SAMPLES), (4096, shot_setup.SAMPLES), (128, 128)):
+        shot.cycles.samples = samples
+        smoke(shot).smokelift.set_up_plate = smoke(shot).smokelift.set_up_camera = False
+        assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+        assert shot.cycles.samples == wanted
+
+
+def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
+    smoke(scene).smokelift.output = str(folder)
+    written = [smoke_takes.write_take(smoke(scene)) for _ in range(count)]
+    for take in written:
+        take.directory.mkdir()
+        (take.directory / "smoke_0001.vdb").write_bytes(b"x" * 1000)
+        (take.directory / "sequence.json").write_text(
+            '{"complete": true, "frames": {"1": {}}, "scene": {"clip": {"fps": 24.0}, "medium": '
+            '{"extinction": 1.0, "albedo": 1.0, "anisotropy": 0.0, "color": [1, 1, 1]}, "domain": '
+            '{"min": [0, 0, 0], "max": [1, 1, 1], "resolution": [8, 8, 8]}}}'
+        )
+    return written
+
+
+def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
+    first, second = with_takes(shot, tmp_path / "out", 2)
+    assert bpy.ops.smokelift.show_take(take=str(first.directory)) == {"FINISHED"}
+    assert volume.shown_take(smoke(shot)) == first
+    assert first.read().title == "Take 1"
+    assert bpy.ops.smokelift.name_take(take=str(first.directory), title="Slow and thick") == {"FINISHED"}
+    assert Take(first.directory).read().title == "Slow and thick"
+    assert first.arguments()[0] == "reconstruct"
+    with pytest.raises(RuntimeError, match="show another one first"):
+        bpy.ops.smokelift.remove_take(take=str(first.directory))
+    assert bpy.ops.smokelift.remove_take(take=str(second.directory)) == {"FINISHED"}
+    assert takes(tmp_path / "out") == [first]
+    assert first.size() == pytest.approx(1e-3, rel=0.5)
+    with pytest.raises(RuntimeError, match="no finished frame"):
+        bpy.ops.smokelift.show_take(take=str(second.directory))
+
+
+@pytest.mark.parametrize("chosen", [False, True])
+def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path, chosen) -> None:
+    """After the first save, after Save As and with a copy; the next is Take 2, and all of it can be moved."""
+    first, second, copied = (tmp_path / "project" / name / "shot.blend" for name in ("first", "second", "copied"))
+    for file in (first, second, copied):
+        file.parent.mkdir(parents=True)
+    shutil.copy(EXAMPLE / "clip.mp4", tmp_path / "project" / "clip.mp4")
+    obj = new_smoke(scene, bpy.data.movieclips.load(str(tmp_path / "project" / "clip.mp4")))
+    if chosen:
+        bpy.ops.wm.save_as_mainfile(filepath=str(first))
+        obj.smokelift.output, obj.smokelift.mask = "//results", "//mask.png"
+        (first.parent / "mask.png").touch()
+    take = smoke_takes.write_take(obj)
+    folder = take.directory.parent
+
+    def kept(there: Path = folder) -> bool:
+        found = takes(smoke_takes.output_folder(smoke(bpy.context.scene)))
+        return [take.directory for take in found] == [there / "take_0001"]
+
+    bpy.ops.wm.save_as_mainfile(filepath=str(first))
+    assert kept()
+    bpy.ops.wm.save_as_mainfile(filepath=str(second))
+    assert kept()
+    bpy.ops.wm.save_as_mainfile(filepath=str(copied), copy=True)
+    assert kept()
+    for file in (second, copied):
+        bpy.ops.wm.open_mainfile(filepath=str(file))
+        assert kept()
+        if chosen:
+            mask = smoke(bpy.context.scene).smokelift.mask
+            assert absolute(mask) == first.parent / "mask.png"
+    (tmp_path / "project").rename(tmp_path / "moved")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "second" / "shot.blend"))
+    assert kept(tmp_path / "moved" / folder.relative_to(tmp_path / "project"))
+    (tmp_path / "moved").rename(tmp_path / "project")
+    bpy.ops.wm.open_mainfile(filepath=str(second))
+    assert smoke_takes.write_take(smoke(bpy.context.scene)).read().title == "Take 2"
+
+
+def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:
+    """A take whose frames hold so much smoke, of so many that it will have."""
+    take = made(folder, frames=len(masses))
+    with changed(take) as index:
+        index["frames"] = {str(n): {"mass": mass} for n, mass in enumerate(masses, 1)}
+        index["scene"]["clip"]["frames"] = [10, 9 + (planned or len(masses))]
+    return take
+
+
+def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
+    """The range is the result's, also of one that is still made; the playhead goes to smoke unless it shows some."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.camera_mode = "SCENE"
+    take = with_masses(tmp_path, [0.0, 0.0, 1.0, 1.0])
+    smoke_takes.present(obj, take)
+    assert (scene.frame_start, scene.frame_end) == (11, 14)
+    assert volume.go_to_smoke(obj)
+    assert scene.frame_current == 13
+    scene.frame_set(14)
+    assert volume.go_to_smoke(obj)
+    assert scene.frame_current == 14
+    scene.frame_set(16)
+    begun = with_masses(tmp_path / "begun", [1.0, 1.0], planned=6)
+    with changed(begun) as index:
+        index["complete"] = False
+    smoke_takes.present(obj, begun)
+    assert (scene.frame_start, scene.frame_end) == (11, 16)
+    assert volume.go_to_smoke(obj)
+    assert scene.frame_current == 16
+    longer = with_masses(tmp_path / "longer", [1.0] * 80)
+    smoke_takes.present(obj, longer)
+    assert scene.frame_end == 90
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (11, 90)
+    scene.frame_end = 60
+    smoke_takes.present(obj, take)
+    assert scene.frame_end == 60
+    empty = with_masses(tmp_path / "empty", [0.0, 0.0])
+    smoke_takes.present(obj, empty)
+    assert not volume.go_to_smoke(obj)
+
+
+def test_the_range_is_that_of_what_is_used_or_shown(scene, clip, tmp_path) -> None:
+    """Before a run that of the used frames, then the result's; of several smokes all; a longer one of a result is."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.camera_mode = "SCENE"
+    obj.smokelift.first, obj.smokelift.last = 10, 20
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (10, 20)
+    smoke_takes.present(obj, with_masses(tmp_path, [1.0] * 8))
+    assert (scene.frame_start, scene.frame_end) == (11, 18)
+    continued = with_masses(tmp_path / "continued", [1.0] * 30, planned=8)
+    smoke_takes.present(obj, continued)
+    assert (scene.frame_start, scene.frame_end) == (11, 40)
+    other = new_smoke(scene, clip)
+    other.smokelift.first, other.smokelift.last = 3, 5
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (3, 40)
