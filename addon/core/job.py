@@ -1,4 +1,4 @@
-"""Runs of the engine in child processes, one after the other.
+"""A run of the engine in a child process.
 
 The engine writes its progress to its standard output, one JSON object a line. A thread reads them, so polling never
 waits. The engine ends when its standard input closes: so a job is cancelled on every system, and ends by itself when
@@ -65,10 +65,7 @@ class EngineMissingError(RuntimeError):
 def engine_command(arguments: Sequence[str]) -> list[str]:
     """The command that runs the engine with this Python, isolated from the user's Python environment.
 
-    Raises
-    ------
-    EngineMissingError
-        If the engine is not installed, or another Python's.
+    EngineMissingError if the engine is not installed, or another Python's.
     """
     require_fitting_zip()
     shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
@@ -319,42 +316,6 @@ class Job:
         if self._log is not None:
             self._log.close()
             self._log = None
-
-
-class Queue:
-    """Jobs that run one after the other."""
-
-    def __init__(self) -> None:
-        self.jobs: list[Job] = []
-
-    @property
-    def current(self) -> Job | None:
-        """The job that runs, or None."""
-        return next((job for job in self.jobs if job.outcome == "running"), None)
-
-    @property
-    def ended(self) -> bool:
-        """Whether all jobs have ended."""
-        return all(job.ended for job in self.jobs)
-
-    def add(self, job: Job) -> None:
-        """Append a job."""
-        self.jobs.append(job)
-
-    def poll(self) -> list[Job]:
-        """Poll the running job and start the next, without waiting; returns the jobs that changed."""
-        changed = [job for job in self.jobs if job.poll()]
-        if self.current is None:
-            waiting = next((job for job in self.jobs if job.outcome == "waiting"), None)
-            if waiting is not None:
-                waiting.start()
-                changed.append(waiting)
-        return changed
-
-    def kill(self) -> None:
-        """End all jobs at once."""
-        for job in reversed(self.jobs):
-            job.kill()
 
 
 def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:

@@ -84,22 +84,21 @@ def match(psnr: float) -> str:
 
 
 def spent(seconds: float) -> str:
-    """A time that something took, in words."""
+    """A time that something took, in words, to the second below an hour."""
     whole = max(1, round(seconds))
-    if whole < 60:
-        return f"{whole} s"
-    minutes, rest = divmod(whole, 60)
-    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+    return f"{whole // 60} min {whole % 60} s" if 60 <= whole < 3600 else duration(seconds)
 
 
 def duration(seconds: float) -> str:
     """A time in words, to the second below a minute and to the minute above."""
-    if seconds < 60.0:
+    if seconds < 59.5:
         return f"{max(1, round(seconds))} s"
     minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def disk_size(megabytes: float) -> str:
     """An amount of disk in words."""
-    return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"
+    if megabytes < 9.95:
+        return f"{megabytes:.1f} MB"
+    return f"{megabytes:.0f} MB" if megabytes < 999.5 else f"{megabytes / 1000.0:.1f} GB"

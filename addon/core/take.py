@@ -94,7 +94,7 @@ class Take:
     def _mask_files(self) -> list[Path]:
         return sorted(self.directory.parent.glob(f"{self.directory.name}_mask*.png"))
 
-    def keep_mask(self, drawn: Path) -> str:
+    def copy_mask(self, drawn: Path) -> str:
         """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
 
         Parameters
@@ -115,10 +115,7 @@ class Take:
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options.
 
-        Raises
-        ------
-        TakeError
-            If the folder cannot be written to.
+        TakeError if the folder cannot be written to.
         """
         self._write({self.scene_file: toml_text(tables).encode(), self.request_file: _request(options)})
 
@@ -199,10 +196,7 @@ class Take:
     def arguments(self) -> list[str]:
         """The engine's arguments, which start this take or resume it.
 
-        Raises
-        ------
-        TakeError
-            If its files are missing or damaged, or hold an option that does not decide its result.
+        TakeError if its files are missing or damaged, or hold an option that does not decide its result.
         """
         now = self.read()
         direction, source, options = now.direction, now.source, now.options
@@ -221,13 +215,7 @@ class Take:
         return [direction, str(source.directory), *run, *meshes]
 
     def give_title(self, title: str) -> None:
-        """Give it a name.
-
-        Raises
-        ------
-        TakeError
-            If its files are missing or damaged, or the name cannot be written.
-        """
+        """Give it a name; TakeError if its files are missing or damaged, or the name cannot be written."""
         try:
             self._change_request("title", title)
         except (OSError, ValueError, TypeError, RecursionError) as error:

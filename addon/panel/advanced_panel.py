@@ -1,55 +1,57 @@
 """The sub-panel Advanced: settings that most shots leave as they are, and what was assumed."""
 
 import bpy
+from bpy.props import BoolProperty, EnumProperty
 
 from ..scene.modifiers import CAN_INTERPOLATE
-from ..scene.smoke import active_smoke
-from .layout import OfClip, draw_automatic
+from .common import RequiresClip, speed_changed, sub_panels
+from .layout import draw_automatic
 
 
-class _Advanced(OfClip):
-    bl_label = "Advanced"
+class PlaybackSettings:
+    """How a result is played."""
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        smoke = active_smoke(context.scene)
-        settings = smoke.smokelift
-        row = layout.row()
-        row.active = settings.camera_mode == "SCENE"
-        draw_automatic(row, settings, "longest_side")
-        draw_automatic(layout, settings, "fps")
-        for name in ("transfer", "speed"):
-            layout.prop(settings, name)
-        if CAN_INTERPOLATE:
-            layout.prop(settings, "between")
-        for name in ("device", "use_medium"):
-            layout.prop(settings, name)
-        column = layout.column()
-        column.active = settings.use_medium
-        for name in ("extinction", "albedo", "anisotropy"):
-            column.prop(settings, name)
-        state = context.window_manager.smokelift
-        if state.check_smoke == smoke.session_uid and state.notes:
-            for note in state.notes.split("\n"):
-                layout.label(text=note, translate=False)
-        layout.operator("smokelift.show_page", icon="IMAGE_DATA")
-        layout.operator("smokelift.check", icon="VIEWZOOM")
+    speed: EnumProperty(
+        name="Speed",
+        description="Speed of the smoke if clip and scene differ in frame rate",
+        items=[
+            ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
+            ("REAL", "Real Time", "As fast as in reality"),
+        ],
+        update=speed_changed,
+    )
+    between: BoolProperty(
+        name="Frames Between",
+        description="At another speed than the clip's, compute what lies between two frames with their velocity, while "
+        "it is shown and rendered. Blender can do so since 5.0",
+        update=speed_changed,
+    )
 
 
-class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):
-    """The panel in the 3D View."""
+def _draw_advanced(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    settings = smoke.smokelift
+    row = layout.row()
+    row.active = settings.camera_mode == "SCENE"
+    draw_automatic(row, settings, "longest_side")
+    draw_automatic(layout, settings, "fps")
+    for name in ("transfer", "speed"):
+        layout.prop(settings, name)
+    if CAN_INTERPOLATE:
+        layout.prop(settings, "between")
+    for name in ("device", "use_medium"):
+        layout.prop(settings, name)
+    column = layout.column()
+    column.active = settings.use_medium
+    for name in ("extinction", "albedo", "anisotropy"):
+        column.prop(settings, name)
+    state = context.window_manager.smokelift
+    if state.check_smoke == smoke.session_uid and state.notes:
+        for note in state.notes.split("\n"):
+            layout.label(text=note, translate=False)
+    layout.operator("smokelift.show_page", icon="IMAGE_DATA")
+    layout.operator("smokelift.check", icon="VIEWZOOM")
 
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
 
-
-class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
-
-
-register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_PT_view_advanced, SMOKELIFT_PT_clip_advanced))
+register, unregister = bpy.utils.register_classes_factory(
+    sub_panels("advanced", "Advanced", _draw_advanced, RequiresClip)
+)

@@ -2,6 +2,7 @@
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
@@ -10,12 +11,123 @@ from ..scene.blender import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
 from ..scene.floor import Floor
 from ..scene.shot_setup import show_clip_behind
-from ..scene.smoke import active_smoke
+from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask
-from .layout import RequiresClip, draw_automatic, draw_closed
+from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, closed_sides, refuse
+from .layout import draw_automatic, draw_closed
+
+USUAL_DISTANCE = 2.0
+"""Meters from which a distance is given by hand where there is no box."""
 
 
-class SMOKELIFT_OT_make_box(bpy.types.Operator):
+def _box_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """A box belongs to the scene's camera."""
+    if settings.box is not None:
+        settings.camera_mode = "SCENE"
+    check_changed(settings, context)
+
+
+def _middle_of_box(settings: bpy.types.PropertyGroup) -> float:
+    """Where a distance that is given by hand begins: at the middle of the box, if there is one before the camera."""
+    box, camera = box_of(settings.id_data), scene_of(settings.id_data).camera
+    if box is None or camera is None:
+        return USUAL_DISTANCE
+    pose = camera.matrix_world
+    return max(0.0, -(box.matrix_world.translation - pose.translation).dot(pose.col[2].to_3d())) or USUAL_DISTANCE
+
+
+def _is_mesh(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    return obj.type == "MESH"
+
+
+def _is_empty(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    return obj.type == "EMPTY"
+
+
+class ShotSettings:
+    """Where the clip was filmed from, the box of its smoke, and what lights it."""
+
+    camera_mode: EnumProperty(
+        name="Camera",
+        description="Where the clip was filmed from",
+        items=[
+            (
+                "ESTIMATE",
+                "From the Clip",
+                "Assume a level camera with an ordinary lens and a box around the smoke, and add it",
+            ),
+            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
+        ],
+        update=check_changed,
+    )
+    box: PointerProperty(
+        name="Box",
+        description="Box that holds all of the smoke. A smaller box gives a finer result",
+        type=bpy.types.Object,
+        poll=_is_mesh,
+        update=_box_chosen,
+    )
+    inlet: PointerProperty(
+        name="Inlet",
+        description=("Empty at the smoke's source, as large as the opening. Without one, sources are estimated"),
+        type=bpy.types.Object,
+        poll=_is_empty,
+        update=check_changed,
+    )
+    distance: FloatProperty(
+        name="Distance",
+        description="Distance from the camera to the lower end of the smoke, level and straight ahead; automatic is "
+        "estimated. With Camera From the Clip it sets the scale",
+        subtype="DISTANCE",
+        default=0.0,
+        min=0.0,
+        update=check_changed,
+    )
+    use_distance: automatic_unless("distance", "Distance", _middle_of_box)
+    closed: closed_sides(
+        "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
+        update=check_changed,
+    )
+    light_mode: EnumProperty(
+        name="Light",
+        description="What lights the smoke in the clip",
+        items=[
+            ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
+            ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
+        ],
+        update=check_changed,
+    )
+    use_medium: BoolProperty(
+        name="Smoke Material", description="Set the smoke's optical properties", update=check_changed
+    )
+    extinction: FloatProperty(
+        name="Extinction",
+        description="Extinction coefficient per meter of smoke of density 1",
+        default=5.0,
+        min=0.001,
+        max=1e9,
+        soft_max=50.0,
+        update=check_changed,
+    )
+    albedo: FloatProperty(
+        name="Albedo",
+        description="Scattered fraction of the extinction: 1 is white steam, 0 is black soot",
+        default=0.9,
+        min=0.0,
+        max=1.0,
+        update=check_changed,
+    )
+    anisotropy: FloatProperty(
+        name="Anisotropy",
+        description="Forward scattering above 0, backward scattering below",
+        default=0.0,
+        min=-0.95,
+        max=0.95,
+        update=check_changed,
+    )
+
+
+class SMOKELIFT_OT_make_box(ActsOnSmoke, bpy.types.Operator):
     """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
 
     bl_idname = "smokelift.make_box"
@@ -25,15 +137,13 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if active_smoke(context.scene) is None:
-            cls.poll_message_set("Add smoke first")
-            return False
+            return refuse(cls, "Add smoke first")
         if context.scene.camera is None:
-            cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
-            return False
+            return refuse(cls, "The scene has no camera: add one where the clip was filmed from")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, smoke = context.scene, active_smoke(context.scene)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        scene = context.scene
         low, high = framed_box(scene)
         box = box_of(smoke)
         if box is None:
@@ -45,7 +155,6 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
         box.location = (low + high) / 2
         box.scale = (high - low) / 2
         shot_check.check_again(context)
-        return {"FINISHED"}
 
 
 class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
@@ -61,11 +170,9 @@ class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
             return False
         smoke = active_smoke(context.scene)
         if smoke.smokelift.camera_mode != "SCENE" or box_of(smoke) is None:
-            cls.poll_message_set("Choose Scene Camera and make a Box first: its bottom is the floor")
-            return False
+            return refuse(cls, "Choose Scene Camera and make a Box first: its bottom is the floor")
         if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Use the tab in a 3D View: the click is made there")
-            return False
+            return refuse(cls, "Use the tab in a 3D View: the click is made there")
         return True
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:

@@ -3,19 +3,126 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..result import shot_check, smoke_takes
 from ..scene import shot_setup
-from ..scene.blender import ShotError, frame_rate
+from ..scene.blender import PATH_OPTIONS, ShotError, frame_rate
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures
 from ..scene.pictures import is_distorted, undistorted
-from ..scene.smoke import active_smoke, new_smoke
+from ..scene.smoke import active_smoke, free_folder, new_smoke
+from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, refuse
 from .editors import open_tab, show_mask
-from .layout import RequiresClip, draw_text
+from .layout import draw_text
 
 
-class SMOKELIFT_OT_add(bpy.types.Operator):
+def _clip_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """Use all frames of a new clip, none of the old one's, and a folder that no other smoke has."""
+    if settings.clip is None:
+        return
+    settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
+    settings.plate_frames = ""
+    settings.folder, settings.results = free_folder(settings.id_data), ""
+
+
+class ClipSettings:
+    """The clip, what is behind its smoke, and where its smoke may be."""
+
+    clip: PointerProperty(
+        name="Clip",
+        description="Footage of smoke: a video or an image sequence",
+        type=bpy.types.MovieClip,
+        update=_clip_chosen,
+    )
+    first: IntProperty(
+        name="First",
+        description="First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
+        default=1,
+        min=1,
+        update=check_changed,
+    )
+    last: IntProperty(
+        name="Last",
+        description="Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
+        default=1,
+        min=1,
+        update=check_changed,
+    )
+    plate_mode: EnumProperty(
+        name="Background",
+        description="The picture without smoke",
+        items=[
+            ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
+            (
+                "FILE",
+                "Clean Plate",
+                "Picture of the same view without smoke; for a moving camera, one for each frame",
+            ),
+            ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
+        ],
+        update=check_changed,
+    )
+    plate: StringProperty(
+        name="Clean Plate",
+        description=(
+            "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, "
+            "with one image for each frame of the clip"
+        ),
+        subtype="FILE_PATH",
+        options=PATH_OPTIONS,
+        update=check_changed,
+    )
+    plate_frames: StringProperty(
+        name="Frames",
+        description="Frames of the clip without smoke, counted from 1 and separated by commas",
+        update=check_changed,
+    )
+    strokes: PointerProperty(
+        name="Strokes",
+        description="Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel "
+        "shows the background. Nothing is said of the rest, which is transparent",
+        type=bpy.types.Image,
+        update=check_changed,
+    )
+    drawn_mask: PointerProperty(
+        name="Mask",
+        description="Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is "
+        "inverted, and nowhere else, whatever moves there",
+        type=bpy.types.Mask,
+        update=check_changed,
+    )
+    mask: StringProperty(
+        name="Mask File",
+        description=(
+            "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
+            "mask_####.png, with one for each frame of the clip"
+        ),
+        subtype="FILE_PATH",
+        options=PATH_OPTIONS,
+        update=check_changed,
+    )
+    fps: FloatProperty(
+        name="Frame Rate",
+        description="Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",
+        default=0.0,
+        min=0.0,
+        soft_max=1000.0,
+        update=check_changed,
+    )
+    use_fps: automatic_unless("fps", "Frame Rate", 120.0)
+    transfer: EnumProperty(
+        name="Color Space",
+        description="Color space of the clip",
+        items=[
+            ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
+            ("srgb", "sRGB", "Ordinary video and pictures"),
+            ("linear", "Linear Rec.709", "Proportional to light"),
+        ],
+        update=check_changed,
+    )
+
+
+class SMOKELIFT_OT_add(ActsOnSmoke, bpy.types.Operator):
     """Add smoke that is made from a video or an image sequence"""
 
     bl_idname = "smokelift.add"
@@ -33,63 +140,54 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        text = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        unreadable = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
         try:
             clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
         except RuntimeError:
-            self.report({"ERROR"}, text.format(self.filepath))
-            return {"CANCELLED"}
+            raise ShotError(unreadable.format(self.filepath)) from None
         if clip.frame_duration < 1:  # Blender takes any file for a clip
-            self.report({"ERROR"}, text.format(self.filepath))
             if clip.users == 0:
                 bpy.data.movieclips.remove(clip)
-            return {"CANCELLED"}
+            raise ShotError(unreadable.format(self.filepath))
         new_smoke(context.scene, clip)
         if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
             open_tab(context.area)
-        return {"FINISHED"}
 
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(SMOKELIFT_OT_add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
 
 
-class SMOKELIFT_OT_use_all_files(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_use_all_files(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
 
     bl_idname = "smokelift.use_all_files"
     bl_label = "Use All Files"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = active_smoke(context.scene).smokelift
-        try:
-            settings.last = frame_count(settings.clip)
-        except ShotError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        settings = smoke.smokelift
+        settings.last = frame_count(settings.clip)
 
 
-class SMOKELIFT_OT_match_clip(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_match_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Set the scene's resolution and frame rate to the clip's, and its length to the result's or its part in use"""
 
     bl_idname = "smokelift.match_clip"
     bl_label = "Match Scene to Clip"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        shot_setup.match_clip(active_smoke(context.scene))
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        shot_setup.match_clip(smoke)
         shot_check.check_again(context)
-        return {"FINISHED"}
 
 
 UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
 """Settings that a clip of the same frames keeps."""
 
 
-class SMOKELIFT_OT_undistort(bpy.types.Operator):
+class SMOKELIFT_OT_undistort(ActsOnSmoke, bpy.types.Operator):
     """Write the clip without its lens's distortion, and use that. Blender waits meanwhile"""
 
     bl_idname = "smokelift.undistort"
@@ -100,80 +198,65 @@ class SMOKELIFT_OT_undistort(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         smoke = active_smoke(context.scene)
         if smoke is None or smoke.smokelift.clip is None or not is_distorted(smoke.smokelift.clip):
-            cls.poll_message_set("The clip's lens has no distortion: calibrate it in the Movie Clip Editor")
-            return False
+            return refuse(cls, "The clip's lens has no distortion: calibrate it in the Movie Clip Editor")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
         if settings.plate_mode == "FILE":
-            self.report({"ERROR"}, "The clean plate is distorted too: choose Background: From the Clip first.")
-            return {"CANCELLED"}
+            raise ShotError("The clean plate is distorted too: choose Background: From the Clip first.")
         if settings.mask or settings.drawn_mask is not None:
-            self.report({"ERROR"}, "The mask is distorted too: clear it, and draw one over the undistorted clip.")
-            return {"CANCELLED"}
+            raise ShotError("The mask is distorted too: clear it, and draw one over the undistorted clip.")
         if settings.strokes is not None:
-            self.report({"ERROR"}, "The strokes are distorted too: clear them, and paint new ones afterwards.")
-            return {"CANCELLED"}
-        clip, kept = settings.clip, {name: getattr(settings, name) for name in UNCHANGED}
+            raise ShotError("The strokes are distorted too: clear them, and paint new ones afterwards.")
+        clip, unchanged = settings.clip, {name: getattr(settings, name) for name in UNCHANGED}
         folder = smoke_takes.output_folder(smoke) / "undistorted"
         try:
             settings.clip = undistorted(clip, folder)
         except RuntimeError:
-            self.report({"ERROR"}, rpt_("{:s} cannot be written to: choose another Output.").format(str(folder)))
-            return {"CANCELLED"}
-        if clip.source == "MOVIE" and not kept["fps"]:
-            kept["fps"] = clip.fps  # pictures have no rate of their own
-        for name, value in kept.items():
+            raise ShotError(rpt_("{:s} cannot be written to: choose another Output.").format(str(folder))) from None
+        if clip.source == "MOVIE" and not unchanged["fps"]:
+            unchanged["fps"] = clip.fps  # pictures have no rate of their own
+        for name, value in unchanged.items():
             setattr(settings, name, value)
-        return {"FINISHED"}
 
 
-class SMOKELIFT_OT_plate_from_frame(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_plate_from_frame(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Take this frame of the clip, in which there is no smoke, as the clean plate. More frames lessen the noise"""
 
     bl_idname = "smokelift.plate_from_frame"
     bl_label = "Plate from This Frame"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
-        try:
-            number = shown_frame(smoke)
-        except ShotError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        number = shown_frame(smoke)
         chosen = settings.plate_frames.replace(",", " ").split() if settings.plate_mode == "FRAMES" else []
         if str(number) not in chosen:
             chosen.append(str(number))
         settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
-        return {"FINISHED"}
 
 
-class SMOKELIFT_OT_clear_plate_frames(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_clear_plate_frames(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Take none of these frames as the clean plate"""
 
     bl_idname = "smokelift.clear_plate_frames"
     bl_label = "Clear Frames"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = active_smoke(context.scene).smokelift
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        settings = smoke.smokelift
         settings.plate_frames, settings.plate_mode = "", "ESTIMATE"
-        return {"FINISHED"}
 
 
-class SMOKELIFT_OT_new_mask(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_new_mask(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Draw over the clip, in the Clip Editor, where smoke may be. Where the mask is black there is none"""
 
     bl_idname = "smokelift.new_mask"
     bl_label = "New Mask"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
         if settings.drawn_mask is None:
             mask = bpy.data.masks.new(smoke.name)
@@ -182,7 +265,6 @@ class SMOKELIFT_OT_new_mask(RequiresClip, bpy.types.Operator):
             settings.drawn_mask = mask
         if not bpy.app.background:
             open_tab(show_mask(settings.clip, settings.drawn_mask))
-        return {"FINISHED"}
 
 
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -1,47 +1,171 @@
 """The sub-panel Direct: what is made of the result on show, and the button that does it."""
 
+from typing import Any
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
-from ..core.take import TakeError
+from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
-from ..result.directing import MESHES
-from ..scene.blender import ShotError
+from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
 from ..scene.smoke import active_smoke
-from .layout import (
-    OfResult,
+from .common import (
+    ActsOnSmoke,
     RequiresClipAndResult,
     RequiresResult,
-    draw_automatic,
-    draw_closed,
-    draw_progress,
-    draw_ticked,
+    automatic_unless,
+    closed_sides,
+    refuse,
+    speed_changed,
+    sub_panels,
 )
+from .layout import draw_automatic, draw_closed, draw_progress, draw_ticked
 
 EFFECTORS = "Effectors"
 """Name of a collection that the tab makes."""
 
 
-class SMOKELIFT_OT_direct(RequiresClipAndResult, bpy.types.Operator):
+def _start_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Begin with the last frame of the result, unless a frame of it was chosen before."""
+    frames = frames_of_result(settings.id_data)
+    if frames is not None and not frames[0] <= settings.start <= frames[1]:
+        settings.start = frames[1]
+
+
+def _part_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Begin with the whole result, unless a part of it was chosen before."""
+    frames = frames_of_result(settings.id_data)
+    if frames is not None and not frames[0] <= settings.part_first < settings.part_last <= frames[1]:
+        settings.part_first, settings.part_last = frames
+
+
+def _speed(name: str, description: str, default: float) -> Any:
+    """A speed, of which 1 is the clip's own."""
+    limits = {"min": SLOWEST, "max": FASTEST, "soft_max": 4.0}
+    return FloatProperty(name=name, description=description, default=default, update=speed_changed, **limits)
+
+
+class SmokeliftDirecting(bpy.types.PropertyGroup):
+    """What is made of the result on show."""
+
+    direction: EnumProperty(
+        name="Direction",
+        description="What is made of the result on show",
+        items=[
+            ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
+            ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
+            ("loop", "Loop", "Repeat the smoke without a seam"),
+        ],
+    )
+    frames: IntProperty(name="Frames", description="Number of frames to add", default=48, min=1, max=100_000)
+    fade: IntProperty(name="Fade", description="Frames at the end in which the smoke fades to nothing", min=0)
+    use_start: BoolProperty(
+        name="Start",
+        description="Simulate from a frame of the clip on, in place of the frames that follow it",
+        update=_start_chosen,
+    )
+    start: IntProperty(
+        name="Start", description="Last frame that stays as it is, counted as Frames of the clip", default=1
+    )
+    closed: closed_sides("Sides of the result's box, along its own axes, that are walls for the frames that are added")
+    room: FloatProperty(
+        name="Room",
+        description="How many times as large as the result's box the smoke may become. Its box grows where smoke goes; "
+        "smoke that would need more dissolves before the box ends. 1 keeps the box",
+        default=8.0,
+        min=1.0,
+        soft_max=64.0,
+        max=4096.0,
+        precision=1,
+    )
+    use_buoyancy: BoolProperty(
+        name="Buoyancy", description="Choose Buoyancy by hand; otherwise it is that of the clip's smoke"
+    )
+    buoyancy: FloatProperty(
+        name="Buoyancy",
+        description="Upward acceleration of smoke of density 1 in the clip's own scale; below zero it sinks",
+        unit="ACCELERATION",
+        default=1.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+    )
+    use_dissipation: BoolProperty(
+        name="Dissipation", description="Choose Dissipation by hand; otherwise it is that of the clip's smoke"
+    )
+    dissipation: FloatProperty(
+        name="Dissipation",
+        description="How fast smoke dissolves, per second: 0 keeps it, at 1 a third is left after a second",
+        default=0.0,
+        min=0.0,
+        soft_max=5.0,
+    )
+    effectors: PointerProperty(
+        name="Effectors",
+        description=(
+            "Collection of what acts on the smoke: closed meshes, which may be animated, are obstacles; Wind "
+            "and Turbulence force fields are wind and turbulence. An Empty, a Force field or a Wind field with "
+            "Max Distance is a fan, which blows along its Z axis. Strength is m/s"
+        ),
+        type=bpy.types.Collection,
+    )
+    fan_speed: FloatProperty(
+        name="Fan Speed",
+        description="Velocity of the air in Empties that have no force field",
+        unit="VELOCITY",
+        default=1.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+    )
+    speed: _speed("Speed", "Speed of the smoke: 0.5 is half as fast", 0.5)
+    use_ramp: BoolProperty(
+        name="Ramp",
+        description="Change the speed from the first frame to the middle and to the last",
+        update=speed_changed,
+    )
+    speed_middle: _speed("Middle", "Speed in the middle of the result", 0.5)
+    speed_end: _speed("End", "Speed at the last frame", 1.0)
+    live: BoolProperty(
+        name="Preview",
+        description="Play the result on show at this speed now. Retime Smoke, or Frames Between in Advanced, makes the "
+        "frames in between",
+        update=speed_changed,
+    )
+    use_part: BoolProperty(
+        name="Part",
+        description="Loop a part of the result, in which the smoke is steady",
+        update=_part_chosen,
+    )
+    part_first: IntProperty(
+        name="First", description="First frame of the part, counted as Frames of the clip", default=1
+    )
+    part_last: IntProperty(name="Last", description="Last frame of the part, counted as Frames of the clip", default=48)
+    overlap: IntProperty(
+        name="Overlap",
+        description="Frames in which the end becomes the start; automatic is a third of the loop, 24 at most",
+        min=0,
+    )
+    use_overlap: automatic_unless("overlap", "Overlap", 12)
+
+    def speeds(self) -> tuple[float, ...]:
+        """One speed, or those of a ramp."""
+        return (self.speed, self.speed_middle, self.speed_end) if self.use_ramp else (self.speed,)
+
+
+class SMOKELIFT_OT_direct(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator):
     """Make a new result of the one on show: longer, at another speed, or repeating. The one on show stays"""
 
     bl_idname = "smokelift.direct"
     bl_label = "Direct Smoke"
     bl_options = {"UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
-        try:
-            take = smoke_takes.write_directed(smoke)
-        except (ShotError, TakeError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        take = smoke_takes.write_directed(smoke)
         run_queue.enqueue(context, smoke, take)
-        return {"FINISHED"}
 
 
-class SMOKELIFT_OT_add_effectors(RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_add_effectors(ActsOnSmoke, RequiresResult, bpy.types.Operator):
     """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
 
     bl_idname = "smokelift.add_effectors"
@@ -53,19 +177,17 @@ class SMOKELIFT_OT_add_effectors(RequiresResult, bpy.types.Operator):
         if not super().poll(context):
             return False
         if not _may_act(context):
-            cls.poll_message_set("Select a mesh, a Wind or Turbulence force field, or an Empty")
-            return False
+            return refuse(cls, "Select a mesh, a Wind or Turbulence force field, or an Empty")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = active_smoke(context.scene).smokelift.directing
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        settings = smoke.smokelift.directing
         if settings.effectors is None:
             settings.effectors = bpy.data.collections.new(EFFECTORS)
             context.scene.collection.children.link(settings.effectors)
         for obj in _may_act(context):
             if obj.name not in settings.effectors.objects:
                 settings.effectors.objects.link(obj)
-        return {"FINISHED"}
 
 
 def _may_act(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -74,27 +196,20 @@ def _may_act(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in context.selected_objects if obj != box and obj.type in {*MESHES, "EMPTY"}]
 
 
-class _Direct(OfResult):
-    bl_label = "Direct"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        smoke = active_smoke(context.scene)
-        settings = smoke.smokelift.directing
-        row = layout.row()
-        row.use_property_split = False
-        row.prop(settings, "direction", expand=True)
-        _DIRECTIONS[settings.direction](layout, settings)
-        label = settings.bl_rna.properties["direction"].enum_items[settings.direction].name
-        row = layout.row()
-        row.scale_y = 1.5
-        text = iface_("{:s} Smoke").format(iface_(label))
-        row.operator("smokelift.direct", text=text, translate=False, icon="PLAY")
-        for job in context.window_manager.smokelift.jobs:
-            if job.outcome == "running" and job.smoke_uid == smoke.session_uid:
-                draw_progress(layout, job)
+def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    settings = smoke.smokelift.directing
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(settings, "direction", expand=True)
+    _DIRECTIONS[settings.direction](layout, settings)
+    label = settings.bl_rna.properties["direction"].enum_items[settings.direction].name
+    row = layout.row()
+    row.scale_y = 1.5
+    text = iface_("{:s} Smoke").format(iface_(label))
+    row.operator("smokelift.direct", text=text, translate=False, icon="PLAY")
+    for job in context.window_manager.smokelift.jobs:
+        if job.outcome == "running" and job.smoke_uid == smoke.session_uid:
+            draw_progress(layout, job)
 
 
 def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -134,20 +249,6 @@ def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
 
 
-class SMOKELIFT_PT_view_direct(_Direct, bpy.types.Panel):
-    """The panel in the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_direct(_Direct, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
-
-
 register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_direct, SMOKELIFT_OT_add_effectors, SMOKELIFT_PT_view_direct, SMOKELIFT_PT_clip_direct)
+    (SMOKELIFT_OT_direct, SMOKELIFT_OT_add_effectors, *sub_panels("direct", "Direct", _draw_direct, RequiresResult))
 )

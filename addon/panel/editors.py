@@ -9,8 +9,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
 from ..core.take import Take
+from ..scene.blender import ShotError
 from ..scene.smoke import active_smoke
-from .layout import RequiresClip
+from .common import ActsOnSmoke, RequiresClip, refuse
 
 DRAWN_SECONDS = 0.3
 """After which a new window has been drawn."""
@@ -21,7 +22,7 @@ LONGEST_OPENING = 5.0
 LOG_TEXT = "Smokelift Log"
 
 
-class SMOKELIFT_OT_open_log(bpy.types.Operator):
+class SMOKELIFT_OT_open_log(ActsOnSmoke, bpy.types.Operator):
     """Show the log of the run in a text editor"""
 
     bl_idname = "smokelift.open_log"
@@ -29,20 +30,18 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def act(self, _context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
         log = Take(Path(self.take)).log_file
         if not log.is_file():
-            self.report({"ERROR"}, rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
-            return {"CANCELLED"}
+            raise ShotError(rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
         text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
         text.from_string(log.read_text(encoding="utf-8", errors="replace"))
         if not bpy.app.background:
             space = _editor("TEXT_EDITOR").spaces.active
             space.text, space.top = text, 0
-        return {"FINISHED"}
 
 
-class SMOKELIFT_OT_show_page(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_show_page(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Show on a page all that was found in the clip and assumed: box and light, background, smoke, doubts"""
 
     bl_idname = "smokelift.show_page"
@@ -55,16 +54,14 @@ class SMOKELIFT_OT_show_page(RequiresClip, bpy.types.Operator):
         state = context.window_manager.smokelift
         own = state.check_done and state.check_smoke == active_smoke(context.scene).session_uid
         if not (own and state.check_page and Path(state.check_page).is_file()):
-            cls.poll_message_set("Check the shot first")
-            return False
+            return refuse(cls, "Check the shot first")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         page = bpy.data.images.load(context.window_manager.smokelift.check_page, check_existing=True)
         page.reload()
         if not bpy.app.background:
             show_image(page)
-        return {"FINISHED"}
 
 
 def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
@@ -76,7 +73,7 @@ def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
     space = area.spaces.active
     space.mode, space.image = mode, image
     space.display_channels = "COLOR" if mode == "PAINT" else "COLOR_ALPHA"
-    bpy.app.timers.register(functools.partial(_fit, image.name), first_interval=DRAWN_SECONDS)
+    bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     return area
 
 
@@ -85,37 +82,29 @@ def show_mask(clip: bpy.types.MovieClip, mask: bpy.types.Mask) -> bpy.types.Area
     area = _editor("CLIP_EDITOR")
     space = area.spaces.active
     space.clip, space.mode, space.mask = clip, "MASK", mask
-    bpy.app.timers.register(functools.partial(_fit_clip, area.as_pointer()), first_interval=DRAWN_SECONDS)
+    bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     return area
 
 
-def _fit_clip(area_pointer: int) -> None:
-    """Show the whole of the clip in a Clip Editor; a timer, as in `_fit`."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.as_pointer() == area_pointer and area.type == "CLIP_EDITOR":
-                region = next(region for region in area.regions if region.type == "WINDOW")
-                with bpy.context.temp_override(window=window, area=area, region=region):
-                    bpy.ops.clip.view_all(fit_view=True)
+def _windows_and_areas() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
+    return [(window, area) for window in bpy.context.window_manager.windows for area in window.screen.areas]
 
 
-def _fit(name: str) -> None:
-    """Show the whole of a picture in the editor that has it; a timer, as a window has no size before it is drawn."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            image = area.spaces.active.image if area.type == "IMAGE_EDITOR" else None
-            if image is not None and image.name == name:
-                region = next(region for region in area.regions if region.type == "WINDOW")
-                with bpy.context.temp_override(window=window, area=area, region=region):
-                    bpy.ops.image.view_all(fit_view=True)
+def _fit(area_pointer: int) -> None:
+    """Show the whole of what an editor has; a timer, as a window has no size before it is drawn."""
+    for window, area in _windows_and_areas():
+        if area.as_pointer() == area_pointer and area.type in ("IMAGE_EDITOR", "CLIP_EDITOR"):
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            view = bpy.ops.image if area.type == "IMAGE_EDITOR" else bpy.ops.clip
+            with bpy.context.temp_override(window=window, area=area, region=region):
+                view.view_all(fit_view=True)
 
 
 def _editor(kind: str, mode: str = "") -> bpy.types.Area:
     """An editor of a kind, and of a mode if it has some; in a window of its own if there is none."""
     manager = bpy.context.window_manager
-    areas = [area for window in manager.windows for area in window.screen.areas]
-    fitting = (area for area in areas if area.type == kind and mode in ("", area.spaces.active.mode))
-    found = next(fitting, None)
+    areas = (area for _, area in _windows_and_areas() if area.type == kind)
+    found = next((area for area in areas if mode in ("", area.spaces.active.mode)), None)
     if found is None:
         with bpy.context.temp_override(window=manager.windows[0]):  # a timer has none
             bpy.ops.wm.window_new()
@@ -133,8 +122,7 @@ def open_tab(area: bpy.types.Area) -> None:
 
 def _choose_tab(area_pointer: int, end: float) -> float | None:
     """Choose the tab in the sidebar of an area; a timer, as one that was never open has no tabs before it is drawn."""
-    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
-    area = next((area for area in areas if area.as_pointer() == area_pointer), None)
+    area = next((area for _, area in _windows_and_areas() if area.as_pointer() == area_pointer), None)
     if area is None or time.monotonic() > end:
         return None
     sidebar = next(region for region in area.regions if region.type == "UI")

@@ -14,15 +14,16 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..core.job import Job
 from ..core.take import Take
 from ..result import smoke_takes
-from ..result.side_job import Request, Writes, side_job
+from ..result.side_job import Request, writing_job
 from ..scene.blender import ShotError, relative
 from ..scene.clip import number_in_file, shown_frame
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
+from .common import ActsOnSmoke, RequiresClip, WritesFiles, sub_panels
 from .editors import open_tab, show_image
-from .layout import OfClip, RequiresClip, draw_work
+from .layout import draw_work
 
 STROKES_FILE = "strokes.png"
 """Name of the image in the folder of the smoke's results."""
@@ -31,15 +32,15 @@ COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0
 """What the engine takes the colors for."""
 
 
-class SMOKELIFT_OT_paint_strokes(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_paint_strokes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
 
     bl_idname = "smokelift.paint_strokes"
     bl_label = "Paint Strokes"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke, now = active_smoke(context.scene), context.scene.frame_current
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        now = context.scene.frame_current
         settings = smoke.smokelift
         try:
             shown_frame(smoke)
@@ -50,12 +51,10 @@ class SMOKELIFT_OT_paint_strokes(RequiresClip, bpy.types.Operator):
                 settings.strokes, write_pictures(settings.clip, now, now, Path(bpy.app.tempdir) / "smokelift_frame_")
             )
         except (ShotError, RuntimeError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            raise ShotError(str(error)) from error
         if not bpy.app.background:
             open_tab(show_image(settings.strokes, "PAINT"))
             _choose_color(context, "SMOKE")
-        return {"FINISHED"}
 
 
 def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
@@ -132,7 +131,7 @@ def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
     return ["extract", str(take.scene_file), "--out", str(folder / PICTURES)]
 
 
-class SMOKELIFT_OT_extract(Writes, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_extract(WritesFiles, RequiresClip, bpy.types.Operator):
     """Show the smoke of this frame by itself, with alpha, as Render Element would write it"""
 
     bl_idname = "smokelift.extract"
@@ -161,7 +160,7 @@ def _show_frame(_smoke: bpy.types.Object, job: Job) -> None:
         show_image(image)
 
 
-class SMOKELIFT_OT_render_element(Writes, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_render_element(WritesFiles, RequiresClip, bpy.types.Operator):
     """Write the smoke of all frames by itself, with alpha, as an image sequence (OpenEXR, linear, premultiplied)"""
 
     bl_idname = "smokelift.render_element"
@@ -183,38 +182,21 @@ class SMOKELIFT_OT_render_element(Writes, RequiresClip, bpy.types.Operator):
 
         def say(_smoke: bpy.types.Object, job: Job) -> None:
             if job.outcome == "done":
-                side_job.sentence = rpt_("The element is in {:s}.").format(str(folder))
+                writing_job.sentence = rpt_("The element is in {:s}.").format(str(folder))
 
         return _extract_request(smoke, folder), say
 
 
-class _Element(OfClip):
-    bl_label = "Element"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        smoke = active_smoke(context.scene)
-        row = self.layout.row(align=True)
-        row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
-        row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
-        for operator, icon in (
-            ("smokelift.extract", "IMAGE_RGB_ALPHA"),
-            ("smokelift.render_element", "RENDER_ANIMATION"),
-        ):
-            draw_work(self.layout, context, smoke, operator, icon)
-
-
-class SMOKELIFT_PT_view_element(_Element, bpy.types.Panel):
-    """The panel in the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_element(_Element, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
+def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    layout.use_property_split = False
+    row = layout.row(align=True)
+    row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
+    row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
+    for operator, icon in (
+        ("smokelift.extract", "IMAGE_RGB_ALPHA"),
+        ("smokelift.render_element", "RENDER_ANIMATION"),
+    ):
+        draw_work(layout, context, smoke, operator, icon)
 
 
 register, unregister = bpy.utils.register_classes_factory(
@@ -224,7 +206,6 @@ register, unregister = bpy.utils.register_classes_factory(
         SMOKELIFT_PT_strokes,
         SMOKELIFT_OT_extract,
         SMOKELIFT_OT_render_element,
-        SMOKELIFT_PT_view_element,
-        SMOKELIFT_PT_clip_element,
+        *sub_panels("element", "Element", _draw_element, RequiresClip),
     )
 )

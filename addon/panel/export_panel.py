@@ -5,11 +5,11 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 
 from ..core.job import Job
 from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
-from ..result.side_job import Request, Writes
+from ..result.side_job import Request
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from ..scene.smoke import active_smoke
-from .layout import OfResult, RequiresResult, draw_text, draw_work
+from .common import RequiresResult, WritesFiles, refuse, sub_panels
+from .layout import draw_text, draw_work
 
 
 def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
@@ -60,7 +60,7 @@ class SmokeliftExport(bpy.types.PropertyGroup):
     )
 
 
-class SMOKELIFT_OT_export(Writes, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_export(WritesFiles, RequiresResult, bpy.types.Operator):
     """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
 
     bl_idname = "smokelift.export"
@@ -75,7 +75,7 @@ def _complete(smoke: bpy.types.Object, job: Job) -> None:
         write_asset(smoke, folder_of(smoke))
 
 
-class SMOKELIFT_OT_make_proxy(Writes, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_make_proxy(WritesFiles, RequiresResult, bpy.types.Operator):
     """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
 
     bl_idname = "smokelift.make_proxy"
@@ -90,38 +90,17 @@ def _show_proxy(smoke: bpy.types.Object, job: Job) -> None:
         volume.show(smoke, volume.shown_take(smoke))
 
 
-class _ExportPanel(OfResult):
-    bl_label = "Export"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        smoke = active_smoke(context.scene)
-        settings = smoke.smokelift_export
-        layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
-        for name in ("host", "precision", "use_velocity", "proxy"):
-            layout.prop(settings, name)
-        if size_estimate.smoke != smoke.session_uid:
-            size_estimate.ask(smoke)
-        elif size_estimate.size:
-            draw_text(layout, context, size_estimate.size, "DISK_DRIVE")
-        draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
-        layout.operator("smokelift.add_instance", icon="DUPLICATE")
-
-
-class SMOKELIFT_PT_view_export(_ExportPanel, bpy.types.Panel):
-    """The panel in the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_export(_ExportPanel, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
+def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    settings = smoke.smokelift_export
+    layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
+    for name in ("host", "precision", "use_velocity", "proxy"):
+        layout.prop(settings, name)
+    if size_estimate.smoke != smoke.session_uid:
+        size_estimate.ask(smoke)
+    elif size_estimate.size:
+        draw_text(layout, context, size_estimate.size, "DISK_DRIVE")
+    draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
+    layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 
 class SMOKELIFT_OT_add_instance(bpy.types.Operator):
@@ -140,11 +119,9 @@ class SMOKELIFT_OT_add_instance(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         obj = context.object
         if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
-            cls.poll_message_set("Select a Volume that plays a sequence")
-            return False
+            return refuse(cls, "Select a Volume that plays a sequence")
         if obj.data.animation_data is not None and obj.data.animation_data.drivers:
-            cls.poll_message_set("Set Speed to Frame by Frame first")
-            return False
+            return refuse(cls, "Set Speed to Frame by Frame first")
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -163,8 +140,7 @@ _CLASSES = (
     SMOKELIFT_OT_export,
     SMOKELIFT_OT_make_proxy,
     SMOKELIFT_OT_add_instance,
-    SMOKELIFT_PT_view_export,
-    SMOKELIFT_PT_clip_export,
+    *sub_panels("export", "Export", _draw_export, RequiresResult),
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,30 +1,20 @@
-"""What the parts of the tab share: where they stand, when they and their buttons work, and how they draw."""
+"""How the parts of the tab draw what they have in common."""
 
 import textwrap
-from collections.abc import Callable
 from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.props import BoolProperty
 
 from ..core.sentences import duration
-from ..result.side_job import side_job
-from ..scene import volume
+from ..result.side_job import writing_job
 from ..scene.smoke import active_smoke
 
+POINTS_A_LETTER = 6.5
+"""Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
-def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
-    """A tick for a number that is chosen automatically where it is 0; ticked, the number begins with ``start``.
-
-    It keeps nothing of its own, so it cannot contradict the number.
-    """
-    return BoolProperty(
-        name=label,
-        description=f"Choose {label} by hand; otherwise it is automatic",
-        get=lambda settings: getattr(settings, name) > 0,
-        set=lambda settings, on: setattr(settings, name, (start(settings) if callable(start) else start) if on else 0),
-    )
+MASK_HELPS = ("not all may be smoke", "not all is smoke", "hardly any smoke fitted")
+"""Doubts that a mask may end."""
 
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
@@ -39,67 +29,6 @@ def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, n
     return row
 
 
-class RequiresClip:
-    """For operators that read the clip."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        if smoke is None or smoke.smokelift.clip is None:
-            cls.poll_message_set("Choose a clip first")
-            return False
-        return True
-
-
-class RequiresResult:
-    """For operators that do something with the result on show."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        if smoke is None or volume.shown_take(smoke) is None:
-            cls.poll_message_set("Make smoke first")
-            return False
-        return True
-
-
-class RequiresClipAndResult(RequiresClip, RequiresResult):
-    """For operators that bring the two together."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return super().poll(context) and super(RequiresClip, cls).poll(context)
-
-
-class OfClip:
-    """A part that is shown for a smoke with a clip."""
-
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and smoke.smokelift.clip is not None
-
-
-class OfResult(OfClip):
-    """A part that is shown for a smoke with a result."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and volume.shown_take(smoke) is not None
-
-
-POINTS_A_LETTER = 6.5
-"""Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
-
-MASKED = ("not all may be smoke", "not all is smoke", "hardly any smoke fitted")
-"""Doubts that a mask may end."""
-
-
 def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """A button for each side of the box, below the name of the row: beside it their names would be cut off."""
     column = layout.column(align=True)
@@ -108,24 +37,20 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
     column.row(align=True).prop(settings, "closed")
 
 
-def draw_progress(layout: bpy.types.UILayout, row: bpy.types.PropertyGroup) -> None:
-    """How far a run has come."""
-    layout.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
-
-
-def _progress(row: bpy.types.PropertyGroup) -> str:
-    if row.cancel:
-        return "Stopping"
-    if not row.total:
-        return "Reading the clip"
-    text = iface_("{:d} of {:d}").format(row.done, row.total)
-    return text if row.seconds_left < 0.0 else iface_("{:s}, {:s} left").format(text, duration(row.seconds_left))
+def draw_progress(layout: bpy.types.UILayout, work: Any) -> None:
+    """How far a run or a job has come."""
+    text = iface_("{:d} of {:d}").format(work.done, work.total) if work.total else iface_("Reading the clip")
+    if getattr(work, "cancel", None) is True:
+        text = iface_("Stopping")
+    elif work.total and (work.seconds_left or -1.0) >= 0.0:
+        text = iface_("{:s}, {:s} left").format(text, duration(work.seconds_left))
+    layout.progress(factor=work.done / work.total if work.total else 0.0, text=text, translate=False)
 
 
 def draw_doubt(layout: bpy.types.UILayout, context: bpy.types.Context, kind: str, words: str) -> None:
     """Why a result may be wrong, and the button that helps."""
     draw_text(layout, context, words, "ERROR")
-    if kind in MASKED:
+    if kind in MASK_HELPS:
         smoke = active_smoke(context.scene)
         drawn = smoke is not None and smoke.smokelift.drawn_mask is not None
         layout.operator("smokelift.new_mask", text="Edit Mask" if drawn else "New Mask", icon="MOD_MASK")
@@ -146,17 +71,15 @@ def draw_work(
     layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, operator: str, icon: str
 ) -> None:
     """The button that has files written; their progress while that is at work, and what it said at its end."""
-    own = operator == side_job.operator
-    if own and side_job.writing:
-        job = side_job.job
-        text = iface_("{:d} of {:d}").format(job.done, job.total) if job.total else iface_("Reading the clip")
-        layout.progress(factor=job.done / job.total if job.total else 0.0, text=text, translate=False)
+    own = operator == writing_job.operator
+    if own and writing_job.writing:
+        draw_progress(layout, writing_job.job)
         layout.operator("smokelift.stop_writing", text="Cancel", icon="CANCEL")
     else:
         layout.operator(operator, icon=icon)
-    if own and side_job.smoke == smoke.session_uid and side_job.sentence:
-        draw_text(layout, context, side_job.sentence, "INFO")
-        for kind, words in side_job.doubts:
+    if own and writing_job.smoke == smoke.session_uid and writing_job.sentence:
+        draw_text(layout, context, writing_job.sentence, "INFO")
+        for kind, words in writing_job.doubts:
             draw_doubt(layout, context, kind, words)
 
 

@@ -4,15 +4,25 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..scene import look, volume
+from ..scene.blender import ShotError
 from ..scene.modifiers import in_viewport, proxy_modifier
 from ..scene.smoke import is_override, smoke_with_look
-from .layout import OfResult, RequiresResult, draw_text, draw_work
+from .common import ActsOnSmoke, RequiresResult, sub_panels
+from .layout import draw_text, draw_work
 
 SHORT = {"Absorption Color": "Absorption"}
 """Names of inputs that the sidebar would cut off."""
 
 
-class SMOKELIFT_OT_use_look(RequiresResult, bpy.types.Operator):
+class RequiresLook(RequiresResult):
+    """For what changes the look of a smoke, also of one that another file is linked for."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_override(smoke_with_look(context.scene)) or super().poll(context)
+
+
+class SMOKELIFT_OT_use_look(ActsOnSmoke, RequiresLook, bpy.types.Operator):
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
 
     bl_idname = "smokelift.use_look"
@@ -25,57 +35,42 @@ class SMOKELIFT_OT_use_look(RequiresResult, bpy.types.Operator):
         items=[(key, name, description) for key, (name, description, _) in look.PRESETS.items()],
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_override(smoke_with_look(context.scene)) or super().poll(context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         smoke = smoke_with_look(context.scene)
         index = volume.shown_take(smoke).read().index
         if index is None:
-            self.report({"ERROR"}, "The smoke's files are missing: make it again.")
-            return {"CANCELLED"}
+            raise ShotError("The smoke's files are missing: make it again.")
         if not look.use_preset(smoke, self.preset, index["scene"]["medium"]["anisotropy"]):
-            self.report({"ERROR"}, "The smoke's material is your own: remove it and show the result again for presets.")
-            return {"CANCELLED"}
-        return {"FINISHED"}
+            raise ShotError("The smoke's material is your own: remove it and show the result again for presets.")
 
 
-class _Look(OfResult):
-    bl_label = "Look"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_override(smoke_with_look(context.scene)) or super().poll(context)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        smoke = smoke_with_look(context.scene)
-        override = is_override(smoke)
-        if override:
-            layout.label(text=smoke.name, translate=False, icon="LIBRARY_DATA_OVERRIDE")
-        sockets = look.controls(smoke)
-        if sockets:
-            layout.operator_menu_enum("smokelift.use_look", "preset", text="Presets", icon="PRESET")
-        else:
-            layout.label(text="The material is your own", icon="MATERIAL")
-        if look.is_linked(smoke):
-            draw_text(layout, context, "A preset gives this override a look of its own.", "INFO")
-        else:
-            column = layout.column()
-            for socket in sockets:
-                column.prop(socket, "default_value", text=SHORT.get(socket.name, socket.name))
+def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    smoke = smoke_with_look(context.scene)
+    layout.use_property_decorate = True  # the look may be animated
+    override = is_override(smoke)
+    if override:
+        layout.label(text=smoke.name, translate=False, icon="LIBRARY_DATA_OVERRIDE")
+    sockets = look.controls(smoke)
+    if sockets:
+        layout.operator_menu_enum("smokelift.use_look", "preset", text="Presets", icon="PRESET")
+    else:
+        layout.label(text="The material is your own", icon="MATERIAL")
+    if look.is_linked(smoke):
+        draw_text(layout, context, "A preset gives this override a look of its own.", "INFO")
+    else:
         column = layout.column()
-        column.use_property_decorate = False
-        modifier = proxy_modifier(smoke)
-        if not override:
-            column.prop(in_viewport(smoke).display, "density", text="View Density")
-            _draw_render(column, context, smoke)
-        if modifier is not None:
-            column.prop(modifier, "show_viewport", text="Proxy in View", icon="NONE")
-        elif not override:
-            draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
+        for socket in sockets:
+            column.prop(socket, "default_value", text=SHORT.get(socket.name, socket.name))
+    column = layout.column()
+    column.use_property_decorate = False
+    modifier = proxy_modifier(smoke)
+    if not override:
+        column.prop(in_viewport(smoke).display, "density", text="View Density")
+        _draw_render(column, context, smoke)
+    if modifier is not None:
+        column.prop(modifier, "show_viewport", text="Proxy in View", icon="NONE")
+    elif not override:
+        draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
 
 
 def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -92,20 +87,6 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
         draw_text(column, context, text, "INFO")
 
 
-class SMOKELIFT_PT_view_look(_Look, bpy.types.Panel):
-    """The panel in the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_look(_Look, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
-
-
 register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_use_look, SMOKELIFT_PT_view_look, SMOKELIFT_PT_clip_look)
+    (SMOKELIFT_OT_use_look, *sub_panels("look", "Look", _draw_look, RequiresLook))
 )

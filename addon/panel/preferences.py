@@ -10,7 +10,8 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from ..core.contract import QUALITIES
 from ..scene.blender import PACKAGE
 from ..scene.smoke import is_smoke
-from .layout import automatic_unless, draw_automatic
+from .common import automatic_unless, refuse
+from .layout import draw_automatic
 
 MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
 """The manual, which the extension brings along."""
@@ -107,8 +108,7 @@ class SMOKELIFT_OT_add_preset(AddPresetBase, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not is_smoke(context.object):
-            cls.poll_message_set("Select the smoke first")
-            return False
+            return refuse(cls, "Select the smoke first")
         return True
 
 

@@ -2,31 +2,86 @@
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.props import EnumProperty, FloatProperty, IntProperty
 
+from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
-from ..result import run_queue, shot_check
-from ..scene.smoke import active_smoke
-from .layout import RequiresClip, draw_doubt, draw_text
+from ..result import shot_check
+from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed
+from .layout import draw_doubt, draw_text
+
+SEEDS = 2**31
+"""Numbers of variations: as many as Blender's whole numbers have from 0."""
 
 
-class SMOKELIFT_OT_check(RequiresClip, bpy.types.Operator):
+class QualitySettings:
+    """How fine the smoke is made, and on what."""
+
+    quality: EnumProperty(
+        name="Quality",
+        description="More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the "
+        "smoke's contrast in the clip that is finer than the voxels",
+        items=[
+            ("draft", "Draft", "A quick preview"),
+            ("balanced", "Balanced", "Good for most shots"),
+            ("fine", "Fine", "More of the clip's detail, several times slower"),
+            ("final", "Final", "All of the clip's detail, a voxel a pixel: much memory, seconds to minutes a frame"),
+        ],
+        default="balanced",
+        update=check_changed,
+    )
+    detail: FloatProperty(
+        name="Depth Detail",
+        description=(
+            "How much fine structure in depth is made up in the clip's texture, since no camera shows it. "
+            "At 0 the smoke is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip"
+        ),
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=check_changed,
+    )
+    seed: IntProperty(
+        name="Variation",
+        description="Number of the plausible smoke: all look alike from the camera, and differ from the side",
+        default=0,
+        min=0,
+        max=SEEDS - 1,
+    )
+    longest_side: IntProperty(
+        name="Resolution",
+        description="Voxels along the box's longest side; automatic is by the detail that is measured in the clip",
+        default=0,
+        min=0,
+        max=1024,
+        update=check_changed,
+    )
+    use_longest_side: automatic_unless("longest_side", "Resolution", BOX_VOXELS)
+    device: EnumProperty(
+        name="Device",
+        description="Device that renders",
+        items=[
+            ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
+            ("cpu", "CPU", "The CPU only"),
+            ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
+        ],
+    )
+
+
+class SMOKELIFT_OT_check(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Estimate time, memory and disk space of the run, and list its assumptions"""
 
     bl_idname = "smokelift.check"
     bl_label = "Check Shot"
     bl_options = {"INTERNAL"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        state = context.window_manager.smokelift
-        smoke = active_smoke(context.scene)
-        state.check_smoke, state.check_place = smoke.session_uid, shot_check.place(smoke)
-        state.check_ticks = shot_check.TICKS
-        run_queue.work(context)
-        return {"FINISHED"}
+    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        shot_check.check(smoke)
 
 
 CELLS = 0.245, 0.215, 0.18, 0.18
-"""Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
+"""Fractions of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
 
 
 def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -52,7 +107,7 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
                 _brief_time(cost.seconds),
                 _brief(cost.memory, "G"),
                 _brief_disk(cost.disk),
-                _brief_share(cost.lost),
+                _brief_fraction(cost.lost),
             )
             for cell, word in zip(cells, words, strict=True):
                 cell.active = done
@@ -64,8 +119,9 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
     elif state.check_error:
         draw_text(layout, context, state.check_error, "ERROR")
     elif not done:
-        text = iface_("Reading the clip: {:s}").format(duration(state.check_seconds))
-        layout.label(text=text if state.check_seconds else iface_("Reading the clip"), translate=False, icon="TIME")
+        seconds = shot_check.check_job.seconds
+        text = iface_("Reading the clip: {:s}").format(duration(seconds)) if seconds else iface_("Reading the clip")
+        layout.label(text=text, translate=False, icon="TIME")
     elif (own := costs.get(settings.quality)) is not None:
         text = iface_("{} x {} x {} voxels").format(*own.resolution)
         layout.label(text=text, translate=False, icon="MESH_GRID")
@@ -80,10 +136,10 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
 def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
     """The cells of a line of the table of qualities."""
     cells, left = [], 1.0
-    for share in CELLS:
-        column = column.split(factor=share / left, align=True)
+    for fraction in CELLS:
+        column = column.split(factor=fraction / left, align=True)
         cells.append(column.row(align=True))
-        left -= share
+        left -= fraction
     return [*cells, column.row(align=True)]
 
 
@@ -95,11 +151,11 @@ def _brief_disk(megabytes: float) -> str:
     return f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G")
 
 
-def _brief_share(share: float) -> str:
-    """A share in percent; nothing below 0, where it is unknown."""
-    if share < 0.0:
+def _brief_fraction(fraction: float) -> str:
+    """A fraction in percent; nothing below 0, where it is unknown."""
+    if fraction < 0.0:
         return ""
-    return f"{share:.1%}" if 0.0005 <= share < 0.00995 else f"{share:.0%}"
+    return f"{fraction:.1%}" if 0.0005 <= fraction < 0.00995 else f"{fraction:.0%}"
 
 
 def _brief(value: float, unit: str) -> str:

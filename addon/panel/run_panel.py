@@ -13,22 +13,23 @@ from ..scene import volume
 from ..scene.blender import ShotError
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import active_smoke, find_smoke
-from .layout import RequiresClip, draw_doubt, draw_progress, draw_text
-from .properties import SEEDS
+from .common import ActsOnSmoke, RequiresClip, refuse
+from .layout import draw_doubt, draw_progress, draw_text
+from .quality_panel import SEEDS
 
 
-class SMOKELIFT_OT_run(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_run(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
 
     bl_idname = "smokelift.run"
     bl_label = "Make Smoke"
     bl_options = {"UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return _make_smoke(self, context)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        run_queue.enqueue(context, smoke, smoke_takes.write_take(smoke))
 
 
-class SMOKELIFT_OT_vary(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_vary(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Make the smoke again with the next variation: it looks the same from the camera, and different from the side"""
 
     bl_idname = "smokelift.vary"
@@ -40,51 +41,32 @@ class SMOKELIFT_OT_vary(RequiresClip, bpy.types.Operator):
         if not super().poll(context):
             return False
         if active_smoke(context.scene).smokelift.detail == 0.0:
-            cls.poll_message_set("Without detail in depth there is only one smoke: raise Depth Detail first")
-            return False
+            return refuse(cls, "Without detail in depth there is only one smoke: raise Depth Detail first")
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = active_smoke(context.scene).smokelift
-        before = settings.seed
-        settings.seed = (before + 1) % SEEDS
-        outcome = _make_smoke(self, context)
-        if outcome == {"CANCELLED"}:
-            settings.seed = before
-        return outcome
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        before = smoke.smokelift.seed
+        smoke.smokelift.seed = (before + 1) % SEEDS
+        try:
+            take = smoke_takes.write_take(smoke)
+        except (ShotError, TakeError):
+            smoke.smokelift.seed = before
+            raise
+        run_queue.enqueue(context, smoke, take)
 
 
-def _make_smoke(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
-    """Write a take and queue it; the operator reports what is in the way."""
-    smoke = active_smoke(context.scene)
-    try:
-        take = smoke_takes.write_take(smoke)
-    except (ShotError, TakeError) as error:
-        operator.report({"ERROR"}, str(error))
-        return {"CANCELLED"}
-    run_queue.enqueue(context, smoke, take)
-    return {"FINISHED"}
-
-
-class SMOKELIFT_OT_resume(RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_resume(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Resume the stopped run after its last finished frame, with its own settings"""
 
     bl_idname = "smokelift.resume"
     bl_label = "Resume"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = smoke_takes.unfinished(smoke)
         if take is None or smoke_takes.busy(context.window_manager, take):
-            self.report({"ERROR"}, "No stopped run to resume: press Make Smoke.")
-            return {"CANCELLED"}
-        try:
-            smoke_takes.update_moved_files(smoke, take)
-        except TakeError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            raise ShotError("No stopped run to resume: press Make Smoke.")
+        smoke_takes.update_moved_files(smoke, take)
         run_queue.enqueue(context, smoke, take)
-        return {"FINISHED"}
 
 
 class SMOKELIFT_OT_cancel(bpy.types.Operator):

@@ -2,17 +2,73 @@
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, PointerProperty
 
 from ..result import shot_check
 from ..scene import shot_setup, volume
-from ..scene.smoke import active_smoke
-from .layout import OfClip, RequiresClipAndResult
+from ..scene.blender import ShotError
+from .common import ActsOnSmoke, RequiresClip, RequiresClipAndResult, sub_panels
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
 """Names of the settings."""
 
 
-class SMOKELIFT_OT_set_up(RequiresClipAndResult, bpy.types.Operator):
+class SetUpSettings:
+    """What Set Up Shot sets up."""
+
+    set_up_range: BoolProperty(
+        name="Size, Rate and Range",
+        description="Give the scene the clip's resolution and frame rate, and the length of the result",
+        default=True,
+    )
+    set_up_camera: BoolProperty(
+        name="Camera",
+        description="Look through the camera of the clip, with the clip behind it",
+        default=True,
+    )
+    set_up_light: BoolProperty(
+        name="Light",
+        description="Render with Cycles, scatter light in smoke as often as the engine did, and add the light that was "
+        "estimated from the clip",
+        default=True,
+    )
+    set_up_plate: BoolProperty(
+        name="Background",
+        description="Show the clean plate behind the smoke",
+        default=True,
+    )
+    set_up_colors: BoolProperty(
+        name="Color Management",
+        description="Set the view transform to Standard, in which the clip looks as it was filmed",
+        default=True,
+    )
+    plate_place: EnumProperty(
+        name="Place",
+        description="Where the background is put behind the smoke",
+        items=[
+            ("WORLD", "World", "In the world, seen by the camera only"),
+            (
+                "COMPOSITE",
+                "Compositor",
+                "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
+                "the clip's grain, and the clip in front of it all where a mask says so",
+            ),
+            (
+                "PROJECTION",
+                "Projection",
+                "On a card behind the smoke, projected from where the clip was filmed, so that it stays in its place "
+                "when the camera of the render moves",
+            ),
+        ],
+    )
+    assumed_camera: PointerProperty(
+        name="Assumed Camera",
+        description="Camera object that stands where the clip was assumed to be filmed from",
+        type=bpy.types.Object,
+    )
+
+
+class SMOKELIFT_OT_set_up(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator):
     """Make a render from the camera match the clip."""
 
     bl_idname = "smokelift.set_up"
@@ -23,18 +79,15 @@ class SMOKELIFT_OT_set_up(RequiresClipAndResult, bpy.types.Operator):
     bl_label = "Set Up Shot"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = volume.shown_take(smoke)
         index = take.read().index
         if index is None:
             text = rpt_("The files of the smoke in {:s} are missing: make it again.")
-            self.report({"ERROR"}, text.format(str(take.directory)))
-            return {"CANCELLED"}
+            raise ShotError(text.format(str(take.directory)))
         settings = smoke.smokelift
         if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
-            self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
-            return {"CANCELLED"}
+            raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
         hidden, further = shot_setup.set_up(smoke, take, index)
         if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "CAMERA"
@@ -47,40 +100,21 @@ class SMOKELIFT_OT_set_up(RequiresClipAndResult, bpy.types.Operator):
             text = rpt_("Beside the clip's light the smoke has that of {:s}: hide it from renders for a match.")
             said.append(text.format(", ".join(further)))
         self.report({"INFO"}, " ".join(said))
-        return {"FINISHED"}
 
 
-class _SetUp(OfClip):
-    bl_label = "Shot Set-Up"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_decorate = False
-        settings = active_smoke(context.scene).smokelift
-        column = layout.column()
-        for name in TICKS:
-            column.prop(settings, name)
-        row = column.row()
-        row.use_property_split = True
-        row.active = settings.set_up_plate
-        row.prop(settings, "plate_place")
-        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
-
-
-class SMOKELIFT_PT_view_set_up(_SetUp, bpy.types.Panel):
-    """The panel in the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_set_up(_SetUp, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
+def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    layout.use_property_split = False
+    settings = smoke.smokelift
+    column = layout.column()
+    for name in TICKS:
+        column.prop(settings, name)
+    row = column.row()
+    row.use_property_split = True
+    row.active = settings.set_up_plate
+    row.prop(settings, "plate_place")
+    layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
 register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_set_up, SMOKELIFT_PT_view_set_up, SMOKELIFT_PT_clip_set_up)
+    (SMOKELIFT_OT_set_up, *sub_panels("set_up", "Shot Set-Up", _draw_set_up, RequiresClip))
 )

@@ -5,16 +5,18 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
 from ..result import smoke_takes
+from ..scene.blender import ShotError
 from ..scene.smoke import activate, active_smoke, smokes
 from . import preferences
 from .camera_panel import draw_shot
 from .clip_panel import draw_clip
+from .common import ActsOnSmoke
 from .layout import draw_text
 from .quality_panel import draw_qualities
 from .run_panel import draw_run
 
 
-class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
+class SMOKELIFT_OT_show_smoke(ActsOnSmoke, bpy.types.Operator):
     """Select this smoke, and show its settings in the tab"""
 
     bl_idname = "smokelift.show_smoke"
@@ -23,13 +25,11 @@ class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
 
     smoke: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         found = next((obj for obj in smokes(context.scene) if obj.name == self.smoke), None)
         if found is None:
-            self.report({"ERROR"}, rpt_("The scene has no smoke of the name {:s}.").format(self.smoke))
-            return {"CANCELLED"}
+            raise ShotError(rpt_("The scene has no smoke of the name {:s}.").format(self.smoke))
         activate(found, context.scene)
-        return {"FINISHED"}
 
 
 class _Main:

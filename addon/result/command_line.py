@@ -128,14 +128,10 @@ def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
             settings.clip = bpy.data.movieclips.load(str(choices.clip.absolute()))
         except RuntimeError:
             raise ShotError(f"The clip {choices.clip} cannot be opened.") from None
-    if choices.quality:
-        settings.quality = choices.quality
-    if choices.detail is not None:
-        settings.detail = choices.detail
-    if choices.seed is not None:
-        settings.seed = choices.seed
-    if choices.distance is not None:
-        settings.distance = choices.distance
+    for name in ("quality", "detail", "seed", "distance"):
+        value = getattr(choices, name)
+        if value is not None:
+            setattr(settings, name, value)
     if choices.output:
         settings.output = str(choices.output.absolute())
     if settings.clip is None:

@@ -13,15 +13,13 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from ..core.job import EngineMissingError, Job
+from ..core.sentences import disk_size
 from ..scene import volume
 from ..scene.blender import absolute, relative
 from ..scene.look import fit_look
 from ..scene.smoke import find_smoke
 from . import smoke_takes
-from .side_job import again, side_job
-
-REST_SECONDS = 0.4
-"""Time without a change of settings before the size is estimated."""
+from .side_job import REST_SECONDS, call_later, cancel_call, writing_job
 
 
 class SizeEstimate:
@@ -30,26 +28,27 @@ class SizeEstimate:
     def __init__(self) -> None:
         self.smoke = 0
         self.size = ""
+        self.timer = self.start  # each `self.start` is another object, by which Blender knows a timer
 
     def ask(self, smoke: bpy.types.Object) -> None:
         """Estimate the size once the settings rest. Drawing code may call this."""
-        if not bpy.app.background and not side_job.writing:
+        if not bpy.app.background and not writing_job.writing:
             self.smoke, self.size = smoke.session_uid, ""
-            again(self.start, REST_SECONDS)
+            call_later(self.timer, REST_SECONDS)
 
     def start(self) -> None:
         """Start the engine; a timer that runs once."""
         smoke = find_smoke(self.smoke)
-        if smoke is None or side_job.writing or volume.shown_take(smoke) is None:
+        if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
             return
         try:
-            side_job.start(smoke, ([*arguments(smoke), "--size"], self._keep))
+            writing_job.start(smoke, ([*arguments(smoke), "--size"], self._store))
         except EngineMissingError as error:
             self.size = str(error)
 
-    def _keep(self, _smoke: bpy.types.Object, job: Job) -> None:
+    def _store(self, _smoke: bpy.types.Object, job: Job) -> None:
         done = job.outcome == "done"
-        self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
+        self.size = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
 
 
 size_estimate = SizeEstimate()
@@ -67,11 +66,6 @@ def arguments(smoke: bpy.types.Object) -> list[str]:
     words = ["export", str(take.directory), "--out", str(folder_of(smoke))]
     words += ["--precision", settings.precision, "--proxy", settings.proxy, "--host", settings.host]
     return words if settings.use_velocity else [*words, "--no-velocity"]
-
-
-def megabytes(count: float) -> str:
-    """An amount of bytes in words."""
-    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
 
 
 def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
@@ -152,7 +146,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister it, and the estimate that waits."""
-    if bpy.app.timers.is_registered(size_estimate.start):
-        bpy.app.timers.unregister(size_estimate.start)
+    cancel_call(size_estimate.timer)
     if getattr(SMOKELIFT_USD_import, "is_registered", False):
         bpy.utils.unregister_class(SMOKELIFT_USD_import)

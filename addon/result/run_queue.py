@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import bpy.utils.previews
 
-from ..core.job import ENDED, EngineMissingError, Job, Queue, engine_command
+from ..core.job import ENDED, EngineMissingError, Job, engine_command
 from ..core.take import Take, TakeError
 from ..scene import volume
 from ..scene.blender import redraw, thread_options
@@ -96,7 +96,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Poll on the timer, pass other events on; Esc asks whether to stop."""
-        if event.type == "ESC" and event.value == "PRESS" and self._queue.current and not _playing(context):
+        if event.type == "ESC" and event.value == "PRESS" and self._job and not _playing(context):
             bpy.ops.smokelift.cancel("INVOKE_DEFAULT")
             return {"RUNNING_MODAL"}
         if event.type == "TIMER" and not self._tick(context):
@@ -120,17 +120,15 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._end(context)
 
     def _begin(self) -> None:
-        self._queue = Queue()
-        self._jobs: dict[str, Job] = {}
-        self._before: dict[str, Take | None] = {}  # what was on show when a job's first frame came
+        self._take, self._job = "", None  # the run, and its process
+        self._before: dict[str, Take | None] = {}  # what was on show when a run's first frame came
         self._seen: set[str] = set()  # takes to whose smoke the playhead went; the artist may leave it
-        self._not_shown: dict[str, Job] = {}  # jobs whose newest frames the viewport does not show yet
-        self._check = shot_check.ShotCheck()
+        self._not_shown: dict[str, Job] = {}  # runs whose newest frames the viewport does not show yet
         self._thumbnails = bpy.utils.previews.new()
 
     def _end(self, context: bpy.types.Context) -> None:
-        self._queue.kill()
-        self._check.kill()
+        if self._job is not None:
+            self._job.kill()
         for row in context.window_manager.smokelift.jobs:
             row.icon = 0
             if row.outcome == "waiting" and find_smoke(row.smoke_uid) is not None:  # a deleted one may come back
@@ -145,47 +143,56 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Poll once; returns whether work remains."""
         manager = context.window_manager
         rows = {row.take: row for row in manager.smokelift.jobs}
-        for name in self._jobs.keys() - rows.keys():
-            self._jobs[name].cancel()  # it was taken out of the queue
-        for name, row in rows.items():
-            if row.outcome == "waiting" and name not in self._jobs:
-                self._start(name, row)
-            if name in self._jobs and find_smoke(row.smoke_uid) is None:
-                row.cancel = True  # it has nowhere to go; undo brings the smoke back, and Resume goes on
-            if row.cancel and name in self._jobs:
-                self._jobs[name].cancel()
-        changed = self._queue.poll()
-        for name, job in list(self._jobs.items()):
-            if job in changed and name in rows:
-                self._update_row(rows[name], job)
-            if job.ended:
-                del self._jobs[name]  # a resumed take has the same name
+        waiting = next((row for row in rows.values() if row.outcome == "waiting"), None)
+        changed = False
+        if self._job is not None:
+            changed = self._poll(rows.get(self._take))
+        elif waiting is not None:
+            self._start(waiting)
+            changed = True
         while self._not_shown and not bpy.app.is_job_running("RENDER"):  # its data must stay
             name, job = self._not_shown.popitem()
             if name in rows:
                 self._show(rows[name], job)
-        checked = self._check.poll(manager.smokelift)
-        if changed or checked:
+        if changed:
             redraw(manager)
-        return bool(self._jobs or self._not_shown) or self._check.running or manager.smokelift.check_ticks > 0
+        return bool(self._job or self._not_shown or waiting)
 
-    def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
-        take, smoke = Take(Path(name)), find_smoke(row.smoke_uid)
-        before = volume.frames_before_take(smoke, take) if smoke is not None else 0
+    def _start(self, row: bpy.types.PropertyGroup) -> None:
+        """Start the engine on a run that waits."""
+        take, smoke = Take(Path(row.take)), find_smoke(row.smoke_uid)
+        if smoke is None:  # undo brings it back, and Resume goes on
+            row.outcome, row.sentence = "cancelled", "Cancelled before it began."
+            return
         try:
             words = engine_command(take.arguments() + thread_options())
-            job = Job(words, take.log_file, before, take.read().frames)
         except (EngineMissingError, TakeError) as error:
             row.outcome, row.sentence = "failed", str(error)
             return
-        self._jobs[name] = job
-        self._queue.add(job)
+        job = Job(words, take.log_file, volume.frames_before_take(smoke, take), take.read().frames)
+        job.start()
+        self._take, self._job = row.take, None if job.ended else job
+        self._update_row(row, job)
+
+    def _poll(self, row: bpy.types.PropertyGroup | None) -> bool:
+        """Read what the engine says; returns whether anything changed."""
+        job = self._job
+        if row is not None and find_smoke(row.smoke_uid) is None:
+            row.cancel = True  # it has nowhere to go; undo brings the smoke back, and Resume goes on
+        if row is None or row.cancel:
+            job.cancel()
+        changed = job.poll()
+        if job.ended:
+            self._job = None
+        if changed and row is not None:
+            self._update_row(row, job)
+        return changed
 
     def _update_row(self, row: bpy.types.PropertyGroup, job: Job) -> None:
         """Show a job's progress in the panel."""
         new_frames = job.done != row.done
         row.outcome, row.sentence = job.outcome, job.sentence
-        shot_check.keep_doubts(row, job.doubts)
+        shot_check.store_doubts(row, job.doubts)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
         if new_frames or job.ended:

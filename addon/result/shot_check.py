@@ -5,7 +5,6 @@ session is not measured anew.
 """
 
 import hashlib
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,16 +12,14 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..core.job import EngineMissingError, Job, engine_command
+from ..core.job import EngineMissingError, Job
 from ..core.take import Take, TakeError
 from ..scene.blender import ShotError, absolute, redraw, thread_options
 from ..scene.box import box_corners, box_of
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
 from ..scene.smoke import active_smoke, find_smoke
-
-TICKS = 4
-"""Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
+from .side_job import REST_SECONDS, SideJob, call_later, cancel_call
 
 _known: dict[str, tuple[Mapping[str, Any], list[tuple[str, str]]]] = {}
 """What the engine said of the shots of this session at its end, and its doubts, by their fingerprints."""
@@ -49,7 +46,7 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
     return [f"{WORDS[fact['what']]}: {fact['short']}" for fact in facts if fact["what"] in WORDS]
 
 
-def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
+def store_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
     """Keep what each quality takes and loses.
 
     Parameters
@@ -70,73 +67,59 @@ def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[
     state.costs_smoke, state.memory_free = smoke_uid, details["memory_free"] / 2**30
 
 
-class ShotCheck:
-    """The engine's check of the shot whose settings changed last; its result goes into the state of the session."""
+check_job = SideJob()
+"""The check's own, beside which files may be written."""
 
-    def __init__(self) -> None:
-        self._job: Job | None = None
-        self._shot = ""
-        self._began = 0.0
 
-    @property
-    def running(self) -> bool:
-        """Whether the engine is at work on it."""
-        return self._job is not None
+def check(smoke: bpy.types.Object) -> None:
+    """Check a shot once its settings rest; without a window, at once and to the end."""
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_place = smoke.session_uid, box_position(smoke)
+    state.check_done, state.check_error = False, ""
+    check_job.stop()
+    if bpy.app.background:
+        _start(smoke)
+        check_job.wait()
+    else:
+        call_later(_start_later, REST_SECONDS)
 
-    def kill(self) -> None:
-        """End the engine at once."""
-        if self._job is not None:
-            self._job.kill()
-            self._job = None
 
-    def poll(self, state: bpy.types.PropertyGroup) -> bool:
-        """Start the check once the settings rest, and read its result; returns whether anything changed."""
-        if state.check_ticks > 0:
-            state.check_ticks -= 1
-            if state.check_ticks > 0:
-                return False
-            self._start(state)
-            return True
-        if self._job is None:
-            return False
-        self._job.poll()
-        if not self._job.ended:
-            before, state.check_seconds = state.check_seconds, int(time.monotonic() - self._began)
-            return state.check_seconds != before
-        job, self._job = self._job, None
-        if job.outcome == "done":
-            _known[self._shot] = job.details, job.doubts
-            _keep(state, *_known[self._shot])
-        else:
-            state.check_error = job.sentence
-        return True
+def _start_later() -> None:
+    """Start the engine on the shot whose settings changed last; a timer, which has no window."""
+    manager = bpy.context.window_manager
+    smoke = find_smoke(manager.smokelift.check_smoke)
+    if smoke is not None:
+        with bpy.context.temp_override(window=manager.windows[0]):
+            _start(smoke)
+        redraw(manager)
 
-    def _start(self, state: bpy.types.PropertyGroup) -> None:
-        self.kill()
-        smoke = find_smoke(state.check_smoke)
-        state.check_done, state.check_error, state.check_seconds = False, "", 0
-        if smoke is None:
+
+def _start(smoke: bpy.types.Object) -> None:
+    """Start the engine on a shot, unless it is known what it says; its result goes into the state of the session."""
+    state, folder = bpy.context.window_manager.smokelift, Path(bpy.app.tempdir)
+    try:
+        take, words = Take(folder / "smokelift_check"), options(smoke)
+        take.write(shot_tables(smoke, quick=True), words)
+        shot = _fingerprint(take.scene_file.read_bytes(), words + thread_options(), smoke)
+        page = folder / f"smokelift_inspect_{shot}.png"
+        state.check_page = str(page)
+        if shot in _known:
+            _store(state, *_known[shot])
             return
-        folder = Path(bpy.app.tempdir)
-        try:
-            take, words = Take(folder / "smokelift_check"), options(smoke) + thread_options()
-            take.write(shot_tables(smoke, quick=True), options(smoke))
-            self._shot = _fingerprint(take.scene_file.read_bytes(), words, smoke)
-            page = folder / f"smokelift_inspect_{self._shot}.png"
-            state.check_page = str(page)
-            if self._shot in _known:
-                _keep(state, *_known[self._shot])
-                return
-            arguments = ["inspect", str(take.scene_file), "--page", str(page), "--progress", "json", *words]
-            self._job = Job(engine_command(arguments), take.log_file)
-        except (ShotError, TakeError, EngineMissingError) as error:
-            state.check_error = str(error)
-            return
-        self._began = time.monotonic()
-        self._job.start()
+
+        def store(_smoke: bpy.types.Object, job: Job) -> None:
+            if job.outcome == "done":
+                _known[shot] = job.details, job.doubts
+                _store(state, *_known[shot])
+            else:
+                state.check_error = job.sentence
+
+        check_job.start(smoke, (["inspect", str(take.scene_file), "--page", str(page), *words], store))
+    except (ShotError, TakeError, EngineMissingError) as error:
+        state.check_error = str(error)
 
 
-def keep_doubts(owner: bpy.types.PropertyGroup, doubts: Iterable[tuple[str, str]]) -> None:
+def store_doubts(owner: bpy.types.PropertyGroup, doubts: Iterable[tuple[str, str]]) -> None:
     """Keep why a result may be wrong, as `Job` has it, in a run or in the state of the session."""
     owner.doubts.clear()
     for kind, words in doubts:
@@ -144,12 +127,12 @@ def keep_doubts(owner: bpy.types.PropertyGroup, doubts: Iterable[tuple[str, str]
         row.kind, row.sentence = kind, words
 
 
-def _keep(state: bpy.types.PropertyGroup, details: Mapping[str, Any], doubts: Iterable[tuple[str, str]]) -> None:
+def _store(state: bpy.types.PropertyGroup, details: Mapping[str, Any], doubts: Iterable[tuple[str, str]]) -> None:
     """Show what the engine said of the shot."""
     state.check_done = True
-    keep_doubts(state, doubts)
+    store_doubts(state, doubts)
     state.notes = "\n".join(found_lines(details.get("facts", ())))
-    keep_costs(state, state.check_smoke, details)
+    store_costs(state, state.check_smoke, details)
 
 
 def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -> str:
@@ -162,7 +145,7 @@ def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -
     return hashlib.sha256(tables + repr((list(words), states)).encode()).hexdigest()[:16]
 
 
-def place(smoke: bpy.types.Object) -> str:
+def box_position(smoke: bpy.types.Object) -> str:
     """Where the corners of a smoke's box are; empty without one."""
     box = box_of(smoke) if smoke.smokelift.camera_mode == "SCENE" else None
     return "" if box is None else " ".join(f"{number:.5g}" for corner in box_corners(box) for number in corner)
@@ -170,7 +153,7 @@ def place(smoke: bpy.types.Object) -> str:
 
 def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
     """Whether the last check is of this smoke, whose box has not been moved since: Blender tells of that by drawing."""
-    return state.check_smoke == smoke.session_uid and state.check_place in ("", place(smoke))
+    return state.check_smoke == smoke.session_uid and state.check_place in ("", box_position(smoke))
 
 
 def check_again(context: bpy.types.Context) -> None:
@@ -206,7 +189,7 @@ def check_soon(context: bpy.types.Context) -> None:
     smoke = active_smoke(context.scene)
     known = smoke is None or is_checked(state, smoke)
     if not known and context.window == first and not bpy.app.timers.is_registered(_start_check):
-        bpy.app.timers.register(_start_check)  # drawing code may not change data
+        call_later(_start_check, 0.0)  # drawing code may not change data
 
 
 def _start_check() -> None:
@@ -222,5 +205,5 @@ def register() -> None:
 def unregister() -> None:
     """End what would start a check."""
     bpy.app.handlers.depsgraph_update_post.remove(_when_drawn_on)
-    if bpy.app.timers.is_registered(_start_check):
-        bpy.app.timers.unregister(_start_check)
+    for timer in (_start_check, _start_later):
+        cancel_call(timer)

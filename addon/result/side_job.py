@@ -1,20 +1,24 @@
-"""The engine's work that is no run of the queue, since it changes no result: an export, a proxy, an element.
+"""The engine's work that is no run of the queue, since it changes no result: a check, an export, a proxy, an element.
 
-There is one such job at a time, which a timer of Blender polls.
+A timer of Blender polls it.
 """
 
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import ClassVar
 
 import bpy
+from bpy.app.handlers import persistent
 
-from ..core.job import EngineMissingError, Job, engine_command
-from ..core.take import TakeError
-from ..scene.blender import ShotError, redraw, thread_options
-from ..scene.smoke import active_smoke, find_smoke
+from ..core.job import Job, engine_command
+from ..scene.blender import redraw, thread_options
+from ..scene.smoke import find_smoke
 
 TICK_SECONDS = 0.1
+
+REST_SECONDS = 0.4
+"""Time without a change of settings before the engine is asked what they come to."""
 
 End = Callable[[bpy.types.Object, Job], None]
 """Called with the smoke and the job when that has ended."""
@@ -24,27 +28,37 @@ Request = tuple[list[str], End]
 
 
 class SideJob:
-    """The job, and after its end what it said; never saved.
+    """One such job at a time, and after its end what it said; never saved.
 
     Attributes
     ----------
+    job
+        The one that runs.
     smoke
         Number of the smoke that it is for.
     operator
         Identifier of the operator that has files written; empty for an estimate.
+    seconds
+        Whole seconds since its start.
     sentence
         The result, or the reason of a failure; empty for an estimate.
     doubts
         Why the result may be wrong, as `Job` has them.
     """
 
+    all: ClassVar[list["SideJob"]] = []
+
     def __init__(self) -> None:
         self.job: Job | None = None
         self.smoke = 0
         self.operator = ""
+        self.seconds = 0
         self.sentence = ""
         self.doubts: list[tuple[str, str]] = []
         self._end: End | None = None
+        self._began = 0.0
+        self._timer = self.poll  # Blender knows a timer by the object, and each `self.poll` is another
+        self.all.append(self)
 
     @property
     def writing(self) -> bool:
@@ -58,8 +72,9 @@ class SideJob:
         self.smoke, self.operator, self.sentence, self.doubts = smoke.session_uid, operator, "", []
         words = [*words, "--progress", "json", *thread_options()]
         self.job = Job(engine_command(words), Path(bpy.app.tempdir) / "smokelift.log")
+        self._began, self.seconds = time.monotonic(), 0
         self.job.start()
-        again(self.poll, TICK_SECONDS)
+        call_later(self._timer, TICK_SECONDS)
 
     def stop(self) -> None:
         """End the engine at once."""
@@ -67,12 +82,18 @@ class SideJob:
             self.job.kill()
         self.job = None
 
+    def wait(self) -> None:
+        """Wait for its end, without a window."""
+        while self.poll() is not None:
+            time.sleep(TICK_SECONDS)
+
     def poll(self) -> float | None:
         """Read what the engine says; a timer that ends with it."""
-        job = self.job
+        job, before = self.job, self.seconds
         if job is None:
             return None
-        if job.poll():
+        self.seconds = int(time.monotonic() - self._began)
+        if job.poll() or self.seconds != before:
             redraw(bpy.context.window_manager)
         if not job.ended:
             return TICK_SECONDS
@@ -85,46 +106,20 @@ class SideJob:
         return None
 
 
-side_job = SideJob()
+writing_job = SideJob()
+"""WritesFiles files, or estimates how large they will be."""
 
 
-def again(timer: Callable[[], float | None], seconds: float) -> None:
+def call_later(timer: Callable[[], float | None], seconds: float) -> None:
     """Have Blender call a function, once, however often it is asked for."""
-    if bpy.app.timers.is_registered(timer):
-        bpy.app.timers.unregister(timer)
+    cancel_call(timer)
     bpy.app.timers.register(timer, first_interval=seconds)
 
 
-class Writes:
-    """An operator that has the engine write files; without a window it waits for them."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if side_job.writing:
-            cls.poll_message_set("Other files are being written: wait for them, or cancel that")
-            return False
-        return super().poll(context)
-
-    def request(self, smoke: bpy.types.Object) -> Request:
-        """The engine's arguments, and what is done at the end; ShotError or TakeError if something is in the way."""
-        raise NotImplementedError
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
-        try:
-            side_job.start(smoke, self.request(smoke), type(self).bl_idname)
-        except (ShotError, TakeError, EngineMissingError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        if not bpy.app.background:
-            return {"FINISHED"}
-        job = side_job.job
-        while side_job.poll() is not None:
-            time.sleep(TICK_SECONDS)
-        if job.outcome != "done":
-            self.report({"ERROR"}, job.sentence)
-            return {"CANCELLED"}
-        return {"FINISHED"}
+def cancel_call(timer: Callable[[], float | None]) -> None:
+    """Have Blender not call it."""
+    if bpy.app.timers.is_registered(timer):
+        bpy.app.timers.unregister(timer)
 
 
 class SMOKELIFT_OT_stop_writing(bpy.types.Operator):
@@ -135,16 +130,26 @@ class SMOKELIFT_OT_stop_writing(bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        side_job.stop()
+        writing_job.stop()
         return {"FINISHED"}
 
 
-register, _unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_stop_writing,))
+@persistent
+def _stop_all(_file: str = "") -> None:
+    """End the engine: another file is loaded."""
+    for job in SideJob.all:
+        job.stop()
+
+
+def register() -> None:
+    bpy.utils.register_class(SMOKELIFT_OT_stop_writing)
+    bpy.app.handlers.load_pre.append(_stop_all)
 
 
 def unregister() -> None:
     """Unregister it and end the engine."""
-    side_job.stop()
-    if bpy.app.timers.is_registered(side_job.poll):
-        bpy.app.timers.unregister(side_job.poll)
-    _unregister()
+    _stop_all()
+    for job in SideJob.all:
+        cancel_call(job._timer)
+    bpy.app.handlers.load_pre.remove(_stop_all)
+    bpy.utils.unregister_class(SMOKELIFT_OT_stop_writing)

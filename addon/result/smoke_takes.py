@@ -84,7 +84,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
         hide_default_cube(scene_of(smoke))
     take = _next_take(smoke)
     if smoke.smokelift.drawn_mask is not None:
-        tables["clip"]["mask"] = take.keep_mask(Path(tables["clip"]["mask"]))
+        tables["clip"]["mask"] = take.copy_mask(Path(tables["clip"]["mask"]))
     take.write(tables, engine_options(smoke))
     _note_file(take)
     return take
@@ -93,10 +93,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
 def write_directed(smoke: bpy.types.Object) -> Take:
     """Write the files of a new take that is made of the one on show.
 
-    Raises
-    ------
-    ShotError, TakeError
-        If a setting or an object cannot be used, or the folder cannot be written to.
+    ShotError, TakeError if a setting or an object cannot be used, or the folder cannot be written to.
     """
     source = volume.shown_take(smoke)
     if source is None:
@@ -129,10 +126,7 @@ def _note_file(*used: Take) -> None:
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
     """Write today's paths of clip, mask, plate and strokes into a resumed take's scene file, if the project was moved.
 
-    Raises
-    ------
-    TakeError
-        If its files are damaged.
+    TakeError if its files are damaged.
     """
     settings = smoke.smokelift
     if take.read().direction is None:
@@ -200,14 +194,16 @@ def earlier_takes(context: bpy.types.Context) -> list[Take]:
     What an earlier version of the add-on made stays too, since nothing says which files show it.
     """
     smoke = active_smoke(context.scene)
-    own, shown, kept = own_takes(smoke), volume.shown_take(smoke), directories_in_use(context)
+    own, shown, in_use = own_takes(smoke), volume.shown_take(smoke), directories_in_use(context)
     earlier = own[: own.index(shown)] if shown in own else []
-    doomed = [take for take in earlier if take.directory.resolve() not in kept and foreign_files(smoke, take) == []]
+    removable = [
+        take for take in earlier if take.directory.resolve() not in in_use and foreign_files(smoke, take) == []
+    ]
     while True:  # what is made of a result that goes needs nothing
-        needed = {source for take in _known_takes() if take not in doomed and (source := take.read().source)}
-        if not needed.intersection(doomed):
-            return doomed
-        doomed = [take for take in doomed if take not in needed]
+        needed = {source for take in _known_takes() if take not in removable and (source := take.read().source)}
+        if not needed.intersection(removable):
+            return removable
+        removable = [take for take in removable if take not in needed]
 
 
 def consequences(context: bpy.types.Context, take: Take) -> list[str]:

@@ -12,7 +12,7 @@ from .blender import ShotError
 from .smoke import scene_of
 
 ROUNDING = 1e-5
-"""Share of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
+"""Fraction of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
 
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
@@ -115,7 +115,7 @@ def engine_to_world(smoke: bpy.types.Object) -> Matrix:
     return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()
 
 
-BOX_SHARE = 0.9
+BOX_FRACTION = 0.9
 """Width and height of a new box over those of the picture."""
 
 
@@ -134,8 +134,8 @@ def framed_box(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
     else:
         corners = [eye + (corner - eye) * (depth / near) for corner in frame]
     middle = sum(corners, Vector()) / 4
-    width = BOX_SHARE * (corners[0] - corners[3]).length
-    height = BOX_SHARE * (corners[0] - corners[1]).length
+    width = BOX_FRACTION * (corners[0] - corners[3]).length
+    height = BOX_FRACTION * (corners[0] - corners[1]).length
     half = Vector((width, min(width, height), height)) / 2
     return middle - half, middle + half
 

@@ -60,13 +60,7 @@ def number_in_file(clip: bpy.types.MovieClip, number: int) -> int:
 
 
 def shown_frame(smoke: bpy.types.Object) -> int:
-    """The frame of the clip that the scene shows now, counted from 1.
-
-    Raises
-    ------
-    ShotError
-        If it shows none.
-    """
+    """The frame of the clip that the scene shows now, counted from 1; ShotError if it shows none."""
     clip, now = smoke.smokelift.clip, scene_of(smoke).frame_current
     start, count = clip.frame_start, frame_count(clip)
     if not start <= now < start + count:
@@ -101,10 +95,7 @@ def frame_count(clip: bpy.types.MovieClip) -> int:
 def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
     """Use some frames of the clip's file, counted from 0 as the engine counts them.
 
-    Raises
-    ------
-    ShotError
-        If the clip does not have them.
+    ShotError if the clip does not have them.
     """
     settings = smoke.smokelift
     lowest = settings.clip.frame_offset

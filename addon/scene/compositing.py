@@ -13,7 +13,7 @@ from mathutils import Matrix, Vector
 from ..core.take import Take
 from .box import engine_to_world
 from .nodes import Input, feed, file_group
-from .plate import plate_image, play_beside
+from .plate import plate_image, synchronize_plate
 from .smoke import scene_of
 
 GROUP = "Smokelift Composite"
@@ -86,7 +86,7 @@ def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> Non
     _connect_clip(tree, node, smoke.smokelift.clip)
 
 
-def take_composite_away(scene: bpy.types.Scene) -> None:
+def disable_composite(scene: bpy.types.Scene) -> None:
     """Render as if it were not there, and keep it as the artist has it until it is set up again."""
     tree = scene.compositing_node_group if SINCE_5 else scene.node_tree
     node = tree.nodes.get(GROUP) if tree is not None else None
@@ -193,7 +193,7 @@ def _connect_plate(
     if source is None:
         source = _source(tree, "CompositorNodeImage", name, node, -300.0, socket)
     source.image = plate_image(take, background["image"])
-    play_beside(source.image, source, smoke.smokelift.clip, "matrices" in tables["camera"])
+    synchronize_plate(source.image, source, smoke.smokelift.clip, "matrices" in tables["camera"])
 
 
 def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:

@@ -13,9 +13,9 @@ from .camera import camera_table, scene_camera
 from .clip import start_frame
 from .smoke import scene_of
 
-COARSEST = 0.08
-"""Share of the box's depth that a pixel may show where the click still tells more than the box alone, which knows the
-depth to 0.165 of its half (docs/experiments/density-axis.md)."""
+MAX_PIXEL_DEPTH = 0.08
+"""Fraction of the box's depth that a pixel may show where the click still tells more than the box alone, which knows
+the depth to 0.165 of its half (docs/experiments/density-axis.md)."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +66,12 @@ class Floor:
     def clicked(self, rays: Sequence[tuple[Vector, Vector]]) -> float:
         """The distance of where the first of two rays, of neighboring pixels, meets the floor.
 
-        Raises
-        ------
-        ShotError
-            If that is outside the box, or so flat that a pixel more is much nearer.
+        ShotError if that is outside the box, or so flat that a pixel more is much nearer.
         """
         place, beside = (self.place(*ray) for ray in rays)
         if not all(self.low[axis] <= place[axis] <= self.high[axis] for axis in (0, 1)):
             raise ShotError("That is outside the box: click in the box, or move the box so that it holds the smoke.")
         depth = sum(abs(self.along[axis]) * (self.high[axis] - self.low[axis]) for axis in range(3))
-        if abs(self.distance(beside) - self.distance(place)) > COARSEST * depth:
+        if abs(self.distance(beside) - self.distance(place)) > MAX_PIXEL_DEPTH * depth:
             raise ShotError("The camera is too near to the floor to show depth there: enter the Distance by hand.")
         return self.distance(place)

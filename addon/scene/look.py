@@ -4,13 +4,12 @@ What was fitted to the clip (extinction, albedo, anisotropy) follows the newest 
 (density, brightness, colors, edges) is never touched by a run.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
 from .blender import set_and_remember, set_unless_changed
-from .nodes import Input, add_node, file_group
+from .nodes import Input, add_node, file_group, math_node, scaled_vector, vector_node
 
 NODE = "Smokelift"
 """Name of the node that holds the values; a material without it is the artist's own."""
@@ -28,68 +27,12 @@ MIN_RATIO = 1e-3
 """Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
 
 
-@dataclass(frozen=True)
-class Look:
-    """Values of the inputs that belong to the artist; as in the clip by default.
-
-    ``anisotropy`` is the fitted one where it is None.
-    """
-
-    density: float = 1.0
-    brightness: float = 1.0
-    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    edge_contrast: float = 1.0
-    absorption_color: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    evaporation: float = 0.0
-    anisotropy: float | None = None
-
-    def inputs(self) -> dict[str, Any]:
-        """Values by name of the input."""
-        values = {
-            "Density": self.density,
-            "Brightness": self.brightness,
-            "Color": (*self.color, 1.0),
-            "Edge Contrast": self.edge_contrast,
-            "Absorption Color": (*self.absorption_color, 1.0),
-            "Evaporation": self.evaporation,
-        }
-        return values if self.anisotropy is None else values | {"Anisotropy": self.anisotropy}
-
-
-# Steam and mist are droplets of water, which absorb no light. One droplet scatters it forward (anisotropy about 0.85);
-# many make it lose its direction, and a render that follows it to the first one only would show them black: with 0.25
-# the lamp behind the camera gives half as much light as with 0, and the lamp before it twice as much. Steam is dense
-# where it comes out, and dry air takes it away as it rises, from its edges inwards.
-PRESETS = {
-    "SMOKE": ("Smoke", "As in the clip", Look()),
-    "STEAM": (
-        "Steam",
-        "White where it comes out, dries up as it rises, bright against the light",
-        Look(density=1.2, brightness=100.0, edge_contrast=1.3, evaporation=3.0, anisotropy=0.25),
-    ),
-    "SOOT": ("Soot", "Black and thick", Look(density=2.5, color=(0.05, 0.045, 0.04))),
-    "DUST": (
-        "Dust",
-        "The color of sand, which reddens the light that passes through",
-        Look(density=1.2, color=(0.7, 0.55, 0.4), edge_contrast=1.4, absorption_color=(0.25, 0.1, 0.03)),
-    ),
-    "MIST": (
-        "Mist",
-        "White, thin and without edges",
-        Look(density=0.3, brightness=100.0, edge_contrast=0.3, anisotropy=0.25),
-    ),
-}
-"""Name, description and look of each preset."""
-
-CONTROLS = (*Look().inputs(), "Anisotropy")
-"""Names of the inputs that the tab shows."""
-
 _INPUTS = (
     Input("Density", "NodeSocketFloat", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
     Input(
         "Brightness",
         "NodeSocketFloat",
-        "Below 1 darker; above 1 the share of light that the smoke absorbs is divided by this",
+        "Below 1 darker; above 1 the fraction of light that the smoke absorbs is divided by this",
         1.0,
         0.0,
         1e3,
@@ -110,7 +53,7 @@ _INPUTS = (
     ),
     Input("Anisotropy", "NodeSocketFloat", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
     Input("Extinction", "NodeSocketFloat", "Per meter of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
-    Input("Albedo", "NodeSocketColor", "Scattered share of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
+    Input("Albedo", "NodeSocketColor", "Scattered fraction of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
     Input(
         "Edge Density",
         "NodeSocketFloat",
@@ -146,6 +89,39 @@ _INPUTS = (
     ),
 )
 
+CONTROLS = tuple(item.name for item in _INPUTS[:7])
+"""Names of the inputs that the tab shows: those that belong to the artist, and the anisotropy, which is fitted."""
+
+# Steam and mist are droplets of water, which absorb no light. One droplet scatters it forward (anisotropy about 0.85);
+# many make it lose its direction, and a render that follows it to the first one only would show them black: with 0.25
+# the lamp behind the camera gives half as much light as with 0, and the lamp before it twice as much. Steam is dense
+# where it comes out, and dry air takes it away as it rises, from its edges inwards.
+PRESETS: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "SMOKE": ("Smoke", "As in the clip", {}),
+    "STEAM": (
+        "Steam",
+        "White where it comes out, dries up as it rises, bright against the light",
+        {"Density": 1.2, "Brightness": 100.0, "Edge Contrast": 1.3, "Evaporation": 3.0, "Anisotropy": 0.25},
+    ),
+    "SOOT": ("Soot", "Black and thick", {"Density": 2.5, "Color": (0.05, 0.045, 0.04, 1.0)}),
+    "DUST": (
+        "Dust",
+        "The color of sand, which reddens the light that passes through",
+        {
+            "Density": 1.2,
+            "Color": (0.7, 0.55, 0.4, 1.0),
+            "Edge Contrast": 1.4,
+            "Absorption Color": (0.25, 0.1, 0.03, 1.0),
+        },
+    ),
+    "MIST": (
+        "Mist",
+        "White, thin and without edges",
+        {"Density": 0.3, "Brightness": 100.0, "Edge Contrast": 0.3, "Anisotropy": 0.25},
+    ),
+}
+"""Name, description and inputs of each preset; the others are as in the clip."""
+
 
 def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
     """Give a smoke a material of what was fitted to the clip.
@@ -168,7 +144,7 @@ def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
     width = min(high - low for low, high in zip(domain["min"], domain["max"], strict=True))
     fitted = {
         "Extinction": medium["extinction"],
-        "Albedo": (*[medium["albedo"] * share for share in medium["color"]], 1.0),
+        "Albedo": (*[medium["albedo"] * part for part in medium["color"]], 1.0),
         "Anisotropy": medium["anisotropy"],
         # smoke that could fill the box and would still let 1/e of the light through
         "Edge Density": 1.0 / (medium["extinction"] * width),
@@ -221,7 +197,8 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
     node = node_of(smoke)
     socket = node.inputs["Anisotropy"]
     set_and_remember(material_of(smoke), _key(socket.name), socket, "default_value", fitted_anisotropy)
-    for key, value in PRESETS[name][2].inputs().items():
+    as_in_clip = {item.name: item.default for item in _INPUTS[:6]}
+    for key, value in (as_in_clip | PRESETS[name][2]).items():
         if key in node.inputs:
             node.inputs[key].default_value = value
     return True
@@ -252,51 +229,20 @@ def _add_group(tree: bpy.types.NodeTree) -> bpy.types.ShaderNode:
     return node
 
 
-class _Formulas:
-    """Adds nodes that compute, at places (column, row), and gives their results."""
-
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
-        self._tree = tree
-
-    def grid(self, name: str, row: int) -> bpy.types.NodeSocket:
-        """The values of a grid of the Volume; 0 where it has none of that name."""
-        return add_node(self._tree, "ShaderNodeAttribute", 0, row, attribute_name=name).outputs["Fac"]
-
-    def height(self, column: int, row: int) -> bpy.types.NodeSocket:
-        """The height in the smoke's own space."""
-        place = add_node(self._tree, "ShaderNodeTexCoord", column, row).outputs["Object"]
-        return add_node(self._tree, "ShaderNodeSeparateXYZ", column, row + 1, place).outputs["Z"]
-
-    def math(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
-        """A number of two numbers."""
-        return add_node(self._tree, "ShaderNodeMath", column, row, a, b, operation=operation).outputs[0]
-
-    def vector(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
-        """A vector of two vectors."""
-        node = add_node(self._tree, "ShaderNodeVectorMath", column, row, a, b, operation=operation)
-        return node.outputs["Vector"]
-
-    def scaled(self, column: int, row: int, a: Any, factor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-        """A vector times a number."""
-        node = add_node(self._tree, "ShaderNodeVectorMath", column, row, a, operation="SCALE")
-        self._tree.links.new(factor, node.inputs["Scale"])
-        return node.outputs["Vector"]
-
-
 def _build(tree: bpy.types.NodeTree) -> None:
     """Make the group's nodes."""
     given = tree.nodes.new("NodeGroupInput")
     given.location = (-200.0, -600.0)
-    source, formulas = given.outputs, _Formulas(tree)
+    source = given.outputs
     feeds = {
-        "Density": _extinction(formulas, source),
-        "Color": _albedo(formulas, source),
+        "Density": _extinction(tree, source),
+        "Color": _albedo(tree, source),
         "Absorption Color": source["Absorption Color"],
         "Anisotropy": source["Anisotropy"],
-        "Emission Strength": formulas.math("MULTIPLY", 1, 7, formulas.grid("flame", 7), source["Flame Strength"]),
+        "Emission Strength": math_node(tree, "MULTIPLY", 1, 7, _grid(tree, "flame", 7), source["Flame Strength"]),
         "Emission Color": source["Flame Color"],
         "Blackbody Intensity": source["Blackbody Intensity"],
-        "Temperature": formulas.math("MULTIPLY", 1, 8, formulas.grid("temperature", 8), source["Temperature"]),
+        "Temperature": math_node(tree, "MULTIPLY", 1, 8, _grid(tree, "temperature", 8), source["Temperature"]),
     }
     shader = add_node(tree, "ShaderNodeVolumePrincipled", 6, 0)
     for name in ("Density Attribute", "Color Attribute", "Temperature Attribute"):
@@ -306,31 +252,38 @@ def _build(tree: bpy.types.NodeTree) -> None:
     add_node(tree, "NodeGroupOutput", 8, 0, shader.outputs[0])
 
 
-def _extinction(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+def _grid(tree: bpy.types.NodeTree, name: str, row: int) -> bpy.types.NodeSocket:
+    """The values of a grid of the Volume; 0 where it has none of that name."""
+    return add_node(tree, "ShaderNodeAttribute", 0, row, attribute_name=name).outputs["Fac"]
+
+
+def _extinction(tree: bpy.types.NodeTree, source: Any) -> bpy.types.NodeSocket:
     """The extinction times density x min(density / edge density, 1) ^ (edge contrast - 1), of what is not dried up."""
-    density = _remaining(formulas, source)
-    ratio = formulas.math("DIVIDE", 1, 0, density, source["Edge Density"])
-    thin = formulas.math("MAXIMUM", 2, 0, formulas.math("MINIMUM", 1, 1, ratio, 1.0), MIN_RATIO)
-    exponent = formulas.math("SUBTRACT", 2, 1, source["Edge Contrast"], 1.0)
-    shape = formulas.math("POWER", 3, 0, thin, exponent)
-    amount = formulas.math("MULTIPLY", 3, 1, source["Extinction"], source["Density"])
-    return formulas.math("MULTIPLY", 5, 0, formulas.math("MULTIPLY", 4, 0, density, shape), amount)
+    density = _remaining(tree, source)
+    ratio = math_node(tree, "DIVIDE", 1, 0, density, source["Edge Density"])
+    thin = math_node(tree, "MAXIMUM", 2, 0, math_node(tree, "MINIMUM", 1, 1, ratio, 1.0), MIN_RATIO)
+    exponent = math_node(tree, "SUBTRACT", 2, 1, source["Edge Contrast"], 1.0)
+    shape = math_node(tree, "POWER", 3, 0, thin, exponent)
+    amount = math_node(tree, "MULTIPLY", 3, 1, source["Extinction"], source["Density"])
+    return math_node(tree, "MULTIPLY", 5, 0, math_node(tree, "MULTIPLY", 4, 0, density, shape), amount)
 
 
-def _remaining(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+def _remaining(tree: bpy.types.NodeTree, source: Any) -> bpy.types.NodeSocket:
     """The density less evaporation x edge density x (z - floor) / height: high smoke is old, thin smoke goes first."""
-    above = formulas.math("SUBTRACT", -2, 2, formulas.height(-3, 2), source["Floor"])
-    age = formulas.math("MAXIMUM", -1, 2, formulas.math("DIVIDE", -1, 3, above, source["Height"]), 0.0)
-    most = formulas.math("MULTIPLY", -2, 3, source["Evaporation"], source["Edge Density"])
-    left = formulas.math("SUBTRACT", 0, 1, formulas.grid("density", 0), formulas.math("MULTIPLY", 0, 2, age, most))
-    return formulas.math("MAXIMUM", 1, 2, left, 0.0)
+    place = add_node(tree, "ShaderNodeTexCoord", -3, 2).outputs["Object"]
+    height = add_node(tree, "ShaderNodeSeparateXYZ", -3, 3, place).outputs["Z"]
+    above = math_node(tree, "SUBTRACT", -2, 2, height, source["Floor"])
+    age = math_node(tree, "MAXIMUM", -1, 2, math_node(tree, "DIVIDE", -1, 3, above, source["Height"]), 0.0)
+    most = math_node(tree, "MULTIPLY", -2, 3, source["Evaporation"], source["Edge Density"])
+    left = math_node(tree, "SUBTRACT", 0, 1, _grid(tree, "density", 0), math_node(tree, "MULTIPLY", 0, 2, age, most))
+    return math_node(tree, "MAXIMUM", 1, 2, left, 0.0)
 
 
-def _albedo(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+def _albedo(tree: bpy.types.NodeTree, source: Any) -> bpy.types.NodeSocket:
     """1 - (1 - a min(brightness, 1)) / max(brightness, 1) of the tinted albedo a: it stays between black and white."""
     white = (1.0, 1.0, 1.0)
-    tinted = formulas.vector("MULTIPLY", 1, 3, source["Albedo"], source["Color"])
-    darker = formulas.scaled(2, 3, tinted, formulas.math("MINIMUM", 1, 4, source["Brightness"], 1.0))
-    share = formulas.math("DIVIDE", 2, 5, 1.0, formulas.math("MAXIMUM", 1, 5, source["Brightness"], 1.0))
-    absorbed = formulas.scaled(4, 3, formulas.vector("SUBTRACT", 3, 3, white, darker), share)
-    return formulas.vector("SUBTRACT", 5, 3, white, absorbed)
+    tinted = vector_node(tree, "MULTIPLY", 1, 3, source["Albedo"], source["Color"])
+    darker = scaled_vector(tree, 2, 3, tinted, math_node(tree, "MINIMUM", 1, 4, source["Brightness"], 1.0))
+    inverse = math_node(tree, "DIVIDE", 2, 5, 1.0, math_node(tree, "MAXIMUM", 1, 5, source["Brightness"], 1.0))
+    absorbed = scaled_vector(tree, 4, 3, vector_node(tree, "SUBTRACT", 3, 3, white, darker), inverse)
+    return vector_node(tree, "SUBTRACT", 5, 3, white, absorbed)

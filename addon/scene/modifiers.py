@@ -16,7 +16,7 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, add_node, get_input, input_path, new_group, own_group, set_input
+from .nodes import Input, add_node, get_input, input_path, math_node, new_group, own_group, set_input
 
 
 @dataclass(frozen=True)
@@ -191,10 +191,7 @@ def _interpolation_group() -> bpy.types.NodeTree:
     given = add_node(tree, "NodeGroupInput", 0, 0).outputs
     later = add_node(tree, "GeometryNodeObjectInfo", 1, 3, given["Next Frame"]).outputs["Geometry"]
 
-    def math(operation: str, column: int, row: int, *values: Any) -> bpy.types.NodeSocket:
-        return add_node(tree, "ShaderNodeMath", column, row, *values, operation=operation).outputs[0]
-
-    def moved(volume: bpy.types.NodeSocket, name: str, row: int, seconds: Any, share: Any) -> bpy.types.NodeSocket:
+    def moved(volume: bpy.types.NodeSocket, name: str, row: int, seconds: Any, weight: Any) -> bpy.types.NodeSocket:
         """A grid that went on with its velocity for some seconds, times a number."""
         grid, velocity = (
             add_node(tree, "GeometryNodeGetNamedGrid", 2, place, volume, grid_name, False, data_type=kind)
@@ -202,16 +199,16 @@ def _interpolation_group() -> bpy.types.NodeTree:
         )
         there = (grid.outputs["Grid"], velocity.outputs["Grid"], seconds)
         advected = add_node(tree, "GeometryNodeGridAdvect", 4, row, *there, data_type="FLOAT")
-        return math("MULTIPLY", 5, row, advected.outputs[0], share)
+        return math_node(tree, "MULTIPLY", 5, row, advected.outputs[0], weight)
 
-    rest = math("SUBTRACT", 1, 5, 1.0, given["Part"])
-    forth = math("MULTIPLY", 2, 8, given["Part"], given["Seconds"])
-    back = math("MULTIPLY", 3, 9, math("MULTIPLY", 2, 9, rest, given["Seconds"]), -1.0)
+    rest = math_node(tree, "SUBTRACT", 1, 5, 1.0, given["Part"])
+    forth = math_node(tree, "MULTIPLY", 2, 8, given["Part"], given["Seconds"])
+    back = math_node(tree, "MULTIPLY", 3, 9, math_node(tree, "MULTIPLY", 2, 9, rest, given["Seconds"]), -1.0)
     result = given["Smoke"]
     for number, name in enumerate(GRIDS):
         row = 4 * number
         before = moved(given["Smoke"], name, row, forth, rest)
-        mixed = math("ADD", 6, row, before, moved(later, name, row + 2, back, given["Part"]))
+        mixed = math_node(tree, "ADD", 6, row, before, moved(later, name, row + 2, back, given["Part"]))
         result = add_node(tree, "GeometryNodeStoreNamedGrid", 7 + number, row, result, name, mixed).outputs[0]
     add_node(tree, "NodeGroupOutput", 7 + len(GRIDS), 0, result)
     return tree

@@ -95,6 +95,29 @@ def add_node(
     return node
 
 
+def math_node(
+    tree: bpy.types.NodeTree, operation: str, column: float, row: float, *values: Any
+) -> bpy.types.NodeSocket:
+    """A number of other numbers, by a node at a place of the grid."""
+    return add_node(tree, "ShaderNodeMath", column, row, *values, operation=operation).outputs[0]
+
+
+def vector_node(
+    tree: bpy.types.NodeTree, operation: str, column: float, row: float, *values: Any
+) -> bpy.types.NodeSocket:
+    """A vector of other vectors."""
+    return add_node(tree, "ShaderNodeVectorMath", column, row, *values, operation=operation).outputs["Vector"]
+
+
+def scaled_vector(
+    tree: bpy.types.NodeTree, column: float, row: float, vector: Any, factor: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """A vector times a number."""
+    node = add_node(tree, "ShaderNodeVectorMath", column, row, vector, operation="SCALE")
+    tree.links.new(factor, node.inputs["Scale"])
+    return node.outputs["Vector"]
+
+
 def feed(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: Any) -> None:
     """Link an input to a socket, or set it to a value."""
     if isinstance(value, bpy.types.NodeSocket):

@@ -17,10 +17,7 @@ from .strokes import saved_strokes
 def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
     """The table; empty where the engine estimates the background.
 
-    Raises
-    ------
-    ShotError
-        If a picture is missing, or the clip does not have the frames.
+    ShotError if a picture is missing, or the clip does not have the frames.
     """
     settings, table = smoke.smokelift, {}
     if settings.plate_mode == "FILE":
@@ -104,7 +101,7 @@ def show_plate(
     return node
 
 
-def play_beside(image: bpy.types.Image, user: Any, clip: bpy.types.MovieClip, tracked: bool) -> None:
+def synchronize_plate(image: bpy.types.Image, user: Any, clip: bpy.types.MovieClip, tracked: bool) -> None:
     """Keep a plate of many pictures in step with the clip.
 
     Parameters

@@ -12,8 +12,8 @@ from mathutils import Matrix, Vector
 from ..core.take import Take
 from .blender import set_unless_changed
 from .box import engine_to_world
-from .nodes import Input, add_node, file_group
-from .plate import play_beside, show_plate
+from .nodes import Input, add_node, file_group, math_node, vector_node
+from .plate import show_plate, synchronize_plate
 from .smoke import scene_of
 from .volume import frames_before
 
@@ -61,7 +61,7 @@ def project(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
     placed = material.node_tree.nodes[f"{MATERIAL} Place"].outputs[0]
     plate = show_plate(material.node_tree, shader, lambda: placed, take, tables.get("background") or {})
     if plate is not None:
-        play_beside(plate.image, plate.image_user, smoke.smokelift.clip, "matrices" in tables["camera"])
+        synchronize_plate(plate.image, plate.image_user, smoke.smokelift.clip, "matrices" in tables["camera"])
     if CARD not in scene.objects:
         _add_card(smoke, projector, tables, material)
 
@@ -162,21 +162,16 @@ def _new_material() -> bpy.types.Material:
     tree = material.node_tree
     tree.nodes.clear()
 
-    def new(kind: str, left: float, name: str = "", down: float = 0.0) -> bpy.types.ShaderNode:
-        node = tree.nodes.new(kind)
-        node.location = (-left, -down)
-        if name:
-            node.name = node.label = name
-        return node
-
-    output, mix = new("ShaderNodeOutputMaterial", 0.0), new("ShaderNodeMixShader", 200.0)
-    rays, clear = new("ShaderNodeLightPath", 400.0, down=-320.0), new("ShaderNodeBsdfTransparent", 400.0)
-    shader = new("ShaderNodeEmission", 400.0, MATERIAL, down=120.0)
-    place = new("ShaderNodeGroup", 900.0, f"{MATERIAL} Place", down=120.0)
+    output, mix = add_node(tree, "ShaderNodeOutputMaterial", 5, 0), add_node(tree, "ShaderNodeMixShader", 4, 0)
+    rays, clear = add_node(tree, "ShaderNodeLightPath", 3, -2), add_node(tree, "ShaderNodeBsdfTransparent", 3, -1)
+    shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL, label=MATERIAL)
     outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
-    place.node_tree = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
+    group = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
+    place = add_node(
+        tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=f"{MATERIAL} Place", label=f"{MATERIAL} Place"
+    )
     place.width = 180.0
-    projector = new("ShaderNodeTexCoord", 1100.0, PROJECTOR, down=120.0)
+    projector = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR, label=PROJECTOR)
     tree.links.new(projector.outputs["Object"], place.inputs["Point"])
     tree.links.new(place.outputs["In Front"], shader.inputs["Strength"])
     tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
@@ -191,11 +186,10 @@ def _build(tree: bpy.types.NodeTree) -> None:
     """Make the nodes of center + focal length x (point / depth); a camera looks along its -Z axis."""
     source = add_node(tree, "NodeGroupInput", 0, 0).outputs
     z = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0, source["Point"]).outputs["Z"]
-    depth = add_node(tree, "ShaderNodeMath", 2, 0, z, -1.0, operation="MULTIPLY").outputs[0]
+    depth = math_node(tree, "MULTIPLY", 2, 0, z, -1.0)
     # depth ^ 0 = 1 for an orthographic camera
-    divisor = add_node(tree, "ShaderNodeMath", 3, 0, depth, source["Perspective"], operation="POWER").outputs[0]
-    slope = add_node(tree, "ShaderNodeVectorMath", 4, 0, source["Point"], divisor, operation="DIVIDE").outputs[0]
-    factors = (slope, source["Focal Length"], source["Center"])
-    point = add_node(tree, "ShaderNodeVectorMath", 5, 0, *factors, operation="MULTIPLY_ADD")
-    in_front = add_node(tree, "ShaderNodeMath", 5, 1.25, depth, 0.0, operation="GREATER_THAN")
-    add_node(tree, "NodeGroupOutput", 6, 0, point.outputs[0], in_front.outputs[0])
+    divisor = math_node(tree, "POWER", 3, 0, depth, source["Perspective"])
+    slope = vector_node(tree, "DIVIDE", 4, 0, source["Point"], divisor)
+    point = vector_node(tree, "MULTIPLY_ADD", 5, 0, slope, source["Focal Length"], source["Center"])
+    in_front = math_node(tree, "GREATER_THAN", 5, 1.25, depth, 0.0)
+    add_node(tree, "NodeGroupOutput", 6, 0, point, in_front)

@@ -14,8 +14,8 @@ from ..core.take import Take
 from . import volume
 from .blender import set_and_remember, set_unless_changed
 from .clip import used_range
-from .compositing import composite, take_composite_away
-from .plate import play_beside, show_plate
+from .compositing import composite, disable_composite
+from .plate import show_plate, synchronize_plate
 from .projection import project, show_card
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
@@ -84,7 +84,7 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> tuple[
     settings, scene = smoke.smokelift, scene_of(smoke)
     hidden, further = False, []
     if settings.set_up_plate:
-        _take_away_plates(smoke)  # first: what it gives back may be set up anew
+        _disable_other_plates(smoke)  # first: what it gives back may be set up anew
     if settings.set_up_range:
         match_clip(smoke)
     if settings.set_up_camera:
@@ -109,11 +109,11 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> tuple[
     return hidden, further
 
 
-def _take_away_plates(smoke: bpy.types.Object) -> None:
+def _disable_other_plates(smoke: bpy.types.Object) -> None:
     """Undo what an earlier set-up did to show the plate elsewhere than it is shown now."""
     scene, place = scene_of(smoke), smoke.smokelift.plate_place
     if place != "COMPOSITE":
-        take_composite_away(scene)
+        disable_composite(scene)
     show_card(scene, place == "PROJECTION")
     tree = scene.world.node_tree if scene.world is not None else None
     if tree is not None and NAME in tree.nodes:
@@ -249,7 +249,7 @@ def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, ta
     tree = world.node_tree
     plate = show_plate(tree, background, lambda: _window(tree), take, tables.get("background") or {})
     if plate is not None:
-        play_beside(plate.image, plate.image_user, clip, "matrices" in tables["camera"])
+        synchronize_plate(plate.image, plate.image_user, clip, "matrices" in tables["camera"])
 
 
 def _remove_unused_worlds() -> None:

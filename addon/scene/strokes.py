@@ -29,10 +29,7 @@ Pixels = npt.NDArray[np.float32]
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
     """The file of the strokes on a clip, with what was painted last.
 
-    Raises
-    ------
-    ShotError
-        If there is no file, it cannot be written, or it is of another size than the clip.
+    ShotError if there is no file, it cannot be written, or it is of another size than the clip.
     """
     file = absolute(image.filepath, image.library)
     try:

@@ -64,30 +64,35 @@ def shown_take(smoke: bpy.types.Object) -> Take | None:
     return take_of(smoke.data)
 
 
-def shown_numbers(smoke: bpy.types.Object) -> list[int]:
-    """The numbers of the finished frames of the take that a smoke shows."""
+def shown_index(smoke: bpy.types.Object) -> dict[str, Any] | None:
+    """The `sequence.json` of the take that a smoke shows; None if it has no finished frame."""
     take = shown_take(smoke)
     index = take.read().index if take is not None else None
+    return index if index and index["frames"] else None
+
+
+def shown_numbers(smoke: bpy.types.Object) -> list[int]:
+    """The numbers of the finished frames of the take that a smoke shows."""
+    index = shown_index(smoke)
     return _numbers(index) if index else []
 
 
 def number_at(smoke: bpy.types.Object, frame: int) -> int:
-    """The number in the take that a smoke shows in a frame of its scene, without a live pace."""
+    """The number in the take that a smoke shows in a frame of its scene, without a live timing."""
     data, (first, ratio) = smoke.data, _step(smoke)
     return first + math.floor((frame - data.frame_start + EARLY) / ratio)
 
 
 def scene_frame(smoke: bpy.types.Object, number: int) -> int:
-    """The first frame of its scene in which a smoke shows a number of its take, without a live pace."""
+    """The first frame of its scene in which a smoke shows a number of its take, without a live timing."""
     data, (first, ratio) = smoke.data, _step(smoke)
     return data.frame_start + math.ceil((number - first) * ratio - EARLY)
 
 
 def _step(smoke: bpy.types.Object) -> tuple[int, float]:
     """The first number of the take on show, and frames of the scene for each."""
-    take = shown_take(smoke)
-    index = take.read().index if take is not None else None
-    if not index or not index["frames"]:
+    index = shown_index(smoke)
+    if index is None:
         return 1, 1.0
     ratio = _ratio(smoke, scene_of(smoke), index)
     return _numbers(index)[0], ratio if _real_time(smoke, ratio, index) else 1.0
@@ -107,9 +112,8 @@ def frames_before_take(smoke: bpy.types.Object, take: Take) -> int:
 
 def shown_range(smoke: bpy.types.Object) -> tuple[int, int] | None:
     """The first and the last frame of its scene in which a smoke shows its take, those that are still made included."""
-    take, data = shown_take(smoke), smoke.data
-    index = take.read().index if take is not None else None
-    if index is None or not index["frames"]:
+    index, data = shown_index(smoke), smoke.data
+    if index is None:
         return None
     last = data.frame_start + data.frame_duration - 1
     if not index["complete"] and "direct" not in index.get("settings", {}):
@@ -125,8 +129,7 @@ def _last_planned(index: dict[str, Any]) -> int:
 
 def go_to_smoke(smoke: bpy.types.Object) -> bool:
     """Go to the first frame that shows smoke unless the current one does, or will; returns whether there is any yet."""
-    take, scene = shown_take(smoke), scene_of(smoke)
-    index = take.read().index if take is not None else None
+    index, scene = shown_index(smoke), scene_of(smoke)
     smoky = [int(n) for n, figures in index["frames"].items() if figures.get("mass", 1.0) > 0.0] if index else []
     if not smoky:
         return False
@@ -187,7 +190,7 @@ def provenance_note(smoke: bpy.types.Object) -> str:
 def _provenance(parts: list[dict[str, Any]], has_further_views: bool, before: int) -> str:
     """The line; of what was done after the clip, with its frames counted on from the clip's."""
     hows = (part["how"] for part in parts if part["what"] in DIRECTIONS)
-    directed = [_counted_on(how, before) for how in hows]
+    directed = [_renumbered(how, before) for how in hows]
     parts = [part for part in parts if part["what"] not in DIRECTIONS]
     if not parts:  # the engine of earlier versions did not say
         return " ".join(directed)
@@ -201,7 +204,7 @@ def _provenance(parts: list[dict[str, Any]], has_further_views: bool, before: in
     return " ".join([seen, what, *directed])
 
 
-def _counted_on(words: str, before: int) -> str:
+def _renumbered(words: str, before: int) -> str:
     """A sentence of the engine, which counts the frames of a result from 1, with so many frames before them."""
     return _FRAMES.sub(lambda named: re.sub(r"\d+", lambda number: str(int(number[0]) + before), named[0]), words)
 
@@ -217,9 +220,8 @@ def _shown() -> Iterator[tuple[bpy.types.Scene, bpy.types.Object, dict[str, Any]
     """Every smoke of every scene whose take has finished frames, with its `sequence.json`."""
     for scene in bpy.data.scenes:
         for smoke in smokes(scene):
-            take = shown_take(smoke)
-            index = take.read().index if take is not None else None
-            if index and index["frames"]:
+            index = shown_index(smoke)
+            if index is not None:
                 yield scene, smoke, index
 
 
@@ -230,7 +232,7 @@ def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
     obj.delta_location = obj.matrix_basis.to_quaternion() @ shift
 
 
-def keep_step() -> None:
+def synchronize_playback() -> None:
     """Play all smokes in step with their clips, after a clip or a scene got another time or rate."""
     for scene, smoke, index in _shown():
         _set_time(smoke, scene, index)
@@ -271,19 +273,19 @@ def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> No
 
 
 def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Make a smoke, its proxy and what it needs for frames between play when its clip does, at the pace on trial."""
+    """Make a smoke, its proxy and what it needs for frames between play when its clip does, at the timing on trial."""
     settings, numbers, ratio = smoke.smokelift, _file_numbers(index), _ratio(smoke, scene, index)
     real = _real_time(smoke, ratio, index)
     direction = index.get("settings", {}).get("direct", {}).get("job")
     live = settings.directing.live and direction != "retime" and not _tracked(index)
     steps = ratio if real else 1.0
-    pace = retiming(len(numbers), settings.directing.speeds() if live else (1.0,))
+    timing = retiming(len(numbers), settings.directing.speeds() if live else (1.0,))
     before = frames_before(settings, index)
     first = (settings.clip.frame_start if settings.clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(smoke.data, "start", smoke.data, "frame_start", first)
     start = smoke.data.frame_start
     time = f"(frame-{start}+{EARLY})/{steps:.9g}"
-    place = f"min({pace.place(time)},{len(numbers) - 1})"
+    place = f"min({timing.place(time)},{len(numbers) - 1})"
     fit_interpolation(smoke, settings.between and (real or live))
     for volume, ahead in ((smoke.data, 0), (proxy_of(smoke), 0), (next_frame_volume(smoke), 1)):
         if volume is None:
@@ -292,14 +294,14 @@ def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, 
         volume.sequence_mode = "REPEAT" if direction == "loop" else "CLIP"
         for name in ("frame_offset", "velocity_scale"):
             volume.driver_remove(name)
-        volume.frame_duration = max(1, math.ceil(steps * pace.duration - EARLY))
-        volume.velocity_scale = (1.0 if real else ratio) * pace.speeds[0]
+        volume.frame_duration = max(1, math.ceil(steps * timing.duration - EARLY))
+        volume.velocity_scale = (1.0 if real else ratio) * timing.speeds[0]
         if real or live:
             # Blender shows one file in each frame of the scene; the driven offset selects another
             file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
             _drive(volume, "frame_offset", f"{file}-(frame-{start})+{numbers[0] - 1}")
-        if live and len(pace.speeds) > 1:
-            _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({pace.speed(time)})")
+        if live and len(timing.speeds) > 1:
+            _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({timing.speed(time)})")
     drive_interpolation(smoke, place, 1.0 / index["scene"]["clip"]["fps"])
 
 
@@ -337,7 +339,7 @@ def _listen(_file: str = "") -> None:
     bpy.msgbus.clear_by_owner(_LISTENER)
     for owner, name in _TIMES:
         key = (getattr(bpy.types, owner), name)
-        bpy.msgbus.subscribe_rna(key=key, owner=_LISTENER, args=(), notify=keep_step)
+        bpy.msgbus.subscribe_rna(key=key, owner=_LISTENER, args=(), notify=synchronize_playback)
 
 
 _LISTENER = object()

@@ -129,7 +129,15 @@ def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float
     for name in SUB_PANELS:
         of_smoke = getattr(bpy.types, f"SMOKELIFT_PT_view_{name}")
         alone = type(
-            f"SMOKELIFT_PT_alone_{name}", of_smoke.__bases__, {"bl_space_type": "VIEW_3D", "bl_options": set()}
+            f"SMOKELIFT_PT_alone_{name}",
+            of_smoke.__bases__,
+            {
+                "bl_space_type": "VIEW_3D",
+                "bl_region_type": "UI",
+                "bl_category": "Smokelift",
+                "bl_label": of_smoke.bl_label,
+                "draw": of_smoke.draw,
+            },
         )
         bpy.utils.register_class(alone)
         look_away()

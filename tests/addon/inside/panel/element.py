@@ -61,7 +61,7 @@ def test_extract_shows_the_element_of_this_frame(shot, asked) -> None:
     image = bpy.data.images["element.exr"]
     assert image.alpha_mode == "PREMUL"
     assert list(image.pixels)[:4] == pytest.approx([0.25, 0.0, 0.0, 0.5])
-    assert side_job.side_job.doubts == [("", "The plate is noisy.")]
+    assert side_job.writing_job.doubts == [("", "The plate is noisy.")]
     shot.frame_set(25)
     assert bpy.ops.smokelift.extract() == {"FINISHED"}
     assert [image.name for image in bpy.data.images if "element" in image.name] == ["element.exr"]
@@ -85,7 +85,7 @@ def test_render_element_writes_all_frames_that_are_used(shot, asked, tmp_path) -
     assert words == ["extract", scene, "--out", str(folder / "element_####.exr"), "--progress", "json"]
     assert tables["clip"]["frames"] == [20, 31]
     assert sorted(path.name for path in folder.iterdir()) == [f"element_{n:04d}.exr" for n in range(20, 32)]
-    assert side_job.side_job.sentence == f"The element is in {folder}."
+    assert side_job.writing_job.sentence == f"The element is in {folder}."
 
 
 def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
@@ -93,8 +93,8 @@ def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
         def kill(self) -> None:
             """Unregistering ends it."""
 
-    monkeypatch.setattr(side_job.side_job, "job", Running())
-    monkeypatch.setattr(side_job.side_job, "operator", "smokelift.render_element")
+    monkeypatch.setattr(side_job.writing_job, "job", Running())
+    monkeypatch.setattr(side_job.writing_job, "operator", "smokelift.render_element")
     assert not bpy.ops.smokelift.extract.poll()
     assert bpy.ops.smokelift.stop_writing() == {"FINISHED"}
     assert bpy.ops.smokelift.extract.poll()

@@ -7,7 +7,6 @@ import bpy
 import pytest
 
 from addon.core.contract import QUALITIES
-from addon.panel import advanced_panel, direct_panel, element_panel, tab
 from addon.result import command_line, shot_check
 from addon.scene import volume
 from addon.scene.clip import clip_table
@@ -74,8 +73,8 @@ def test_no_line_is_cut_off(shot) -> None:
         row = manager.smokelift.jobs.add()
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left = 1250, 2500, 80000.0
-        shot_check.keep_doubts(row, [("not all is smoke", "This is a doubt. " * 5)])
-    panels = (tab.SMOKELIFT_PT_view, element_panel.SMOKELIFT_PT_view_element, advanced_panel.SMOKELIFT_PT_view_advanced)
+        shot_check.store_doubts(row, [("not all is smoke", "This is a doubt. " * 5)])
+    panels = (bpy.types.SMOKELIFT_PT_view, bpy.types.SMOKELIFT_PT_view_element, bpy.types.SMOKELIFT_PT_view_advanced)
     texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES") for text in drawn_with(shot, mode, *panels)]
     bpy.ops.smokelift.new_mask()
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
@@ -101,17 +100,17 @@ def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
     volume.show(smoke(shot), take)
     bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
     offer = "This smoke is large"
-    assert not [text for text in drawn(shot, tab.SMOKELIFT_PT_view) if text.startswith(offer)]
+    assert not [text for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.startswith(offer)]
     with changed(take) as index:
         index["scene"]["domain"]["resolution"] = [160, 160, 240]
-    assert [text for text in drawn(shot, tab.SMOKELIFT_PT_view) if text.startswith(offer)]
+    assert [text for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.startswith(offer)]
 
 
 @pytest.mark.parametrize("name", ["longest_side", "fps", "overlap"])
 def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     settings = smoke(shot).smokelift.directing if name == "overlap" else smoke(shot).smokelift
     smoke(shot).smokelift.directing.direction = "loop"
-    panels = (advanced_panel.SMOKELIFT_PT_view_advanced, direct_panel.SMOKELIFT_PT_view_direct)
+    panels = (bpy.types.SMOKELIFT_PT_view_advanced, bpy.types.SMOKELIFT_PT_view_direct)
 
     def words() -> int:
         return [text.strip() for text in drawn(shot, *panels)].count("Automatic")
@@ -134,7 +133,7 @@ def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> N
 
     def said() -> str:
         bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
-        return " ".join(text.strip() for text in drawn(scene, tab.SMOKELIFT_PT_view))
+        return " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
 
     assert (settings.first, settings.last) == (1, 2)
     assert "Missing: frame_0019.png." in said() and "Blender sees 2 of 6 frames." in said()
@@ -157,11 +156,11 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     state = bpy.context.window_manager.smokelift
     each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
     each |= {"lost": 0.0772}
-    shot_check.keep_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
+    shot_check.store_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
     cells = ("12 s", "0.2 G", "30 M", "8%")
 
     def shown() -> list[int]:
-        texts = drawn(shot, tab.SMOKELIFT_PT_view)
+        texts = drawn(shot, bpy.types.SMOKELIFT_PT_view)
         return [texts.count(cell) for cell in cells]
 
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
@@ -182,8 +181,8 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
     details = {**each, "qualities": dict.fromkeys(QUALITIES, each)}
     state.check_smoke = smoke(shot).session_uid
-    shot_check._keep(state, details, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")])
-    texts = [text.strip() for text in drawn(shot, tab.SMOKELIFT_PT_view)]
+    shot_check._store(state, details, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")])
+    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
     place = texts.index("A person moves.")
     assert "[new_mask]" in texts[:place]  # beside Mask
     assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
@@ -191,7 +190,7 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     assert texts.index("There is a cut.") < texts.index("[run]")
     smoke(shot).smokelift.albedo = 0.5
     state.check_smoke = smoke(shot).session_uid
-    assert "A person moves." not in [text.strip() for text in drawn(shot, tab.SMOKELIFT_PT_view)]
+    assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
 
 
 def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
@@ -205,7 +204,7 @@ def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
             "Match to the clip: good (29.0 dB).",
         )
     state.check_smoke = smoke(shot).session_uid
-    texts = [text.strip() for text in drawn(shot, tab.SMOKELIFT_PT_view) if text.strip()]
+    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.strip()]
     end = texts.index("[set_up]")
     assert texts[end - 4 : end] == ["[open_log]", "Queued", "[cancel]", "Cancel"]
     assert "Smoke from Video..." in texts
@@ -214,7 +213,7 @@ def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
 def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
     def said() -> bool:
         bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
-        return "inside its lines" in " ".join(map(str.strip, drawn(shot, tab.SMOKELIFT_PT_view)))
+        return "inside its lines" in " ".join(map(str.strip, drawn(shot, bpy.types.SMOKELIFT_PT_view)))
 
     assert not said()
     bpy.ops.smokelift.new_mask()
@@ -223,13 +222,13 @@ def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
 
 def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
     state = bpy.context.window_manager.smokelift
-    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.box_position(smoke(shot))
     assert shot_check.is_checked(state, smoke(shot))
     smoke(shot).smokelift.box.scale.x *= 1.1
     bpy.context.view_layer.update()
     assert not shot_check.is_checked(state, smoke(shot))
     smoke(shot).smokelift.camera_mode = "ESTIMATE"
-    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.box_position(smoke(shot))
     smoke(shot).smokelift.box.scale.x *= 1.1
     bpy.context.view_layer.update()
     assert shot_check.is_checked(state, smoke(shot))

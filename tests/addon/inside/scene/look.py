@@ -4,7 +4,6 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.panel import look_panel
 from addon.scene import look, volume
 from addon.scene.smoke import is_override, smokes
 from conftest import made, rendered
@@ -64,7 +63,7 @@ def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) ->
     bpy.ops.smokelift.use_look(preset="DUST")
     volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5), number=2))
     found = {name: socket.default_value for name, socket in node(lit).inputs.items()}
-    for name, value in look.PRESETS["DUST"][2].inputs().items():
+    for name, value in look.PRESETS["DUST"][2].items():
         assert (found[name] if isinstance(value, float) else tuple(found[name])) == pytest.approx(value), name
     assert (found["Extinction"], found["Albedo"][0]) == (9.0, 0.5)
     bpy.ops.smokelift.use_look(preset="SMOKE")
@@ -152,10 +151,10 @@ def test_an_override_of_a_linked_smoke_gets_a_look_of_its_own(lit, tmp_path) -> 
     override = linked.override_create(remap_local_usages=True)
     assert smokes(scene) == [] and not bpy.ops.smokelift.use_look.poll(), "it is not active"
     bpy.context.view_layer.objects.active = override
-    texts = drawn(scene, look_panel.SMOKELIFT_PT_view_look)
+    texts = drawn(scene, bpy.types.SMOKELIFT_PT_view_look)
     assert "Density" not in texts and "View Density" not in texts
     assert bpy.ops.smokelift.use_look(preset="SOOT") == {"FINISHED"}
-    assert "Density" in drawn(scene, look_panel.SMOKELIFT_PT_view_look)
+    assert "Density" in drawn(scene, bpy.types.SMOKELIFT_PT_view_look)
     look.node_of(override).inputs["Density"].default_value = 3.0
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))

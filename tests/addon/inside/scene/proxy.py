@@ -96,7 +96,7 @@ def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, spee
     assert volume.shown_numbers(obj) == list(range(1, FRAMES + 1))
     assert volume.number_at(obj, 3) == 3
     scene.render.fps = 48
-    volume.keep_step()
+    volume.synchronize_playback()
     later = "smoke_1002.vdb" if speed == "REAL" else "smoke_1003.vdb"
     assert in_viewport(obj, 3) == later
 
@@ -107,7 +107,7 @@ def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
     obj = volume.show(smoke(shot), with_proxy(tmp_path))
     assert [in_viewport(obj, frame) for frame in (1, 2, 3)] == ["proxy_0001.vdb"] * 2 + ["proxy_0002.vdb"]
     settings.clip.frame_start = 101
-    volume.keep_step()
+    volume.synchronize_playback()
     assert [in_viewport(obj, frame) for frame in (1, 103)] == ["", "proxy_0002.vdb"]
 
 

@@ -7,10 +7,10 @@ import bpy
 import pytest
 
 from addon.core.take import Take, takes
-from addon.result import run_queue, smoke_takes
+from addon.result import smoke_takes
 from addon.scene import shot_setup, volume
 from addon.scene.blender import absolute
-from addon.scene.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke
+from addon.scene.smoke import active_smoke, hide_default_cube, new_smoke
 from conftest import changed, made
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
 
@@ -51,37 +51,6 @@ def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> 
     assert folders == [tmp_path / "smokelift" / name for name in ("clip", "clip_2")]
     second.smokelift.clip = clip
     assert smoke_takes.output_folder(second) == folders[1]
-
-
-def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
-    obj = new_smoke(scene, clip)
-    obj.smokelift.output = str(tmp_path)
-    take = smoke_takes.write_take(obj)
-    uid = obj.session_uid
-    assert find_smoke(uid) == obj
-    scene.collection.objects.unlink(obj)
-    assert find_smoke(uid) is None
-    rows = bpy.context.window_manager.smokelift.jobs
-    row = rows.add()
-    row.take, row.smoke_uid = str(take.directory), uid
-    run_queue.work(bpy.context)
-    assert rows[0].outcome == "cancelled"
-    assert take.read().resumable
-
-
-def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
-    obj = new_smoke(scene, clip)
-    obj.smokelift.output = str(tmp_path)
-    rows, written = bpy.context.window_manager.smokelift.jobs, [smoke_takes.write_take(obj) for _ in range(3)]
-    for take in written:
-        row = rows.add()
-        row.take, row.smoke_uid = str(take.directory), obj.session_uid
-    rows[0].outcome = "running"
-    assert bpy.ops.smokelift.cancel(take=str(written[1].directory)) == {"FINISHED"}
-    assert [row.take for row in rows] == [str(written[0].directory), str(written[2].directory)]
-    assert takes(tmp_path) == [written[0], written[2]]
-    assert bpy.ops.smokelift.cancel() == {"FINISHED"}
-    assert [row.cancel for row in rows] == [True, False]
 
 
 @pytest.mark.parametrize("change", [None, "location", "name", "vertex"])

@@ -123,13 +123,13 @@ def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     assert data.frame_start == 11
     smoke(shot).smokelift.first = 3
     smoke(shot).smokelift.clip.frame_start = 101
-    volume.keep_step()  # Blender calls it where there is a window
+    volume.synchronize_playback()  # Blender calls it where there is a window
     assert data.frame_start == 111
     smoke(shot).smokelift.clip.frame_offset = 4
-    volume.keep_step()
+    volume.synchronize_playback()
     assert data.frame_start == 107
     data.frame_start = 500
-    volume.keep_step()
+    volume.synchronize_playback()
     assert data.frame_start == 500
 
 

@@ -1,0 +1,85 @@
+"""The queue of runs: one after the other, whatever becomes of each."""
+
+import sys
+
+import bpy
+import pytest
+
+from addon.core.take import takes
+from addon.result import run_queue, smoke_takes
+from addon.scene.smoke import find_smoke, new_smoke
+from tests.example_shot import EXAMPLE
+
+ENGINE = """
+import json, sys
+from pathlib import Path
+journal, out = Path(sys.argv[1]), sys.argv[sys.argv.index("--out") + 1]
+with journal.open("a") as file:
+    print("begin", out, file=file, flush=True)
+    if out.endswith("2"):
+        print(json.dumps({"event": "error", "text": "No clip."}), flush=True)
+        sys.exit(2)
+    print(json.dumps({"event": "done", "text": "Done."}), flush=True)
+    print("end", out, file=file, flush=True)
+"""
+"""Stands in for the engine: the second run fails."""
+
+
+@pytest.fixture
+def clip(blender) -> bpy.types.MovieClip:
+    """The example's."""
+    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+
+
+def queued(obj: bpy.types.Object, count: int) -> list:
+    """Takes of a smoke that wait."""
+    written = [smoke_takes.write_take(obj) for _ in range(count)]
+    for take in written:
+        row = bpy.context.window_manager.smokelift.jobs.add()
+        row.take, row.smoke_uid = str(take.directory), obj.session_uid
+    return written
+
+
+def test_runs_follow_one_another_and_a_failed_one_stops_none(scene, clip, tmp_path, monkeypatch) -> None:
+    obj, journal = new_smoke(scene, clip), tmp_path / "journal"
+    obj.smokelift.output = str(tmp_path / "takes")
+    written = queued(obj, 3)
+    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", ENGINE, str(journal), *words])
+    run_queue.work(bpy.context)
+    rows = bpy.context.window_manager.smokelift.jobs
+    assert [row.outcome for row in rows] == ["done", "failed", "done"]
+    assert [row.sentence for row in rows] == ["Done.", "No clip.", "Done."]
+    first, second, third = (take.directory for take in written)
+    wanted = [f"begin {first}", f"end {first}", f"begin {second}", f"begin {third}", f"end {third}"]
+    assert journal.read_text().splitlines() == wanted
+
+
+def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    take = smoke_takes.write_take(obj)
+    uid = obj.session_uid
+    assert find_smoke(uid) == obj
+    scene.collection.objects.unlink(obj)
+    assert find_smoke(uid) is None
+    rows = bpy.context.window_manager.smokelift.jobs
+    row = rows.add()
+    row.take, row.smoke_uid = str(take.directory), uid
+    run_queue.work(bpy.context)
+    assert rows[0].outcome == "cancelled"
+    assert take.read().resumable
+
+
+def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    rows, written = bpy.context.window_manager.smokelift.jobs, [smoke_takes.write_take(obj) for _ in range(3)]
+    for take in written:
+        row = rows.add()
+        row.take, row.smoke_uid = str(take.directory), obj.session_uid
+    rows[0].outcome = "running"
+    assert bpy.ops.smokelift.cancel(take=str(written[1].directory)) == {"FINISHED"}
+    assert [row.take for row in rows] == [str(written[0].directory), str(written[2].directory)]
+    assert takes(tmp_path) == [written[0], written[2]]
+    assert bpy.ops.smokelift.cancel() == {"FINISHED"}
+    assert [row.cancel for row in rows] == [True, False]
