@@ -76,7 +76,8 @@ def check(smoke: bpy.types.Object) -> None:
     state = bpy.context.window_manager.smokelift
     state.check_smoke, state.check_place = smoke.session_uid, box_position(smoke)
     state.check_done, state.check_error = False, ""
-    check_job.stop()
+    if check_job.smoke != smoke.session_uid:
+        check_job.stop()
     if bpy.app.background:
         _start(smoke)
         check_job.wait()
@@ -95,14 +96,20 @@ def _start_later() -> None:
 
 
 def _start(smoke: bpy.types.Object) -> None:
-    """Start the engine on a shot, unless it is known what it says; its result goes into the state of the session."""
+    """Start the engine on a shot, unless it is at work on it or it is known what it says.
+
+    Its result goes into the state of the session.
+    """
     state, folder = bpy.context.window_manager.smokelift, Path(bpy.app.tempdir)
     try:
         take, words = Take(folder / "smokelift_check"), options(smoke)
         take.write(shot_tables(smoke, quick=True), words)
         shot = _fingerprint(take.scene_file.read_bytes(), words + thread_options(), smoke)
         page = folder / f"smokelift_inspect_{shot}.png"
-        state.check_page = str(page)
+        if check_job.job is not None and state.check_page == str(page):
+            return
+        check_job.stop()
+        state.check_done, state.check_page = False, str(page)
         if shot in _known:
             _store(state, *_known[shot])
             return
@@ -116,6 +123,7 @@ def _start(smoke: bpy.types.Object) -> None:
 
         check_job.start(smoke, (["inspect", str(take.scene_file), "--page", str(page), *words], store))
     except (ShotError, TakeError, EngineMissingError) as error:
+        check_job.stop()
         state.check_error = str(error)
 
 
@@ -136,13 +144,18 @@ def _store(state: bpy.types.PropertyGroup, details: Mapping[str, Any], doubts: I
 
 
 def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -> str:
-    """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads."""
+    """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads.
+
+    The quality does not: a check says what all of them take.
+    """
     settings = smoke.smokelift
     paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]
     if settings.strokes is not None:
         paths.append(absolute(settings.strokes.filepath, settings.strokes.library))
     states = [(path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None for path in paths]
-    return hashlib.sha256(tables + repr((list(words), states)).encode()).hexdigest()[:16]
+    return hashlib.sha256(
+        tables + repr(([word for word in words if word != settings.quality], states)).encode()
+    ).hexdigest()[:16]
 
 
 def box_position(smoke: bpy.types.Object) -> str:

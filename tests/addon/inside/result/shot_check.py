@@ -1,0 +1,68 @@
+"""The check of a shot: when the engine reads the clip anew, and when what it said or reads stays good."""
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon.core.contract import QUALITIES
+from addon.result import shot_check, side_job
+from tests.example_shot import smoke
+
+FIGURES = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": 0.1}
+DONE = {"event": "done", "text": "Done.", **FIGURES, "qualities": dict.fromkeys(QUALITIES, FIGURES)}
+ENGINE = f"""
+import sys, time
+with open(sys.argv[1], "a") as file:
+    print("read", file=file)
+time.sleep(float(sys.argv[2]))
+print({json.dumps(DONE)!r})
+"""
+"""Stands in for the engine, which reads for some seconds."""
+
+
+@pytest.fixture
+def engine(shot, tmp_path, monkeypatch) -> Iterator[Path]:
+    """The journal of an engine that answers at once."""
+    journal = tmp_path / "journal"
+    command = [sys.executable, "-c", ENGINE, str(journal), "0"]
+    monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
+    monkeypatch.setattr(shot_check, "_known", {})
+    yield journal
+    shot_check.check_job.stop()
+
+
+def readings(journal: Path) -> int:
+    return len(journal.read_text().splitlines())
+
+
+def test_another_quality_is_known_and_another_shot_is_read(shot, engine) -> None:
+    state, settings = bpy.context.window_manager.smokelift, smoke(shot).smokelift
+    for quality in QUALITIES:
+        settings.quality = quality
+        bpy.ops.smokelift.check()
+        assert state.check_done and not state.check_error
+        assert [cost.name for cost in state.costs] == list(QUALITIES)
+    assert readings(engine) == 1
+    settings.albedo, settings.use_medium = 0.5, True
+    assert not state.check_done
+    bpy.ops.smokelift.check()
+    assert state.check_done and readings(engine) == 2
+
+
+def test_a_reading_of_the_same_shot_goes_on(shot, engine, monkeypatch) -> None:
+    command = [sys.executable, "-c", ENGINE, str(engine), "30"]
+    monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
+    obj, job = smoke(shot), shot_check.check_job
+    shot_check._start(obj)
+    before = job.job
+    obj.smokelift.quality = "final"
+    bpy.ops.smokelift.match_clip()
+    shot_check._start(obj)
+    assert job.job is before
+    obj.smokelift.use_medium = True
+    shot_check._start(obj)
+    assert job.job is not before and before.outcome == "cancelled"
