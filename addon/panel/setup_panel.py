@@ -88,18 +88,13 @@ class SMOKELIFT_OT_set_up(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator
         settings = smoke.smokelift
         if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
             raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
-        hidden, further = shot_setup.set_up(smoke, take, index)
+        said = shot_setup.set_up(smoke, take, index)
         if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "CAMERA"
         volume.show(smoke, take)  # the frame rate may have changed
         shot_check.check_again(context)
-        said = [rpt_("The shot is set up: press F12 for a render that matches the clip.")]
-        if hidden:
-            said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
-        if further:
-            text = rpt_("Beside the clip's light the smoke has that of {:s}: hide it from renders for a match.")
-            said.append(text.format(", ".join(further)))
-        self.report({"INFO"}, " ".join(said))
+        done = rpt_("The shot is set up: press F12 for a render that matches the clip.")
+        self.report({"INFO"}, " ".join([done, *said]))
 
 
 def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -8,8 +8,6 @@ cancelled (and resumable).
 """
 
 import argparse
-import importlib
-import importlib.util
 import math
 import signal
 import sys
@@ -25,6 +23,7 @@ from ..core.take import TakeError
 from ..scene import volume
 from ..scene.blender import ShotError, thread_options
 from ..scene.clip import number_in_file, unseen_pictures, use_frames
+from ..scene.shot_setup import has_denoiser
 from ..scene.smoke import activate, active_smoke, new_smoke, smokes
 from . import smoke_takes
 
@@ -73,17 +72,11 @@ def _require_means(choices: argparse.Namespace) -> None:
     if choices.save and not bpy.data.filepath:
         raise ShotError("The file was never saved, so --save has nowhere to write: give blender a .blend to open.")
     scene = bpy.context.scene
-    denoises = scene.cycles.use_denoising and (choices.set_up or scene.render.engine == "CYCLES")
-    if choices.render and denoises and not _has_denoiser():
+    denoises = scene.cycles.use_denoising and scene.render.engine == "CYCLES"
+    if choices.render and denoises and not (choices.set_up or has_denoiser()):
         raise ShotError(
             "This Blender has no denoiser, and --render needs one: switch Denoise off in the render properties."
         )
-
-
-def _has_denoiser() -> bool:
-    """Whether Cycles was built with the denoiser that needs no graphics card."""
-    found = importlib.util.find_spec("_cycles")
-    return found is None or bool(getattr(importlib.import_module("_cycles"), "with_openimagedenoise", True))
 
 
 def _wait(job: Job) -> None:

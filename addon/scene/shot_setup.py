@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix, Vector
 
 from ..core.take import Take
@@ -67,7 +68,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
         set_value(scene, "frame_start", scene, "frame_start", min(firsts))
 
 
-def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> tuple[bool, list[str]]:
+def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> list[str]:
     """Make a render from the camera match the clip, in the parts that are ticked.
 
     Parameters
@@ -79,10 +80,10 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> tuple[
 
     Returns
     -------
-    Whether the lamp of a new file was hidden, and the names of further lights beside those of the clip.
+    What an artist should know of it, a sentence each.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
-    hidden, further = False, []
+    said = []
     if settings.set_up_plate:
         _disable_other_plates(smoke)  # first: what it gives back may be set up anew
     if settings.set_up_range:
@@ -93,20 +94,27 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> tuple[
     if settings.set_up_light:
         scene.render.engine = "CYCLES"
         _sample_for_a_minute(scene)
+        if scene.cycles.use_denoising and not has_denoiser():  # or F12 ends in an error
+            scene.cycles.use_denoising = False
+            said.append(rpt_("Denoise is off, since this Blender has no denoiser: more Max Samples make less noise."))
         _scatter_as_fitted(scene, index)
         estimated = settings.light_mode == "ESTIMATE"
         _estimated_suns(scene, index, index["scene"]["lights"] if estimated else [])
         if estimated:
-            hidden = hide_default_lamp(scene)
+            if hide_default_lamp(scene):
+                said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
             lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
             further = [obj.name for obj in lights if not _is_estimated(obj)]
+            if further:
+                text = rpt_("Beside the clip's light the smoke has that of {:s}: hide it from renders for a match.")
+                said.append(text.format(", ".join(further)))
     if settings.set_up_plate:
         _set_up_plate(smoke, take, index)
     if settings.set_up_colors:
         scene.view_settings.view_transform = "Standard"
         scene.view_settings.look = "None"
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
-    return hidden, further
+    return said
 
 
 def _disable_other_plates(smoke: bpy.types.Object) -> None:
@@ -182,6 +190,15 @@ def _sample_for_a_minute(scene: bpy.types.Scene) -> None:
         scene.cycles.samples = SAMPLES
         if hasattr(scene.cycles, "volume_biased"):  # null scattering takes four times as many for the same noise
             scene.cycles.volume_biased = True
+
+
+def has_denoiser() -> bool:
+    """Whether Cycles was built with the denoiser that needs no graphics card."""
+    try:
+        import _cycles  # a part of Blender, where it has Cycles
+    except ImportError:
+        return True
+    return bool(getattr(_cycles, "with_openimagedenoise", True))
 
 
 def _scattering(index: dict[str, Any]) -> str | None:

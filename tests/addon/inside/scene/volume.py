@@ -114,6 +114,18 @@ def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model
     assert (shot.cycles.volume_bounces, shot.cycles.max_bounces) == (7, 7)
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_a_set_up_needs_no_denoiser_that_is_not_there(shot, tmp_path, monkeypatch, there) -> None:
+    """Cycles of some distributions has none, and ends a render in an error if it is asked for."""
+    monkeypatch.setattr(shot_setup, "has_denoiser", lambda: there)
+    shot.cycles.use_denoising = True
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    said = shot_setup.set_up(smoke(shot), take, take.read().index)
+    assert shot.cycles.use_denoising == there
+    assert any("no denoiser" in sentence for sentence in said) == (not there)
+
+
 def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     """Frames chosen for the next run move nothing; a start that the artist gave the Volume stays."""
     take = made(tmp_path)
