@@ -101,6 +101,12 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> list[s
         estimated = settings.light_mode == "ESTIMATE"
         _estimated_suns(scene, index, index["scene"]["lights"] if estimated else [])
         if estimated:
+            lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
+            if lamps:
+                text = rpt_(
+                    "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
+                )
+                said.append(text.format(", ".join(lamps)))
             if hide_default_lamp(scene):
                 said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
             lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)

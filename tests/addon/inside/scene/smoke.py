@@ -68,6 +68,21 @@ def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
     assert cube.hide_render == cube.hide_viewport == (change is None)
 
 
+@pytest.mark.parametrize(("scattering", "even"), [("unshadowed", True), ("multiple", False)])
+def test_light_that_casts_no_shadow_says_how_it_lights_from_a_side(scene, clip, tmp_path, scattering, even) -> None:
+    """Else to turn the light changes nothing, without a word why."""
+    obj, take = new_smoke(scene, clip), made(tmp_path)
+    with changed(take) as index:
+        index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
+        index["scene"]["medium"]["scattering"] = scattering
+    volume.show(obj, take)
+    for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
+        setattr(obj.smokelift, name, False)
+    said = shot_setup.set_up(obj, take, take.read().index)
+    assert [sentence for sentence in said if "give Smokelift Light a shadow" in sentence] == said[: int(even)]
+    assert scene.objects["Smokelift Light"].data.use_shadow != even
+
+
 @pytest.mark.parametrize("change", [None, "location", "energy", "animated", "hidden", "scene"])
 def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(scene, clip, tmp_path, change) -> None:
     """Set Up Shot hides it and says so; a lamp that anybody changed, or that the smoke was made with, stays."""
