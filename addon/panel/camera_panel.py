@@ -245,6 +245,8 @@ def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         row = layout.row(align=True)
         row.prop(settings, "plate_frames", text=" ")
         row.operator("smokelift.clear_plate_frames", text="", icon="X")
+    elif settings.plate_mode == "COLOR":
+        layout.prop(settings, "plate_color", text=" ")
     draw_mask(layout, context, settings)
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":

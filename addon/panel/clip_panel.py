@@ -3,7 +3,15 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ..result import shot_check, smoke_takes
 from ..scene import shot_setup
@@ -59,7 +67,17 @@ class ClipSettings:
                 "Picture of the same view without smoke; for a moving camera, one for each frame",
             ),
             ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
+            ("COLOR", "Color", "One color, as behind stock footage on black"),
         ],
+        update=check_changed,
+    )
+    plate_color: FloatVectorProperty(
+        name="Background Color",
+        description="Color of all that is behind the smoke",
+        subtype="COLOR",
+        default=(0.0, 0.0, 0.0),
+        min=0.0,
+        soft_max=1.0,
         update=check_changed,
     )
     plate: StringProperty(

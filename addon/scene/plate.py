@@ -24,6 +24,8 @@ def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
         table["image"] = str(_plate(settings.plate))
     elif settings.plate_mode == "FRAMES":
         table["frame"] = [number_in_file(settings.clip, number) for number in _clean_frames(settings)]
+    elif settings.plate_mode == "COLOR":
+        table["color"] = list(settings.plate_color)
     if settings.strokes is not None:
         table["strokes"] = str(saved_strokes(settings.strokes, settings.clip))
     return table

@@ -75,7 +75,7 @@ def test_no_line_is_cut_off(shot) -> None:
         row.done, row.total, row.seconds_left = 1250, 2500, 80000.0
         shot_check.store_doubts(row, [("not all is smoke", "This is a doubt. " * 5)])
     panels = (bpy.types.SMOKELIFT_PT_view, bpy.types.SMOKELIFT_PT_view_element, bpy.types.SMOKELIFT_PT_view_advanced)
-    texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES") for text in drawn_with(shot, mode, *panels)]
+    texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES", "COLOR") for text in drawn_with(shot, mode, *panels)]
     bpy.ops.smokelift.new_mask()
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
     texts += drawn(shot, *panels)

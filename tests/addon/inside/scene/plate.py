@@ -11,7 +11,7 @@ from addon.panel import element_panel
 from addon.result.smoke_takes import output_folder
 from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables, shot_tables
-from smokelift.scene import Scene
+from smokelift.scene import Background, Scene
 from tests.example_shot import EXAMPLE, smoke
 
 # frames of the clip as the clean plate
@@ -42,6 +42,15 @@ def test_frames_that_the_clip_does_not_have_are_refused(shot) -> None:
         bpy.ops.smokelift.plate_from_frame()
     settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
     assert settings.plate_frames == ""
+
+
+def test_one_color_is_the_background(shot) -> None:
+    """As the engine asks for it where the clip does not show what is behind its smoke."""
+    settings = smoke(shot).smokelift
+    settings.plate_mode = "COLOR"
+    assert footage_tables(smoke(shot))["background"] == {"color": [0.0, 0.0, 0.0]}
+    settings.plate_color = (0.25, 0.5, 2.0)
+    assert Background(**footage_tables(smoke(shot))["background"]).color == (0.25, 0.5, 2.0)
 
 
 # strokes
