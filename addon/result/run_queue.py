@@ -13,10 +13,8 @@ from ..scene import volume
 from ..scene.blender import redraw, thread_options
 from ..scene.smoke import find_smoke
 from . import shot_check
+from .side_job import TICK_SECONDS, call_later, cancel_call
 from .smoke_takes import show_while_made
-
-TICK_SECONDS = 0.1
-"""Between two checks of the engine."""
 
 
 def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:
@@ -37,8 +35,7 @@ def work(context: bpy.types.Context) -> None:
         return
     manager = context.window_manager
     if _has_unregistered(manager):
-        if not bpy.app.timers.is_registered(_work_later):
-            bpy.app.timers.register(_work_later, first_interval=TICK_SECONDS)
+        call_later(_work_later, TICK_SECONDS)
     elif not workers(manager):
         # the first window exists as long as Blender does
         with context.temp_override(window=manager.windows[0]):
@@ -248,8 +245,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the worker and end its jobs."""
-    if bpy.app.timers.is_registered(_work_later):
-        bpy.app.timers.unregister(_work_later)
+    cancel_call(_work_later)
     manager = bpy.context.window_manager
     running = workers(manager)
     for worker in running:

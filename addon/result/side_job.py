@@ -16,6 +16,7 @@ from ..scene.blender import redraw, thread_options
 from ..scene.smoke import find_smoke
 
 TICK_SECONDS = 0.1
+"""Between two readings of what the engine says."""
 
 REST_SECONDS = 0.4
 """Time without a change of settings before the engine is asked what they come to."""
