@@ -80,6 +80,17 @@ class SMOKELIFT_OT_check(ActsOnSmoke, RequiresClip, bpy.types.Operator):
         shot_check.check(smoke)
 
 
+class SMOKELIFT_OT_stop_check(ActsOnSmoke, bpy.types.Operator):
+    """Stop reading the clip; Make Smoke and all settings work without the estimate"""
+
+    bl_idname = "smokelift.stop_check"
+    bl_label = "Stop Reading"
+    bl_options = {"INTERNAL"}
+
+    def act(self, _context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
+        shot_check.stop()
+
+
 CELLS = 0.245, 0.215, 0.18, 0.18
 """Fractions of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
 
@@ -121,7 +132,9 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
     elif not done:
         seconds = shot_check.check_job.seconds
         text = iface_("Reading the clip: {:s}").format(duration(seconds)) if seconds else iface_("Reading the clip")
-        layout.label(text=text, translate=False, icon="TIME")
+        row = layout.row(align=True)
+        row.label(text=text, translate=False, icon="TIME")
+        row.operator("smokelift.stop_check", text="", icon="X")
     elif (own := costs.get(settings.quality)) is not None:
         text = iface_("{} x {} x {} voxels").format(*own.resolution)
         layout.label(text=text, translate=False, icon="MESH_GRID")
@@ -163,4 +176,4 @@ def _brief(value: float, unit: str) -> str:
     return f"{value:.1f} {unit}" if value < 9.95 else f"{value:.0f} {unit}"
 
 
-register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_check,))
+register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_check, SMOKELIFT_OT_stop_check))

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core.job import EngineMissingError, Job
 from ..core.take import Take, TakeError
@@ -83,6 +84,14 @@ def check(smoke: bpy.types.Object) -> None:
         check_job.wait()
     else:
         call_later(_start_later, REST_SECONDS)
+
+
+def stop() -> None:
+    """Stop reading the clip, until a setting changes or the artist asks for a check."""
+    check_job.stop()
+    cancel_call(_start_later)
+    state = bpy.context.window_manager.smokelift
+    state.check_error = rpt_("Time and memory are not estimated: Check Shot under Advanced does it.")
 
 
 def _start_later() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from addon.core.contract import QUALITIES
 from addon.result import shot_check, side_job
+from tests.addon.inside.panel.tab import drawn
 from tests.example_shot import smoke
 
 FIGURES = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": 0.1}
@@ -66,3 +67,17 @@ def test_a_reading_of_the_same_shot_goes_on(shot, engine, monkeypatch) -> None:
     obj.smokelift.use_medium = True
     shot_check._start(obj)
     assert job.job is not before and before.outcome == "cancelled"
+
+
+def test_a_reading_can_be_stopped(shot, engine, monkeypatch) -> None:
+    command = [sys.executable, "-c", ENGINE, str(engine), "30"]
+    monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke = smoke(shot).session_uid
+    shot_check._start(smoke(shot))
+    job = shot_check.check_job.job
+    assert "[stop_check]" in drawn(shot, bpy.types.SMOKELIFT_PT_view)
+    assert bpy.ops.smokelift.stop_check() == {"FINISHED"}
+    assert job.outcome == "cancelled" and shot_check.check_job.job is None
+    texts = " ".join(text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view))
+    assert "not estimated" in texts and "[stop_check]" not in texts and "[run]" in texts
