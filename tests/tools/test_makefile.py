@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCES = (
     *("pyproject.toml", "CMakeLists.txt", "cpp/a.cpp", "engine/a.py", "LICENSE", "blender_manifest.toml"),
-    *("docs/a.md", "mkdocs.yml", "examples/a.toml", "addon/a.py"),
+    *("docs/a.md", "mkdocs.yml", "examples/a.toml", "addon/core/a.py"),
     *("tools/build_extension.py", "tools/extension_libraries.py", "tools/engine_wheels.py", "tools/bundle.txt"),
 )
 MADE = (
@@ -25,7 +25,7 @@ STEPS = {"wheels": "engine_wheels.py --blender", "manual": "mkdocs build", "zip"
     ("changed", "steps"),
     [
         (None, set()),
-        ("addon/a.py", {"manual", "zip"}),
+        ("addon/core/a.py", {"manual", "zip"}),
         ("docs/a.md", {"manual", "zip"}),
         ("tools/bundle.txt", {"manual", "zip"}),
         ("tools/extension_libraries.py", {"manual", "zip"}),
