@@ -11,7 +11,7 @@ from ..core.job import ENDED, EngineMissingError, Job, engine_command
 from ..core.take import Take, TakeError
 from ..scene import volume
 from ..scene.blender import redraw, thread_options
-from ..scene.smoke import find_smoke
+from ..scene.smoke import active_smoke, find_smoke, scene_of
 from . import shot_check
 from .side_job import TICK_SECONDS, call_later, cancel_call
 from .smoke_takes import show_while_made
@@ -206,7 +206,9 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if not row.left:
                 show_while_made(smoke, take, before, job.outcome)
             created = _datablocks() - count
-            if before is None and row.take not in self._seen and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
+            in_tab = smoke == active_smoke(scene_of(smoke))  # of another the artist sees nothing now
+            first = before is None and in_tab and row.take not in self._seen
+            if first and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
                 self._seen.add(row.take)
         if not bpy.app.background:
             row.icon = self._thumbnail(take)

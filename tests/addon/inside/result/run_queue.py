@@ -5,9 +5,11 @@ import sys
 import bpy
 import pytest
 
-from addon.core.take import takes
+from addon.core.take import Take, takes
 from addon.result import run_queue, smoke_takes
+from addon.scene import volume
 from addon.scene.smoke import find_smoke, new_smoke
+from conftest import made
 from tests.example_shot import EXAMPLE
 
 ENGINE = """
@@ -38,6 +40,42 @@ def queued(obj: bpy.types.Object, count: int) -> list:
         row = bpy.context.window_manager.smokelift.jobs.add()
         row.take, row.smoke_uid = str(take.directory), obj.session_uid
     return written
+
+
+FRAMES = """
+import json
+for message in (
+    {"event": "start", "done": 0, "total": 6},
+    {"event": "frame", "frame": 6, "done": 6, "total": 6, "seconds_left": 0.0},
+    {"event": "done", "text": "Done."},
+):
+    print(json.dumps(message), flush=True)
+"""
+"""Stands in for an engine whose frames are there already."""
+
+
+def finished_before(obj: bpy.types.Object) -> Take:
+    """A take that waits, with all its frames."""
+    (take,) = queued(obj, 1)
+    saved = {file: file.read_bytes() for file in (take.scene_file, take.request_file)}
+    take.remove()
+    made(take.directory.parent, number=int(take.directory.name[-4:]))
+    for file, content in saved.items():
+        file.write_bytes(content)
+    return take
+
+
+def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", FRAMES])
+    other, active = new_smoke(scene, clip), new_smoke(scene, clip)
+    for obj, frame in ((other, 40), (active, 2)):
+        obj.smokelift.output = str(tmp_path / obj.name)
+        take = finished_before(obj)
+        obj.smokelift.camera_mode = "SCENE"  # of which these files have none
+        scene.frame_set(40)
+        run_queue.work(bpy.context)
+        assert volume.shown_take(obj) == take
+        assert scene.frame_current in ((frame,) if frame == 40 else (1, 2))
 
 
 def test_runs_follow_one_another_and_a_failed_one_stops_none(scene, clip, tmp_path, monkeypatch) -> None:
