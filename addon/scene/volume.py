@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
 from ..core.retiming import retiming
-from ..core.take import Take
+from ..core.take import TITLES, Take
 from .blender import absolute, frame_rate, relative, set_unless_changed
 from .box import engine_to_world
 from .look import fit_look
@@ -188,9 +188,14 @@ def provenance_note(smoke: bpy.types.Object) -> str:
 
 
 def _provenance(parts: list[dict[str, Any]], has_further_views: bool, before: int) -> str:
-    """The line; of what was done after the clip, with its frames counted on from the clip's."""
-    hows = (part["how"] for part in parts if part["what"] in DIRECTIONS)
-    directed = [_renumbered(how, before) for how in hows]
+    """The line; of what was done last after the clip, with its frames counted on from the clip's.
+
+    What was done before names frames of an earlier result, which are others in this one.
+    """
+    done = [part for part in parts if part["what"] in DIRECTIONS]
+    directed = [_renumbered(part["how"], before) for part in done[-1:]]
+    if len(done) > 1:
+        directed.append(f"Before that: {', '.join(TITLES[part['what']] for part in done[:-1])}.")
     parts = [part for part in parts if part["what"] not in DIRECTIONS]
     if not parts:  # the engine of earlier versions did not say
         return " ".join(directed)

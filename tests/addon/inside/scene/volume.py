@@ -250,6 +250,21 @@ def test_a_simulation_is_said_with_the_clips_frames(shot, tmp_path) -> None:
     assert volume.provenance_note(smoke(shot)) == said
 
 
+def test_frames_of_earlier_results_are_not_said_of_what_was_made_of_them(shot, tmp_path) -> None:
+    take = made(tmp_path)
+    hows = {
+        "continue": "Frames 7 to 11 are a simulation that starts from frame 6.",
+        "retime": "Frames between two of the source are made.",
+        "loop": "In frames 1 to 3 the end of the loop becomes its start.",
+    }
+    with changed(take) as index:
+        index["provenance"] = [
+            {"what": what, "origin": "made up", "how": how, "settings": {}} for what, how in hows.items()
+        ]
+    volume.show(smoke(shot), take)
+    assert volume.provenance_note(smoke(shot)) == f"{hows['loop']} Before that: Continued, Retimed."
+
+
 def test_a_new_result_replaces_the_old_one_in_the_same_object(shot, tmp_path) -> None:
     volume.show(smoke(shot), made(tmp_path))
     before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
