@@ -95,7 +95,7 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
     for name in ("host", "precision", "use_velocity", "proxy"):
         layout.prop(settings, name)
-    if size_estimate.smoke != smoke.session_uid:
+    if not size_estimate.fits(smoke):
         size_estimate.ask(smoke)
     elif size_estimate.size:
         draw_text(layout, context, size_estimate.size, "DISK_DRIVE")

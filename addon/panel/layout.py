@@ -88,6 +88,5 @@ def draw_ticked(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, t
     row = layout.row(heading=settings.bl_rna.properties[tick].name)
     row.prop(settings, tick, text="")
     values = row.row(align=True)
-    values.active = getattr(settings, tick)
-    for name in names:
+    for name in names if getattr(settings, tick) else ():  # else they may be of another result
         values.prop(settings, name, text="")

@@ -28,12 +28,17 @@ class SizeEstimate:
     def __init__(self) -> None:
         self.smoke = 0
         self.size = ""
+        self._of: tuple[int, Path | None, int] | None = None
         self.timer = self.start  # each `self.start` is another object, by which Blender knows a timer
+
+    def fits(self, smoke: bpy.types.Object) -> bool:
+        """Whether it is of what a smoke shows now."""
+        return self._of == _shown(smoke)
 
     def ask(self, smoke: bpy.types.Object) -> None:
         """Estimate the size once the settings rest. Drawing code may call this."""
         if not bpy.app.background and not writing_job.writing:
-            self.smoke, self.size = smoke.session_uid, ""
+            self.smoke, self.size, self._of = smoke.session_uid, "", _shown(smoke)
             call_later(self.timer, REST_SECONDS)
 
     def start(self) -> None:
@@ -49,6 +54,12 @@ class SizeEstimate:
     def _store(self, _smoke: bpy.types.Object, job: Job) -> None:
         done = job.outcome == "done"
         self.size = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
+
+
+def _shown(smoke: bpy.types.Object) -> tuple[int, Path | None, int]:
+    """A smoke by its number, the take that it shows, and how many frames that has."""
+    take = volume.shown_take(smoke)
+    return smoke.session_uid, take and take.directory, take.read().frames if take else 0
 
 
 size_estimate = SizeEstimate()

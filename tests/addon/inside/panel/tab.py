@@ -123,6 +123,17 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     assert getattr(settings, name) == 0
 
 
+def test_frames_of_a_part_are_drawn_where_it_is_ticked(shot, tmp_path) -> None:
+    """They may be of another result until then."""
+    volume.show(smoke(shot), made(tmp_path))
+    settings = smoke(shot).smokelift.directing
+    settings.direction = "loop"
+    whole = len(drawn(shot, bpy.types.SMOKELIFT_PT_view_direct))
+    settings.use_part = True
+    assert (settings.part_first, settings.part_last) == (1, 6)
+    assert len(drawn(shot, bpy.types.SMOKELIFT_PT_view_direct)) == whole + 2
+
+
 def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> None:
     """And those that Blender does not know of because they were written after it read the first ones."""
     image = bpy.data.images.new("frame", 48, 32)

@@ -1,6 +1,7 @@
 """What the engine writes of a result: the files and assets that are handed on, and a proxy."""
 
 import json
+import shutil
 from pathlib import Path
 
 import bpy
@@ -135,3 +136,14 @@ def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
     bpy.context.scene.collection.objects.link(obj)
     start = obj.data.frame_start
     assert grids(obj.data, start + 1) == ("smoke_0002.vdb", {"density", "velocity"})
+
+
+def test_the_size_is_that_of_what_is_on_show(made, tmp_path) -> None:
+    estimate = export.SizeEstimate()
+    assert not estimate.fits(made)
+    estimate._of = export._shown(made)
+    assert estimate.fits(made)
+    directory = volume.shown_take(made).directory
+    shutil.copytree(directory, directory.with_name("take_0002"))
+    volume.show(made, Take(directory.with_name("take_0002")))
+    assert not estimate.fits(made)
