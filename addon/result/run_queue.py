@@ -199,12 +199,12 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Show a job's frames in the viewport, and its end."""
         take = Take(Path(row.take))
         smoke = find_smoke(row.smoke_uid)
-        created = 0
+        created, said = 0, ""
         if smoke is not None:
             count = _datablocks()
             before = self._before.setdefault(row.take, volume.shown_take(smoke))
             if not row.left:
-                show_while_made(smoke, take, before, job.outcome)
+                said = show_while_made(smoke, take, before, job.outcome)
             created = _datablocks() - count
             in_tab = smoke == active_smoke(scene_of(smoke))  # of another the artist sees nothing now
             first = before is None and in_tab and row.take not in self._seen
@@ -215,6 +215,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
                 # an undo to a step before new objects leaves Blender with dangling pointers
                 bpy.ops.ed.undo_push(message="Make Smoke")
+            if said:
+                self.report({"INFO"}, said)
             if job.ended:
                 self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
 

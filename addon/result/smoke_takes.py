@@ -80,8 +80,6 @@ def write_take(smoke: bpy.types.Object) -> Take:
         If the shot is unusable, or the folder cannot be written to.
     """
     tables = shot_tables(smoke)
-    if smoke.smokelift.camera_mode == "ESTIMATE":
-        hide_default_cube(scene_of(smoke))
     take = _next_take(smoke)
     if smoke.smokelift.drawn_mask is not None:
         tables["clip"]["mask"] = take.copy_mask(Path(tables["clip"]["mask"]))
@@ -149,12 +147,21 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
     return next((take for take in candidates if take.read().resumable), None)
 
 
-def present(smoke: bpy.types.Object, take: Take) -> None:
-    """Show a take's finished frames, and the camera that the engine assumed if it did."""
-    index = take.read().index
-    if volume.show(smoke, take) and index is not None:
-        shot_setup.assumed_camera(smoke, index)
+def present(smoke: bpy.types.Object, take: Take) -> str:
+    """Show a take's finished frames, and the camera that the engine assumed if it did.
+
+    Returns
+    -------
+    What else was changed in the scene, as a sentence; empty if nothing was.
+    """
+    index, first = take.read().index, volume.shown_take(smoke) is None
+    if not volume.show(smoke, take) or index is None:
+        return ""
+    assumed = shot_setup.assumed_camera(smoke, index) is not None
+    if index["complete"] or take.read().direction is None:  # how long a directed one becomes is not known before
         shot_setup.follow_range(smoke)
+    hidden = first and assumed and hide_default_cube(scene_of(smoke))
+    return rpt_("The cube of the new file is hidden: it stands where the smoke does.") if hidden else ""
 
 
 def choose(smoke: bpy.types.Object, take: Take) -> None:
@@ -165,8 +172,8 @@ def choose(smoke: bpy.types.Object, take: Take) -> None:
             row.left = row.take != str(take.directory)
 
 
-def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:
-    """Show the frames of a take while it is made, unless the artist has chosen another meanwhile.
+def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> str:
+    """Show the frames of a take while it is made, unless the artist has chosen another meanwhile; as `present`.
 
     Parameters
     ----------
@@ -178,9 +185,9 @@ def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, ou
         State of the run.
     """
     if volume.shown_take(smoke) not in (before, take):
-        return
+        return ""
     stopped = outcome in ("failed", "cancelled")
-    present(smoke, before if stopped and before is not None else take)
+    return present(smoke, before if stopped and before is not None else take)
 
 
 def busy(manager: bpy.types.WindowManager, take: Take) -> bool:

@@ -117,16 +117,21 @@ def _layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
 
 
-def hide_default_cube(scene: bpy.types.Scene) -> None:
-    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place."""
+def hide_default_cube(scene: bpy.types.Scene) -> bool:
+    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place.
+
+    Returns whether it was seen.
+    """
     cube = scene.objects.get("Cube")
-    if cube is None or cube.type != "MESH" or cube.matrix_basis != Matrix.Identity(4):
-        return
+    if cube is None or cube.type != "MESH" or cube.hide_render or cube.matrix_basis != Matrix.Identity(4):
+        return False
     if cube.parent or cube.children or cube.modifiers or cube.constraints or cube.animation_data:
-        return
+        return False
     places = {tuple(vertex.co) for vertex in cube.data.vertices}
-    if places == {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
-        cube.hide_viewport = cube.hide_render = True
+    if places != {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
+        return False
+    cube.hide_viewport = cube.hide_render = True
+    return True
 
 
 def hide_default_lamp(scene: bpy.types.Scene) -> bool:
