@@ -12,7 +12,7 @@ from bpy.app.handlers import persistent
 
 from ..core.take import Take
 from ..scene.blender import absolute, relative
-from .smoke_takes import takes_of_file
+from .smoke_takes import find_results_again, takes_of_file
 
 _NAMES = ("output", "results", "before", "plate", "mask")
 """Settings of a smoke that hold a path; the folder of its export is one more."""
@@ -102,6 +102,8 @@ def _after_undo(_scene: bpy.types.Scene) -> None:
         then = Path(owner.id_data.smokelift.saved_as).parent
         if path.startswith("//") and then != here and then in _folders:
             _set(owner, name, relative(absolute(path, folder=then)))
+    for obj in _smokes():
+        find_results_again(obj)
     _set_saved_as(bpy.data.filepath)
     if all(folder == here for folder in _folders):  # to ask for every file takes time
         return

@@ -19,6 +19,9 @@ from ..scene.scene_file import shot_tables
 from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes
 from . import directing
 
+_written_to: dict[int, tuple[str, Path]] = {}
+"""Folders that this session wrote takes to, with their names, by the numbers of their smokes."""
+
 
 def output_folder(smoke: bpy.types.Object) -> Path:
     """The folder of a smoke's takes: the chosen one, else the one that it has, else a new one.
@@ -111,7 +114,16 @@ def _next_take(smoke: bpy.types.Object) -> Take:
     folder = output_folder(smoke)
     if not smoke.smokelift.output:
         smoke.smokelift.results = relative(folder)
+        _written_to[smoke.session_uid] = smoke.smokelift.folder, folder
     return new_take(folder)
+
+
+def find_results_again(smoke: bpy.types.Object) -> None:
+    """Have a smoke know the folder of its results where an undo took that back: the results themselves stay."""
+    settings = smoke.smokelift
+    name, folder = _written_to.get(smoke.session_uid, ("", None))
+    if folder is not None and name == settings.folder and not settings.results:
+        settings.results = relative(folder)
 
 
 def _note_file(*used: Take) -> None:

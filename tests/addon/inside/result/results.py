@@ -195,3 +195,23 @@ def test_undo_after_saving_elsewhere_finds_all_files(project, moved) -> None:
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(project / "flat.blend"))
     check()
+
+
+@pytest.mark.parametrize("saved_elsewhere", [False, True])
+def test_undo_to_before_a_run_finds_its_result(project, saved_elsewhere) -> None:
+    """Also where the file was saved elsewhere while it ran: it is in the folder that the run wrote to."""
+    obj = smoke(bpy.context.scene)
+    bpy.ops.ed.undo_push(message="Before")
+    obj.location.x += 1.0
+    bpy.ops.ed.undo_push(message="Move")
+    take = finished()
+    bpy.ops.ed.undo_push(message="Make Smoke")
+    if saved_elsewhere:
+        (project / "delivery").mkdir()
+        bpy.ops.wm.save_as_mainfile(filepath=str(project / "delivery" / "final.blend"))
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    obj = smoke(bpy.context.scene)
+    assert obj.location.x == 0.0
+    assert smoke_takes.output_folder(obj) == take.directory.parent
+    assert own() == [1]
