@@ -23,7 +23,7 @@ from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
 from .common import ActsOnSmoke, RequiresClip, WritesFiles, sub_panels
 from .editors import open_tab, show_image
-from .layout import draw_work
+from .layout import draw_text, draw_work
 
 STROKES_FILE = "strokes.png"
 """Name of the image in the folder of the smoke's results."""
@@ -111,8 +111,11 @@ class SMOKELIFT_PT_strokes(bpy.types.Panel):
         shown = context.space_data.image
         return smoke is not None and shown is not None and shown == smoke.smokelift.strokes
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
+        if context.tool_settings.image_paint.brush is None:
+            text = "This Blender comes without brushes: paint the strokes in another, and open that picture as Strokes."
+            draw_text(layout, context, text, "ERROR")
         layout.column(align=True).operator_enum("smokelift.stroke", "means")
         layout.operator("smokelift.paint_strokes", text="Show This Frame", icon="FILE_REFRESH")
 

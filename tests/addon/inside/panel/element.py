@@ -11,6 +11,7 @@ import bpy
 import pytest
 
 from addon.result import side_job
+from tests.addon.inside.panel.tab import drawn
 from tests.example_shot import smoke
 
 ENGINE = """
@@ -98,3 +99,10 @@ def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
     assert not bpy.ops.smokelift.extract.poll()
     assert bpy.ops.smokelift.stop_writing() == {"FINISHED"}
     assert bpy.ops.smokelift.extract.poll()
+
+
+@pytest.mark.parametrize("brush", [None, "a brush"])
+def test_strokes_say_where_there_is_no_brush(shot, brush) -> None:
+    """Builds of some distributions bring none, and Blender paints nothing then, without a word."""
+    said = " ".join(text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_strokes, brush=brush))
+    assert ("without brushes" in said) == (brush is None)

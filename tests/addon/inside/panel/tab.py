@@ -39,13 +39,14 @@ class Layout:
         """Blender's layout has settings; here they change nothing."""
 
 
-def drawn(scene: bpy.types.Scene, *panels: type) -> list[str]:
+def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[str]:
     texts: list[str] = []
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
     context = SimpleNamespace(
         scene=scene,
         region=SimpleNamespace(width=WIDTH),
         preferences=preferences,
+        tool_settings=SimpleNamespace(image_paint=SimpleNamespace(brush=brush)),
         window_manager=bpy.context.window_manager,
     )
     for kind in panels:
