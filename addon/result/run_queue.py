@@ -24,6 +24,7 @@ def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> 
         if jobs[place].outcome in ENDED and jobs[place].smoke_uid == smoke.session_uid:
             jobs.remove(place)
     row = jobs.add()
+    shot_check.make_way()
     row.take, row.smoke_uid, row.done = str(take.directory), smoke.session_uid, take.read().frames
     work(context)
 

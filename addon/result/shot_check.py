@@ -13,7 +13,7 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core.job import EngineMissingError, Job
+from ..core.job import ENDED, EngineMissingError, Job
 from ..core.take import Take, TakeError
 from ..scene.blender import ShotError, absolute, redraw, thread_options
 from ..scene.box import box_corners, box_of
@@ -92,6 +92,15 @@ def stop() -> None:
     cancel_call(_start_later)
     state = bpy.context.window_manager.smokelift
     state.check_error = rpt_("Time and memory are not estimated: Check Shot under Advanced does it.")
+
+
+def make_way() -> None:
+    """Stop reading the clip for a run, which reads it too; the tab begins again when no run is left."""
+    state = bpy.context.window_manager.smokelift
+    if check_job.job is not None or bpy.app.timers.is_registered(_start_later):
+        check_job.stop()
+        cancel_call(_start_later)
+        _forget(state)
 
 
 def _start_later() -> None:
@@ -209,7 +218,7 @@ def check_soon(context: bpy.types.Context) -> None:
     """Check the active smoke unless it was checked. Drawing code may call this."""
     state, first = context.window_manager.smokelift, context.window_manager.windows[0]
     smoke = active_smoke(context.scene)
-    known = smoke is None or is_checked(state, smoke)
+    known = smoke is None or is_checked(state, smoke) or any(row.outcome not in ENDED for row in state.jobs)
     if not known and context.window == first and not bpy.app.timers.is_registered(_start_check):
         call_later(_start_check, 0.0)  # drawing code may not change data
 

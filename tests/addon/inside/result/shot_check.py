@@ -9,7 +9,7 @@ import bpy
 import pytest
 
 from addon.core.contract import QUALITIES
-from addon.result import shot_check, side_job
+from addon.result import run_queue, shot_check, side_job
 from tests.addon.inside.panel.tab import drawn
 from tests.example_shot import smoke
 
@@ -81,3 +81,15 @@ def test_a_reading_can_be_stopped(shot, engine, monkeypatch) -> None:
     assert job.outcome == "cancelled" and shot_check.check_job.job is None
     texts = " ".join(text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view))
     assert "not estimated" in texts and "[stop_check]" not in texts and "[run]" in texts
+
+
+def test_a_run_does_not_read_the_clip_beside_a_check(shot, engine, tmp_path, monkeypatch) -> None:
+    command = [sys.executable, "-c", ENGINE, str(engine), "30"]
+    monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
+    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", ""])
+    smoke(shot).smokelift.output = str(tmp_path)
+    shot_check._start(smoke(shot))
+    job = shot_check.check_job.job
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    assert job.outcome == "cancelled" and shot_check.check_job.job is None
+    assert not shot_check.is_checked(bpy.context.window_manager.smokelift, smoke(shot))
