@@ -12,6 +12,7 @@ from bpy.app.handlers import persistent
 
 from ..core.take import Take
 from ..scene.blender import absolute, relative
+from ..scene.smoke import volume_objects
 from .smoke_takes import find_results_again, takes_of_file
 
 _NAMES = ("output", "results", "before", "plate", "mask")
@@ -35,7 +36,7 @@ _folders: list[Path] = []
 
 def _smokes() -> Iterator[bpy.types.Object]:
     """The smokes of all scenes, those in none too."""
-    return (obj for obj in bpy.data.objects if obj.library is None and obj.smokelift.is_smoke)
+    return (obj for obj in volume_objects() if obj.library is None and obj.smokelift.is_smoke)
 
 
 def _settings() -> Iterator[tuple[bpy.types.PropertyGroup, str, str]]:

@@ -16,6 +16,11 @@ ASSUMED_CAMERA = "Smokelift Camera"
 """Name of a camera that stands where the engine assumed the clip's."""
 
 
+def volume_objects() -> list[bpy.types.Object]:
+    """The objects that may have settings; before 5.0 to ask any other for them would give it a custom property."""
+    return [obj for obj in bpy.data.objects if obj.type == "VOLUME"]
+
+
 def is_smoke(obj: bpy.types.Object | None) -> bool:
     """Whether an object is a smoke that can be made: one that is linked from another file is finished."""
     if obj is None or obj.type != "VOLUME" or obj.library is not None or obj.data.library is not None:
@@ -91,7 +96,7 @@ def activate(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
 
 def free_folder(smoke: bpy.types.Object) -> str:
     """A name for the folder of a smoke's takes that no other smoke has: its clip's, with a number if need be."""
-    taken = {obj.smokelift.folder for obj in bpy.data.objects if obj != smoke and obj.smokelift.is_smoke}
+    taken = {obj.smokelift.folder for obj in volume_objects() if obj != smoke and obj.smokelift.is_smoke}
     stem = bpy.path.clean_name(Path(smoke.smokelift.clip.filepath).stem)
     names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
     return next(name for name in names if name not in taken)

@@ -272,6 +272,17 @@ def test_the_range_stays_while_a_directed_result_grows(scene, clip, tmp_path) ->
     assert scene.frame_end == before[0] + 1
 
 
+def test_other_objects_get_nothing(scene, clip, tmp_path) -> None:
+    """Before 5.0 Blender shows what an add-on gives an object among its custom properties."""
+    add_box(scene, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    obj = new_smoke(scene, clip)
+    smoke_takes.own_takes(obj)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "other.blend"))
+    assert not set(bpy.data.objects["Box"].keys())
+
+
 def test_the_range_is_that_of_what_is_used_or_shown(scene, clip, tmp_path) -> None:
     """Before a run that of the used frames, then the result's; of several smokes all; a longer one of a result is."""
     obj = new_smoke(scene, clip)
