@@ -22,7 +22,8 @@ EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
 def refuse(cls: type, why: str) -> bool:
     """Have Blender say why an operator cannot be used; False, for its `poll`. A panel is left out in silence."""
     if issubclass(cls, bpy.types.Operator):
-        return refuse(cls, why)
+        cls.poll_message_set(why)
+    return False
 
 
 class RequiresClip:

@@ -70,6 +70,14 @@ def test_defaults_are_the_engines(scene) -> None:
     assert (room.default, room.hard_min) == (ROOM, 1.0)
 
 
+def test_what_cannot_be_used_says_so_without_an_error(scene) -> None:
+    """Blender prints an error in such a question, and goes on."""
+    kinds = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith(("SMOKELIFT_OT", "SMOKELIFT_PT"))]
+    asked = [kind for kind in kinds if hasattr(kind, "poll") and kind.__name__ != "SMOKELIFT_PT_strokes"]
+    assert len(asked) > 30
+    assert not any(kind.poll(bpy.context) for kind in asked if kind.__name__ != "SMOKELIFT_PT_presets")
+
+
 def test_smoke_is_in_the_menu_for_volumes(scene, tmp_path) -> None:
     """Where Blender's search looks; choosing a clip adds the smoke, and what is no clip is one sentence."""
     menu = bpy.types.VIEW3D_MT_volume_add
