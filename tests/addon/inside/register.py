@@ -92,3 +92,22 @@ def test_smoke_is_in_the_menu_for_volumes(scene, tmp_path) -> None:
     with pytest.raises(RuntimeError, match="no video and no picture"):
         bpy.ops.smokelift.add(filepath=str(tmp_path / "notes.txt"))
     assert len(bpy.data.movieclips) == 1
+
+
+SAVED = {
+    "smokelift": "albedo anisotropy assumed_camera before between box camera_mode clip closed detail device directing "
+    "distance drawn_mask extinction first folder fps inlet is_smoke last light_mode longest_side mask output plate "
+    "plate_frames plate_mode plate_place quality results saved_as seed set_up_camera set_up_colors set_up_light "
+    "set_up_plate set_up_range speed strokes transfer use_medium",
+    "smokelift_export": "folder host precision proxy use_velocity",
+}
+"""Settings by the names under which .blend files and scripts have them."""
+
+
+def test_settings_have_the_names_that_files_know(scene) -> None:
+    for owner, names in SAVED.items():
+        assert set(names.split()) <= set(getattr(smoke(scene), owner).bl_rna.properties.keys())
+    directing = smoke(scene).smokelift.directing.bl_rna.properties
+    names = "buoyancy closed direction dissipation effectors fade fan_speed frames live overlap part_first part_last "
+    names += "room speed speed_end speed_middle start use_buoyancy use_dissipation use_part use_ramp use_start"
+    assert set(names.split()) <= set(directing.keys())
