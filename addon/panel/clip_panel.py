@@ -16,7 +16,7 @@ from bpy.props import (
 from ..result import shot_check, smoke_takes
 from ..scene import shot_setup
 from ..scene.blender import PATH_OPTIONS, ShotError, frame_rate
-from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures
+from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, refuse
@@ -281,6 +281,9 @@ class SMOKELIFT_OT_new_mask(ActsOnSmoke, RequiresClip, bpy.types.Operator):
             mask.layers.new(name="Smoke")
             mask.frame_start, mask.frame_end = context.scene.frame_start, context.scene.frame_end
             settings.drawn_mask = mask
+        first, last = used_range(settings)
+        if not first <= context.scene.frame_current <= last:
+            context.scene.frame_set(first)  # what is drawn on a frame that is not used helps little
         if not bpy.app.background:
             open_tab(show_mask(settings.clip, settings.drawn_mask))
 

@@ -86,7 +86,7 @@ SETTINGS = (
 
 
 class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):
-    """The menu."""
+    """Settings that are kept for other smokes: quality, light, medium, speed and device"""
 
     bl_label = "Smoke Presets"
     preset_subdir = FOLDER

@@ -188,3 +188,12 @@ def test_a_mask_that_is_drawn_on_is_checked_anew(shot) -> None:
     line.points[0].co = (0.2, 0.1)
     bpy.context.view_layer.update()
     assert not state.check_smoke
+
+
+def test_a_mask_is_drawn_on_a_frame_that_is_used(shot) -> None:
+    settings = smoke(shot).smokelift
+    settings.first, settings.last = 21, 30
+    for frame, shown in ((5, 21), (25, 25)):
+        shot.frame_set(frame)
+        assert bpy.ops.smokelift.new_mask() == {"FINISHED"}
+        assert shot.frame_current == shown
