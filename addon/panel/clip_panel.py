@@ -23,6 +23,9 @@ from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, 
 from .editors import open_tab, show_mask
 from .layout import draw_text
 
+UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
+"""Settings that a clip of the same frames keeps."""
+
 
 def _clip_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """Use all frames of a new clip, none of the old one's, and a folder that no other smoke has."""
@@ -199,10 +202,6 @@ class SMOKELIFT_OT_match_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         shot_setup.match_clip(smoke)
         shot_check.check_again(context)
-
-
-UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
-"""Settings that a clip of the same frames keeps."""
 
 
 class SMOKELIFT_OT_undistort(ActsOnSmoke, bpy.types.Operator):

@@ -31,6 +31,12 @@ STROKES_FILE = "strokes.png"
 COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}
 """What the engine takes the colors for."""
 
+PICTURES = "element_####.exr"
+"""Names of the pictures, numbered as the frames of the clip's file."""
+
+SHOWN = "element.exr"
+"""The picture of a single frame that is shown."""
+
 
 class SMOKELIFT_OT_paint_strokes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
@@ -118,13 +124,6 @@ class SMOKELIFT_PT_strokes(bpy.types.Panel):
             draw_text(layout, context, text, "ERROR")
         layout.column(align=True).operator_enum("smokelift.stroke", "means")
         layout.operator("smokelift.paint_strokes", text="Show This Frame", icon="FILE_REFRESH")
-
-
-PICTURES = "element_####.exr"
-"""Names of the pictures, numbered as the frames of the clip's file."""
-
-SHOWN = "element.exr"
-"""The picture of a single frame that is shown."""
 
 
 def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:

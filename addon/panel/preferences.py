@@ -16,6 +16,25 @@ from .layout import draw_automatic
 MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
 """The manual, which the extension brings along."""
 
+FOLDER = "smokelift"
+"""Below the user's folder of presets."""
+
+SETTINGS = (
+    "quality",
+    "detail",
+    "light_mode",
+    "closed",
+    "longest_side",
+    "transfer",
+    "speed",
+    "device",
+    "use_medium",
+    "extinction",
+    "albedo",
+    "anisotropy",
+)
+"""What does not belong to one clip: no paths, no objects, no frames."""
+
 
 class SmokeliftPreferences(bpy.types.AddonPreferences):
     """The preferences and their page."""
@@ -63,26 +82,6 @@ class SMOKELIFT_OT_open_manual(bpy.types.Operator):
             self.report({"ERROR"}, "This copy of the add-on has no manual: read docs/blender.md of the source code.")
             return {"CANCELLED"}
         return bpy.ops.wm.url_open(url=MANUAL.as_uri())
-
-
-FOLDER = "smokelift"
-"""Below the user's folder of presets."""
-
-SETTINGS = (
-    "quality",
-    "detail",
-    "light_mode",
-    "closed",
-    "longest_side",
-    "transfer",
-    "speed",
-    "device",
-    "use_medium",
-    "extinction",
-    "albedo",
-    "anisotropy",
-)
-"""What does not belong to one clip: no paths, no objects, no frames."""
 
 
 class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):

@@ -13,6 +13,9 @@ from .layout import draw_doubt, draw_text
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
 
+CELLS = 0.245, 0.215, 0.18, 0.18
+"""Fractions of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
+
 
 class QualitySettings:
     """How fine the smoke is made, and on what."""
@@ -89,10 +92,6 @@ class SMOKELIFT_OT_stop_check(ActsOnSmoke, bpy.types.Operator):
 
     def act(self, _context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
         shot_check.stop()
-
-
-CELLS = 0.245, 0.215, 0.18, 0.18
-"""Fractions of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
 
 
 def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

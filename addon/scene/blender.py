@@ -16,6 +16,9 @@ PACKAGE = __package__.rpartition(".")[0]
 PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
 """Options of properties that hold a path."""
 
+TOLERANCE = 1e-5
+"""Difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make."""
+
 
 def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
     """The absolute path, without the ``..`` that Blender's relative paths begin with: so it can be compared.
@@ -97,10 +100,6 @@ def thread_options() -> list[str]:
     """Options of the engine that limit its threads; they change no result."""
     user = _user_preferences()
     return ["--threads", str(user.threads)] if user is not None and user.threads else []
-
-
-TOLERANCE = 1e-5
-"""Difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make."""
 
 
 def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:

@@ -14,6 +14,9 @@ from .smoke import scene_of
 ROUNDING = 1e-5
 """Fraction of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
 
+BOX_FRACTION = 0.9
+"""Width and height of a new box over those of the picture."""
+
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
     """The box that holds the smoke."""
@@ -113,10 +116,6 @@ def engine_to_world(smoke: bpy.types.Object) -> Matrix:
     settings = smoke.smokelift
     box = box_of(smoke) if settings.camera_mode == "SCENE" else None
     return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()
-
-
-BOX_FRACTION = 0.9
-"""Width and height of a new box over those of the picture."""
 
 
 def framed_box(scene: bpy.types.Scene) -> tuple[Vector, Vector]:

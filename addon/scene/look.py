@@ -26,7 +26,6 @@ BLACKBODY_KELVIN = 1000.0
 MIN_RATIO = 1e-3
 """Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
 
-
 _INPUTS = (
     Input("Density", "NodeSocketFloat", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
     Input(

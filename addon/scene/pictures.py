@@ -15,6 +15,14 @@ from .compositing import SINCE_5, compositor
 UNDISTORTED_BITS, FILMED_BITS = "16", "8"
 """Bits per channel of a picture that is computed anew, and of one that is shown as it was filmed."""
 
+COEFFICIENTS = {
+    "POLYNOMIAL": ("k1", "k2", "k3"),
+    "DIVISION": ("division_k1", "division_k2"),
+    "NUKE": ("nuke_k1", "nuke_k2"),
+    "BROWN": ("brown_k1", "brown_k2", "brown_k3", "brown_k4", "brown_p1", "brown_p2"),
+}
+"""Names of a lens's coefficients by its distortion model."""
+
 
 @contextmanager
 def picture_scene(
@@ -83,15 +91,6 @@ def _undistorted(
         lens.distortion_type = "UNDISTORT"
     tree.links.new(pictures, lens.inputs["Image"])
     return lens.outputs["Image"]
-
-
-COEFFICIENTS = {
-    "POLYNOMIAL": ("k1", "k2", "k3"),
-    "DIVISION": ("division_k1", "division_k2"),
-    "NUKE": ("nuke_k1", "nuke_k2"),
-    "BROWN": ("brown_k1", "brown_k2", "brown_k3", "brown_k4", "brown_p1", "brown_p2"),
-}
-"""Names of a lens's coefficients by its distortion model."""
 
 
 def is_distorted(clip: bpy.types.MovieClip) -> bool:
