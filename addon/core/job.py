@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from .contract import BLENDERS, CANCELLED, PLATFORMS, ZIP_FILE
-from .sentences import sentence
+from .sentences import sentence, stopped
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 
@@ -281,7 +281,7 @@ class Job:
         if status == 0:
             self.outcome = "done"
         elif self._kill_at is not None or status == CANCELLED:
-            self.outcome, self.sentence = "cancelled", f"Cancelled; finished frames stay: {self.done}."
+            self.outcome, self.sentence = "cancelled", stopped(self.done)
         else:
             self.outcome = "failed"
             self.sentence = self._error or self._failure_reason(status)

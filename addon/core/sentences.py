@@ -7,7 +7,7 @@ SENTENCES = {
     "reconstructed": "Match to the clip: {psnr}. {frames} in {seconds}.",
     "written": "{frames} in {seconds}.",
     "continued": "{frames} in {seconds}, {simulated} of them simulated.",
-    "looped": "{frames} in {seconds}, which repeat.",
+    "looped": "A loop of {frames}, made in {seconds}.",
     "proxy": "The proxy of {frames} is made.",
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
@@ -76,6 +76,11 @@ def sentence(message: Mapping[str, Any], before: int = 0) -> str:
     if "psnr" in figures:
         figures["psnr"] = f"{match(figures['psnr'])} ({figures['psnr']:.1f} dB)"
     return words.format(**figures)
+
+
+def stopped(done: int) -> str:
+    """What a run that was cancelled leaves, by the number of its finished frames."""
+    return f"Cancelled; finished frames stay: {done}." if done else "Cancelled before its first frame was finished."
 
 
 def match(psnr: float) -> str:

@@ -8,6 +8,7 @@ import bpy
 import bpy.utils.previews
 
 from ..core.job import ENDED, EngineMissingError, Job, engine_command
+from ..core.sentences import stopped
 from ..core.take import Take, TakeError
 from ..scene import volume
 from ..scene.blender import redraw, thread_options
@@ -132,7 +133,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if row.outcome == "waiting" and find_smoke(row.smoke_uid) is not None:  # a deleted one may come back
                 Take(Path(row.take)).remove_unless_begun()
             if row.outcome not in ENDED:
-                row.outcome, row.sentence = "cancelled", f"Stopped; finished frames stay: {row.done}."
+                row.outcome, row.sentence = "cancelled", stopped(row.done)
         bpy.utils.previews.remove(self._thumbnails)
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)

@@ -7,7 +7,7 @@ from string import Formatter
 
 import pytest
 
-from addon.core.sentences import SENTENCES, match, sentence, spent
+from addon.core.sentences import SENTENCES, match, sentence, spent, stopped
 from smokelift.report.sentences import SENTENCES as OWN
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "tools"))
@@ -59,7 +59,7 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
         ),
         (
             {"text": "", "kind": "looped", "figures": {"frames": 1, "seconds": 9, "first": 1, "last": 2}},
-            "1 frame in 9 s, which repeat.",
+            "A loop of 1 frame, made in 9 s.",
         ),
         (
             {"text": "", "kind": "cut", "figures": {"before": 4, "after": 5, "first": 0, "last": 9}},
@@ -87,3 +87,8 @@ def test_a_match_in_words(psnr, said) -> None:
 def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
     message = {"text": "", "kind": "dissolving smoke", "figures": {"frame": 70, "room": 8.0}}
     assert sentence(message, before=39).startswith("From frame 109 on")
+
+
+def test_what_a_cancelled_run_leaves_is_said() -> None:
+    assert stopped(7) == "Cancelled; finished frames stay: 7."
+    assert "0" not in stopped(0)
