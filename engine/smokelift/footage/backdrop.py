@@ -43,7 +43,8 @@ MOSTLY = 0.5
 """Mean share of the picture in one colour from which on that colour is no texture that passes by."""
 
 MIN_KNOWN = 0.1
-"""Smallest share of a picture that must be seen clear: public clips before one show .2 and more (docs/clips.md)."""
+"""Smallest fraction of what no mask hides that must be seen clear: public clips before a picture show .2 and more
+(docs/clips.md)."""
 
 SEEN_OFTEN = 0.15
 """Share of the blocks of all frames in one colour from which on that colour is no texture that passes by. Public clips
@@ -145,7 +146,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             again: Any = given_plates(behind, camera, quiet)
             plates = replace(again, noise=plates.noise)
         found = Backdrop("alpha" if grey else "given", quiet, plates, behind, motion=motion)
-    shown = uncovered(found.plates, found.clip)
+    shown = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
     found = replace(found, clip=cleared(found.clip, shown), plates=shown)
     if background is None or background.strokes is None or grey is not None:
         return found
@@ -215,8 +216,10 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     colour, objects = found.colour, found.objects
     source: Source = "colour"
     if colour is None:
-        plate = _picture(clip, part, white)
-        if plate.confidence.mean() >= MIN_KNOWN:
+        # what a mask hides is no smoke: where it never changes, it is background
+        shown = part.with_still()
+        plate = _picture(clip, shown, white)
+        if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
             return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
         # fog drifts over all of the file: treat it as filmed before black
         colour, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"

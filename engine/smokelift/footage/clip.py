@@ -180,8 +180,11 @@ class Clip:
         return _kept(self._stored, LINEAR_BYTES, self._sound, n)
 
     def seen(self, n: int, width: int, height: int) -> Seen | None:
-        """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask."""
-        return None if self.mask is None else self.mask.seen(self.numbers[n], width, height)
+        """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask.
+
+        A changed clip asks for frames of its file before and after its own, too: below 0 and from its length on.
+        """
+        return None if self.mask is None else self.mask.seen(self.numbers.start + n, width, height)
 
     def as_seen(self, n: int, picture: Picture) -> Picture:
         """Return a picture (rows, columns, 3) of frame ``n`` in which what is hidden is not a number."""

@@ -153,7 +153,7 @@ def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
     known = np.ones((height, width), np.float32)
 
     def of(frame: int) -> Plate:
-        return Plate(area_average(plates.frame(clip.numbers[frame]), width, height), known, NO_NOISE)
+        return Plate(area_average(plates.frame(clip.numbers.start + frame), width, height), known, NO_NOISE)
 
     silent = ChangingPlate(of, NO_NOISE, plates.files)
     return replace(silent, noise=noise_about(*_noise_samples(silent, clip)))
@@ -227,14 +227,14 @@ def shown_behind(clip: Clip, plates: Plates, visible: Callable[[int, Picture], P
 
 
 def uncovered(plates: Plates, clip: Clip) -> Plates:
-    """Return backgrounds that show what the clip itself shows where a mask hides all frames, if nothing else tells.
+    """Return estimated backgrounds that show what the clip itself shows where a mask hides all frames.
 
     That is no smoke, so it may stand behind the result.
     """
     if clip.mask is None or not isinstance(plates, Plate):
         return plates
     numbers = clip.spread(UNCOVERED)
-    hidden = plates.confidence == 0
+    hidden = np.ones(plates.confidence.shape, np.bool_)
     for number in numbers:
         seen = clip.seen(number, *clip.size)
         hidden = hidden if seen is None else hidden & ~seen

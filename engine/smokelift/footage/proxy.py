@@ -52,6 +52,8 @@ class Proxy:
         First and last frame of the file that the clip uses.
     pictures : (frames, rows, columns, 3)
         Linear; what a mask hides is continued from around it.
+    filmed : (frames, rows, columns, 3)
+        The same with what a mask hides.
     seen : (frames, rows, columns) bool
         Pixels that no mask hides.
     blocks
@@ -64,6 +66,7 @@ class Proxy:
     numbers: tuple[int, ...]
     clip: tuple[int, int]
     pictures: Picture
+    filmed: Picture
     seen: NDArray[np.bool_]
     blocks: Mapping[int, tuple[StoredPicture, Seen | None]]
     scale: float
@@ -73,7 +76,7 @@ class Proxy:
         """Read the frames, ``beyond`` the part in use too; ClipError is raised if one of that part cannot be read."""
         numbers = clip.numbers
         (columns, rows), whole = reduced_size(*clip.size, PROXY_SIDE), clip.whole()
-        pictures, seen, blocks = {}, [], {}
+        pictures, filmed, seen, blocks = {}, [], [], {}
         own = [numbers[n] for n in clip.spread(FRAMES)]
         noisy = {own[n] for n in np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int)}
         for number in sorted({*own} | set(whole.spread(FRAMES) if beyond else ())):
@@ -81,6 +84,8 @@ class Proxy:
             of, n = (clip, numbers.index(number)) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
                 picture = of.stored(n)
+                if clip.mask is not None:
+                    filmed.append(of.as_filmed().stored(n).averaged(columns, rows))
                 pictures[number] = picture.averaged(columns, rows)
                 shown = of.seen(n, columns, rows)
                 seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
@@ -89,7 +94,8 @@ class Proxy:
                     blocks[number] = picture.cut(some_blocks), None if hides is None else some_blocks(hides)
         scale = max(clip.size) / max(columns, rows)
         whole_file = np.stack(list(pictures.values()))
-        return Proxy(tuple(pictures), (numbers[0], numbers[-1]), whole_file, np.stack(seen), blocks, scale)
+        bare = np.stack(filmed) if filmed else whole_file
+        return Proxy(tuple(pictures), (numbers[0], numbers[-1]), whole_file, bare, np.stack(seen), blocks, scale)
 
     @cached_property
     def encoded(self) -> Picture:
@@ -119,7 +125,7 @@ class Proxy:
         At a cut most of the picture changes at once and for good, while little changes in as many frames beside it: on
         the clip's side, for beyond a cut anything may be; on both sides of one within the clip, which smoke may fill.
         """
-        tiny = [small(picture) for picture in self.pictures]
+        tiny = [small(picture) for picture in self.filmed]
         first, last, within = self.numbers[0], self.numbers[-1], None
         for n, (before, after) in enumerate(pairwise(self.numbers)):
             if _alike(tiny[n], tiny[n + 1]) >= SAME_SHOT:
@@ -150,10 +156,20 @@ class Proxy:
         sides = [side for side in (one, other) if side is not None] or [0.0]
         return sides[0], sides[-1]
 
+    def with_still(self) -> Proxy:
+        """Return the frames with what a mask hides, and never changes, as it was filmed: there is background."""
+        if self.seen.all():
+            return self
+        encoded = linear_to_srgb(self.filmed)
+        still = (np.abs(encoded - np.median(encoded, axis=0)) < MAX_STILL_CHANGE).all((0, -1))
+        pictures = np.where((still & ~self.seen)[..., None], self.filmed, self.pictures)
+        return replace(self, pictures=pictures, seen=self.seen | still)
+
     def only(self, which: NDArray[np.intp]) -> Proxy:
         """Return some of the frames, by their indices here."""
         numbers = tuple(self.numbers[n] for n in which)
-        return replace(self, numbers=numbers, pictures=self.pictures[which], seen=self.seen[which])
+        pictures, filmed = self.pictures[which], self.filmed[which]
+        return replace(self, numbers=numbers, pictures=pictures, filmed=filmed, seen=self.seen[which])
 
     @cached_property
     def evened(self) -> tuple[Proxy, Picture]:

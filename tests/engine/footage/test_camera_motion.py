@@ -71,7 +71,7 @@ def shifts(down: np.ndarray, right: np.ndarray) -> tuple[Similarity, ...]:
 def found(pictures: np.ndarray) -> CameraMotion | str | None:
     """Return the motion that is found in pictures."""
     seen = np.ones(pictures.shape[:3], np.bool_)
-    return find_motion(Proxy(tuple(range(len(pictures))), (0, len(pictures) - 1), pictures, seen, {}, 1.0))
+    return find_motion(Proxy(tuple(range(len(pictures))), (0, len(pictures) - 1), pictures, pictures, seen, {}, 1.0))
 
 
 def pixels_off(motion: CameraMotion, truth: tuple[Similarity, ...]) -> float:
