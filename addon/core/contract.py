@@ -29,6 +29,9 @@ EXPORT_FILE = "export.json"
 ASSET_FILE = "smoke.blend"
 """File in a folder with an export: the add-on's own, which the engine leaves alone."""
 
+MOVING_CAMERA = "The camera moves, so what is behind the smoke cannot be found"
+"""Beginning of the sentence that refuses a clip whose frames cannot be registered."""
+
 QUALITIES = ("draft", "balanced", "fine", "final")
 """How much of the clip's detail is kept."""
 

@@ -20,7 +20,7 @@ from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, u
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, refuse
-from .editors import open_tab, show_mask
+from .editors import open_tab, show_clip
 from .layout import draw_text
 
 UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
@@ -284,7 +284,18 @@ class SMOKELIFT_OT_new_mask(ActsOnSmoke, RequiresClip, bpy.types.Operator):
         if not first <= context.scene.frame_current <= last:
             context.scene.frame_set(first)  # what is drawn on a frame that is not used helps little
         if not bpy.app.background:
-            open_tab(show_mask(settings.clip, settings.drawn_mask))
+            open_tab(show_clip(settings.clip, settings.drawn_mask))
+
+
+class SMOKELIFT_OT_track_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+    """Open the clip in the Clip Editor, where its camera is tracked, or the picture stabilized (Stabilization)"""
+
+    bl_idname = "smokelift.track_clip"
+    bl_label = "Track or Stabilize"
+
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        if not bpy.app.background:
+            show_clip(smoke.smokelift.clip)
 
 
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -358,6 +369,7 @@ _CLASSES = (
     SMOKELIFT_OT_plate_from_frame,
     SMOKELIFT_OT_clear_plate_frames,
     SMOKELIFT_OT_new_mask,
+    SMOKELIFT_OT_track_clip,
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -77,11 +77,13 @@ def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
     return area
 
 
-def show_mask(clip: bpy.types.MovieClip, mask: bpy.types.Mask) -> bpy.types.Area:
-    """Show a clip in a Clip Editor, with a mask to be drawn over it."""
+def show_clip(clip: bpy.types.MovieClip, mask: bpy.types.Mask | None = None) -> bpy.types.Area:
+    """Show a clip in a Clip Editor, with a mask to be drawn over it, or to be tracked and stabilized."""
     area = _editor("CLIP_EDITOR")
     space = area.spaces.active
-    space.clip, space.mode, space.mask = clip, "MASK", mask
+    space.clip, space.mode = clip, "TRACKING" if mask is None else "MASK"
+    if mask is not None:
+        space.mask = mask
     bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     return area
 

@@ -6,6 +6,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ..core.contract import MOVING_CAMERA
 from ..core.sentences import duration
 from ..result.side_job import writing_job
 from ..scene.smoke import active_smoke
@@ -54,6 +55,13 @@ def draw_doubt(layout: bpy.types.UILayout, context: bpy.types.Context, kind: str
         smoke = active_smoke(context.scene)
         drawn = smoke is not None and smoke.smokelift.drawn_mask is not None
         layout.operator("smokelift.new_mask", text="Edit Mask" if drawn else "New Mask", icon="MOD_MASK")
+
+
+def draw_failure(layout: bpy.types.UILayout, context: bpy.types.Context, words: str) -> None:
+    """Why a check or a run ended without a result, and the button that helps."""
+    draw_text(layout, context, words, "ERROR")
+    if MOVING_CAMERA in words:
+        layout.operator("smokelift.track_clip", icon="TRACKER")
 
 
 def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:

@@ -8,7 +8,7 @@ from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
 from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed
-from .layout import draw_doubt, draw_text
+from .layout import draw_doubt, draw_failure, draw_text
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -127,7 +127,7 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         layout.operator("smokelift.check", icon="VIEWZOOM")
         shot_check.check_soon(context)
     elif state.check_error:
-        draw_text(layout, context, state.check_error, "ERROR")
+        draw_failure(layout, context, state.check_error)
     elif not done:
         seconds = shot_check.check_job.seconds
         text = iface_("Reading the clip: {:s}").format(duration(seconds)) if seconds else iface_("Reading the clip")

@@ -14,7 +14,7 @@ from ..scene.blender import ShotError
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import active_smoke, find_smoke
 from .common import ActsOnSmoke, RequiresClip, refuse
-from .layout import draw_doubt, draw_progress, draw_text
+from .layout import draw_doubt, draw_failure, draw_progress, draw_text
 from .quality_panel import SEEDS
 
 
@@ -144,8 +144,10 @@ def _draw_job(
         box.label(text="Queued", icon="SORTTIME")
     elif row.outcome == "running":
         draw_progress(box, row)
+    elif row.outcome == "failed":
+        draw_failure(box, context, row.sentence)
     else:
-        draw_text(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
+        draw_text(box, context, row.sentence, "INFO")
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
     if row.outcome in ENDED:

@@ -19,6 +19,7 @@ from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.commands import continue_, loop, retime
 from smokelift.checks import Source
 from smokelift.direct import new_sequence, playback
+from smokelift.footage.backdrop import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import numbered_pictures
 from smokelift.footage.images import READABLE
@@ -28,6 +29,10 @@ from smokelift.output.vdb import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 from smokelift_command import BAD_INPUT, CANCELLED, DONE
+
+
+def test_the_refusal_of_a_camera_that_travels_is_the_engines() -> None:
+    assert MOVING_CAMERA.startswith(contract.MOVING_CAMERA)
 
 
 def test_names_are_the_engines() -> None:

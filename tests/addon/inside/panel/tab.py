@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import pytest
 
-from addon.core.contract import QUALITIES
+from addon.core.contract import MOVING_CAMERA, QUALITIES
 from addon.result import command_line, shot_check
 from addon.scene import volume
 from addon.scene.clip import clip_table
@@ -203,6 +203,20 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     smoke(shot).smokelift.albedo = 0.5
     state.check_smoke = smoke(shot).session_uid
     assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+
+
+def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot) -> None:
+    """In the check that ends with it and below the run, and below no other failure."""
+    state = bpy.context.window_manager.smokelift
+    refused = f"{MOVING_CAMERA} from the clip. Stabilize the clip."
+    state.check_smoke, state.check_error = smoke(shot).session_uid, refused
+    row = state.jobs.add()
+    row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, "failed", refused
+    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    assert texts.count("[track_clip]") == 2
+    assert bpy.ops.smokelift.track_clip() == {"FINISHED"}
+    state.check_error = row.sentence = "The box is flat."
+    assert "[track_clip]" not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
 
 
 def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
