@@ -49,17 +49,17 @@ MIN_CONTACT_SHARE = 0.6
 """Smallest share of the frames that show a floor contact where there is one."""
 
 CONTACT_TRUST = 0.7
-"""Share of a floor contact's depth that is believed, at most: smoke that begins above the floor shows one as well."""
+"""Weight of the depth that a floor contact shows, at most: smoke that begins above the floor shows one as well."""
 
 FAR_BEHIND = 1.5
 """Distance behind the middle, in `BOX_DEVIATION`, from which a contact is more likely smoke that begins above the
-floor: the standard deviation of the Gaussian by which the share that is believed falls."""
+floor: the standard deviation of the Gaussian by which the weight falls."""
 
 MIN_CONTACT_TRUST = 0.2
-"""Smallest share that is believed of a contact which shows the place: less leaves about what the box does."""
+"""Smallest weight of a contact that shows the place: less leaves about what the box does."""
 
 LEANING = 0.2
-"""Share of the box's variance that stays of a column whose base is known: it may lean."""
+"""Fraction of the box's variance that stays of a column whose base is known: it may lean."""
 
 WIDENING = 0.15
 """Growth of a column's radius per metre of height: it takes in air (docs/experiments/density-axis.md)."""
@@ -137,10 +137,10 @@ def estimate_axis(
     if not columns:
         return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(box))
     # what drifts across the picture drifts in depth as well
-    shares = [box**2 / (box**2 + column.drifts**2) for column in columns]
-    trusts = [(1 - LEANING) * column.trust * share for column, share in zip(columns, shares, strict=True)]
+    weights = [box**2 / (box**2 + column.drifts**2) for column in columns]
+    trusts = [(1 - LEANING) * column.trust * weight for column, weight in zip(columns, weights, strict=True)]
     error = box * np.sqrt(1 - np.average(np.mean(trusts, 0), weights=total))
-    axis = _axis(columns, [column.base * share for column, share in zip(columns, shares, strict=True)], mean)
+    axis = _axis(columns, [column.base * weight for column, weight in zip(columns, weights, strict=True)], mean)
     depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
     if cue == "box" and columns[0].trust >= MIN_CONTACT_TRUST:
         cue = "floor contact"
@@ -160,7 +160,7 @@ class _Column:
     middles, widths, drifts : (n,)
         By height: lateral place (m) of its axis, its lateral standard deviation, distance of its axis from its base.
     trust
-        Share that is believed of what shows the base.
+        Weight of what shows the base.
     """
 
     base: float
