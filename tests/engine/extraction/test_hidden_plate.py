@@ -79,6 +79,16 @@ def test_what_no_mixture_with_the_continuation_explains_is_the_plate() -> None:
     assert off(better, behind) < 0.5 * off(plate, behind)
 
 
+def test_a_post_goes_on_behind_smoke_from_above_and_below() -> None:
+    """A bright post before a dark sky, which is what lies on its sides."""
+    behind = np.full((ROWS, COLUMNS, 3), 0.03, "f4") * (1 + 0.2 * wall() / wall().mean())
+    behind[:, 88:104] = 0.5, 0.4, 0.25
+    plate = replace(continued(behind), errors=0.01 * np.eye(3, dtype="f4"))
+    plate.image[plate.confidence < 0.5] = 0.03
+    better = plate_in_turn(filmed(behind, list(np.linspace(70, 122, FRAMES)), 3.0), plate, SOURCE)
+    assert off(better, behind) < 0.5 * off(plate, behind)
+
+
 def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
     behind = wall()
     plate = continued(behind)
