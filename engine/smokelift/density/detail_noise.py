@@ -23,12 +23,12 @@ MAX_NODE_DISTANCE = 2.0
 
 MIN_NODE_DISTANCE = 3.5
 """Smallest distance (voxels) between nodes of the finest octave. Finer ones flicker
-(docs/experiments/stretched-noise.md), and where their detail is made to last the front loses
+(docs/experiments/every-view.md), and where their detail is made to last the front loses
 (docs/experiments/every-view.md)."""
 
 STRETCH = 0.2
 """Standard deviation of each octave's motion, over the distance between its nodes: more draws the smoke out into straws
-(docs/experiments/stretched-noise.md)."""
+(docs/experiments/every-view.md)."""
 
 LATTICE = 32
 """Nodes along each side of a lattice, which repeats."""

@@ -11,7 +11,7 @@ shows. The spread of the smoke's row is right for what rises as a column. The wi
 (inflated outlines: Igarashi, Matsuoka and Tanaka 1999) is right for what is round and longer than thick in any
 direction. Over four scenes with their axis known the mean was better in new views than either, by 0.4 to 0.9 dB. In
 true smoke dark rays are longer than thin ones, by which a smooth answer gains nothing
-(docs/experiments/ray-thickness.md).
+(docs/experiments/density-profile.md).
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
 density can have, so a ray's middle is moved along it until most of the profile is inside too

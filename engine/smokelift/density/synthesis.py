@@ -42,7 +42,7 @@ SMOOTH_TOLERANCE = 0.02
 LOW_PASS = 0.75
 """Standard deviation of a blur, in those of the smoke's width. Noisy and carried smoke, blurred, is the smooth answer,
 blurred: lobes are made up, on any grid, and the smoke of each stays where it is
-(docs/experiments/guided-simulation.md, docs/experiments/made-up-detail.md)."""
+(docs/experiments/temporal-prior.md, docs/experiments/made-up-detail.md)."""
 
 LARGEST_GAIN = 5.0
 """Bound of the factor that gives noisy smoke the smooth answer's low pass."""

@@ -7,7 +7,7 @@ frame to frame (docs/experiments/temporal-prior.md).
 
 `GuidedSimulation`, for smoke with made-up detail, is a simulation that the clip guides: the detail of the frame before
 moves on with the flow, and the smooth answer of the new picture says how much smoke is where. A velocity of its own,
-which nothing guides along the rays, makes more lobes there and worse jets (docs/experiments/simulated-carry.md).
+which nothing guides along the rays, makes more lobes there and worse jets (docs/experiments/wander.md).
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from smokelift.transport import Array, advect, faces_in
 
 BLUR_VOXELS = 2.0
 """Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets. This and the three
-ramps below: docs/experiments/velocity-weights.md."""
+ramps below: docs/experiments/velocity-solver.md."""
 
 COHERENCE = (0.4, 0.6)
 """Mean residual over mean magnitude: nothing is an inlet below the first, everything that stands out is one above the

@@ -35,19 +35,19 @@ COARSEST_SIDE, MIN_SIDE = 30, 8
 second. Motion of several voxels is found there (docs/experiments/velocity-solver.md)."""
 
 IRROTATIONAL = 0.05
-"""Weight of vorticity where there is no smoke that could show it (docs/experiments/velocity-weights.md)."""
+"""Weight of vorticity where there is no smoke that could show it (docs/experiments/velocity-solver.md)."""
 
 KINETIC = 0.003
 """Weight of what departs from the centre. It only holds what nothing else does
-(docs/experiments/velocity-weights.md)."""
+(docs/experiments/velocity-solver.md)."""
 
 UNEXPLAINED, MIN_UNEXPLAINED = 0.25, 0.04
 """Share of the change, left unexplained by the centre, at which the weights apply unscaled: they grow in inverse
-proportion to that share, down to the second one (docs/experiments/velocity-weights.md)."""
+proportion to that share, down to the second one (docs/experiments/velocity-solver.md)."""
 
 WORTHLESS = 0.5
 """Share of the change left unexplained from which a prediction is not used: after a cut, say, or a gust
-(docs/experiments/velocity-weights.md)."""
+(docs/experiments/velocity-solver.md)."""
 
 MAX_INCREMENT = 1.0
 """Voxels of the grid at hand. A linearisation of the density holds no further, so the increment is clamped

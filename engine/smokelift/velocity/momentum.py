@@ -27,11 +27,11 @@ from smokelift.velocity.linearisation import Linearisation, directional_derivati
 
 MOMENTUM = 0.8
 """Share of the fitted momentum that an estimate without a prediction starts from. Below one, because the fit is to
-noise as well (docs/experiments/velocity-weights.md)."""
+noise as well (docs/experiments/velocity-solver.md)."""
 
 BRIGHTENING = 0.5
 """Without a prediction, overall brightening is allowed only if it cuts the unexplained change to this share. Flicker
-does; smoke that enters does not (docs/experiments/velocity-weights.md)."""
+does; smoke that enters does not (docs/experiments/velocity-solver.md)."""
 
 RIDGE = 1e-3
 """Ridge over the diagonal of the normal equations: what the smoke does not determine stays small."""

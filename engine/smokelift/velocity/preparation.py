@@ -6,7 +6,7 @@ smoke (Donoho and Johnstone 1994). It chooses the blur: gradients have to stand 
 
 Contrast: any function of a density is carried along just like the density, so the one to follow is free to choose. With
 the density itself the thick smoke at the base of a plume decides everything. With its power of 3/4 thin smoke counts as
-well (docs/experiments/velocity-weights.md). Noise would count as well, so noisy densities are followed as they are. So
+well (docs/experiments/velocity-solver.md). Noise would count as well, so noisy densities are followed as they are. So
 are smooth ones.
 """
 
@@ -27,11 +27,11 @@ BLUR = 0.5
 
 NOISE = 0.35
 """Allowed noise in the difference of two densities, divided by the root mean square gradient: voxels of motion
-(docs/experiments/velocity-weights.md)."""
+(docs/experiments/velocity-solver.md)."""
 
 SMOOTH = 0.045
 """Noise in the same unit below which densities are smooth already, and neither blurred nor compressed
-(docs/experiments/velocity-weights.md)."""
+(docs/experiments/velocity-solver.md)."""
 
 NOISE_WIDTHS = (1.0, 1.5, 2.0)
 """Standard deviations (voxels) to choose from where the usual blur leaves too much noise."""
