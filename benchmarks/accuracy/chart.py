@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.accuracy.label_placement import place_labels
 from benchmarks.accuracy.measured_runs import ERRORS, Run, Runs, read_runs
 
 SECONDS = "seconds"
@@ -24,11 +23,12 @@ PANELS = ((SECONDS, "view_error"), ("view_error", "patches"))
 
 NAMES = {SECONDS: "processor seconds a frame", **ERRORS}
 
-LEADER = 18.0
-"""Pixels between a point and its label from which on a line joins them."""
+DIRECTIONS = [(round(np.cos(turn), 3), round(np.sin(turn), 3)) for turn in np.pi * np.arange(16) / 8]
+DISTANCES = (10, 16, 26, 40, 60, 90, 130)
+"""Where the label of a point is tried: directions from it, and how far away its corner lies (pixels)."""
 
-MARGIN = 2.0
-"""Pixels between two labels at least, on either side."""
+MARKER = 12.0
+"""Size of a point, which no label hides (pixels)."""
 
 EDGE = 40.0
 """Pixels from the right edge at which a level that has no time gets its label."""
@@ -124,43 +124,29 @@ def _series(axes: Any, name: str, placed: list[tuple[Run, tuple[float, float]]],
 
 
 def _label(axes: Any, runs: Runs, panel: tuple[str, str]) -> None:
-    """Write beside every point what it is, where it hides no other label and as few lines as can be."""
-    from matplotlib.transforms import IdentityTransform
+    """Write beside every point what it is, at the nearest place where it lies over no other label."""
+    from matplotlib.transforms import Bbox
 
-    pixels = IdentityTransform()
     window = axes.get_window_extent()
-    points, texts = [], []
+    placed = []
     for run in runs.runs:
         if (at := _at(run, panel)) is not None:
-            points.append(axes.transData.transform(at))
+            placed.append((run.label, axes.transData.transform(at)))
         elif panel[1] in run.errors:  # its level is a line
-            points.append((window.x1 - EDGE, axes.transData.transform((1, run.errors[panel[1]]))[1]))
-        else:
-            continue
-        texts.append(axes.text(0, 0, run.label, fontsize=8, va="bottom", transform=pixels))
-    extents = [text.get_window_extent() for text in texts]
-    sizes = np.array([[extent.width, extent.height] for extent in extents]) + 2 * MARGIN
-    bounds = np.array([window.x0, window.y0, window.x1, window.y1])
-    corners = place_labels(np.array(points), sizes, _drawn(axes), bounds)
-    for text, point, corner, size in zip(texts, points, corners, sizes, strict=True):
-        text.set_position(corner + MARGIN)
-        end = np.clip(point, corner, corner + size)
-        if np.linalg.norm(end - point) > LEADER:
-            axes.plot(*zip(point, end, strict=True), color="black", linewidth=0.4, transform=pixels)
-
-
-def _drawn(axes: Any) -> Any:
-    """Boxes (boxes, 4) of some pixels along every line of a panel, its markers among them."""
-    step, half = 6.0, 4.0
-    found = []
-    for line in axes.lines:
-        path = line.get_transform().transform(np.column_stack(line.get_data()).astype(float))
-        for start, end in pairwise(path):
-            count = int(np.linalg.norm(end - start) / step) + 1
-            found.append(start + np.linspace(0, 1, count)[:, None] * (end - start))
-        found.append(path)
-    middles = np.concatenate(found) if found else np.zeros((0, 2))
-    return np.concatenate([middles - half, middles + half], axis=-1)
+            placed.append((run.label, (window.x1 - EDGE, axes.transData.transform((1, run.errors[panel[1]]))[1])))
+    taken = [Bbox.from_bounds(x - MARKER / 2, y - MARKER / 2, MARKER, MARKER) for _, (x, y) in placed]
+    for label, point in placed:
+        text = axes.text(0, 0, label, fontsize=8, transform=None)
+        for distance, (x, y) in product(DISTANCES, DIRECTIONS):
+            corner = np.add(point, (distance * x, distance * y))
+            text.set(position=corner, ha="left" if x > 0 else "right", va="bottom" if y > 0 else "top")
+            box = text.get_window_extent().padded(2)
+            inside = window.x0 < box.x0 and box.x1 < window.x1 and window.y0 < box.y0 and box.y1 < window.y1
+            if inside and not any(box.overlaps(other) for other in taken):
+                break
+        taken.append(box)
+        if distance > DISTANCES[1]:
+            axes.plot(*zip(point, corner, strict=True), color="black", linewidth=0.4, transform=None)
 
 
 def _readable(axis: Any, values: list[float], room: float) -> None:
