@@ -3,46 +3,44 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from ctypes.util import find_library
+from multiprocessing import get_context
 from pathlib import Path
+from typing import TypeVar
 
-import smokelift
-
-
-def run_module(module: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a module of this package with arguments, and keep what it prints."""
-    return subprocess.run(
-        [sys.executable, "-m", module, *arguments],
-        env=environment(),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-    )
+Made = TypeVar("Made")
 
 
-def environment() -> dict[str, str]:
-    """Return the variables of the process: it finds this package and smokelift, and Dr.Jit finds its compiler."""
-    homes = [str(Path(__file__).parents[1]), str(Path(smokelift.__file__).parents[1])]
-    paths = [*homes, *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**_llvm(), **os.environ, "PYTHONPATH": os.pathsep.join(paths), "JAX_PLATFORMS": "cpu"}
+def apart(work: Callable[..., Made], *arguments: object) -> Made | str:
+    """Return what a function returns in a process of its own, or one sentence that says why there is nothing.
 
-
-def why_it_ended(ended: subprocess.CompletedProcess[str]) -> str:
-    """Return one sentence about a process that left no result."""
-    status = ended.returncode
-    if status == -signal.SIGKILL:
-        return "Killed, most likely for lack of memory."
-    if status < 0:
-        return f"Crashed with {signal.Signals(-status).name}."
-    return ((ended.stderr or "").strip().splitlines() or [f"Ended with status {status}."])[-1]
+    What the process prints is not shown.
+    """
+    for name, value in _llvm().items():
+        os.environ.setdefault(name, value)
+    with ProcessPoolExecutor(1, get_context("spawn"), _be_silent) as process:
+        try:
+            return process.submit(work, *arguments).result()
+        except BrokenProcessPool:
+            return "Crashed, or was killed, most likely for lack of memory."
+        except MemoryError as error:
+            return str(error) or "Out of memory."
+        except Exception as error:  # whatever a framework raises, the others go on
+            return (str(error).strip().splitlines() or [type(error).__name__])[-1]
 
 
 def finds_llvm() -> bool:
     """Whether Dr.Jit finds its compiler; without one it aborts the process."""
-    return "DRJIT_LIBLLVM_PATH" in environment() or find_library("LLVM") is not None
+    return "DRJIT_LIBLLVM_PATH" in {**os.environ, **_llvm()} or find_library("LLVM") is not None
+
+
+def _be_silent() -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
 
 
 def _llvm() -> dict[str, str]:

@@ -13,10 +13,11 @@ import numpy as np
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
 
+from benchmarks.accuracy import worker
 from benchmarks.accuracy.runs import billboard_depth, run_name, run_views
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.baked import BLACK
-from benchmarks.process import run_module
+from benchmarks.process import apart
 from smokelift import Scene
 from smokelift.evaluation import metrics
 from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
@@ -59,10 +60,9 @@ def reconstructed(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
     done = folder / "run.json"
     if not done.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        span = str(known.frames[0]), str(known.frames[-1])
-        ended = run_module("benchmarks.accuracy.worker", str(known.scene_path), run, *span, str(folder))
-        if ended.returncode != 0:
-            sys.exit(f"{run} of {known.name} failed with status {ended.returncode}:\n{ended.stderr}")
+        span = known.frames[0], known.frames[-1]
+        if failure := apart(worker.reconstruct, known.scene_path, run, span, folder):
+            sys.exit(f"{run} of {known.name} failed: {failure}")
     found: dict[str, Any] = json.loads(done.read_text())
     return found
 

@@ -1,9 +1,5 @@
 """One run of the accuracy benchmark in a process of its own, so that its peak of memory is its own.
 
-    python -m benchmarks.accuracy.worker scene.toml RUN FIRST LAST OUT
-
-reads the clip's frames FIRST to LAST (and those of further views that RUN names). It writes OUT/0001.npz, ... (density,
-and the velocity at voxel centers in m/s if the run has one), OUT/scene.toml with what was estimated, and OUT/run.json.
 Only the reconstruction is timed, from decoding the clip to OpenVDB files on disk, not the writing of the arrays. Times
 are the processor's, over all cores, so that other work on the machine changes none.
 """
@@ -12,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import sys
 import tempfile
 import time
 from dataclasses import replace
@@ -26,16 +21,19 @@ from smokelift import Clip, Reconstruction, Scene, Settings, prepare_shot
 from smokelift.render import Volume
 
 
-def main() -> None:
-    """Do the run that the command line names."""
-    scene_path, run, first, last, out = (Path(sys.argv[1]), *sys.argv[2:5], Path(sys.argv[5]))
+def reconstruct(scene_path: Path, run: str, frames: tuple[int, int], out: Path) -> None:
+    """Reconstruct a clip's frames from the first to the last, with the further views that a run names, into a folder.
+
+    It gets 0001.npz, ... (density, and the velocity at voxel centers in m/s if the run has one), scene.toml with what
+    was estimated, and run.json.
+    """
     scene = Scene.load(scene_path)
     if scene.clip is None:
         raise ValueError(f"{scene_path}: has no [clip].")
-    source = replace(scene.clip, frames=(int(first), int(last)))
+    source = replace(scene.clip, frames=frames)
     settings = Settings.preset() if run == SMEAR else run_settings(run)
     with tempfile.TemporaryDirectory() as folder, Clip.open(source) as clip:
-        views = tuple(further_view(name, scene_path, int(last), Path(folder)) for name in run_views(run))
+        views = tuple(further_view(name, scene_path, frames[1], Path(folder)) for name in run_views(run))
         scene = replace(scene, views=views)
         shot = prepare_shot(clip, scene, settings)
         shot.scene.save(out / "scene.toml")
@@ -70,7 +68,3 @@ def main() -> None:
         "method": "baseline" if run == SMEAR else settings.method,
     }
     (out / "run.json").write_text(json.dumps(result) + "\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -135,7 +135,7 @@ def main() -> None:
                 with_grid(known, shape).save(folder / "scene.toml")
                 path = str(folder / "scene.toml")
                 job = Job(path, shape, options.quality, options.detail, options.frames, options.clock)
-                runs.append(run_apart(job, folder))
+                runs.append(run_apart(job))
                 print(line(_cells(runs[-1])), flush=True)
     print("", *laws(runs), sep="\n")
 

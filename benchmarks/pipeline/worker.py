@@ -1,23 +1,16 @@
-"""One run of the pipeline in a process of its own, so that its peak of memory is its own.
+"""One run of the pipeline in a process of its own, so that its peak of memory is its own."""
 
-    python -m benchmarks.pipeline.worker JOB FOLDER
-
-reads the job, a `Job` as JSON, and writes run.json into the folder.
-"""
-
-import json
-import sys
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from benchmarks.machine import UNTIMED, FrameTimes, median, peak_mib
-from benchmarks.process import run_module, why_it_ended
+from benchmarks.process import apart
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
@@ -86,15 +79,10 @@ class Run:
     failure: str = ""
 
 
-def run_apart(job: Job, folder: Path) -> Run:
-    """Do a job in a process of its own, which leaves its result in a folder."""
-    result = folder / "run.json"
-    result.unlink(missing_ok=True)
-    ended = run_module("benchmarks.pipeline.worker", json.dumps(asdict(job)), str(folder))
-    if result.exists():
-        found = json.loads(result.read_text())
-        return Run(**{**found, "size": tuple(found["size"])})
-    return Run(job.size, failure=why_it_ended(ended))
+def run_apart(job: Job) -> Run:
+    """Do a job in a process of its own."""
+    found = apart(measure, job)
+    return Run(job.size, failure=found) if isinstance(found, str) else found
 
 
 def measure(job: Job) -> Run:
@@ -125,20 +113,3 @@ def measure(job: Job) -> Run:
         psnr=float(np.mean([found["psnr_working"] for found in figures[UNTIMED:]])),
         occupied=float(np.mean([found["hull_share"] for found in figures[UNTIMED:]])),
     )
-
-
-def main() -> None:
-    """Do the job that the command line names."""
-    words = json.loads(sys.argv[1])
-    job = Job(**{**words, "size": tuple(words["size"])})
-    try:
-        found = measure(job)
-    except MemoryError as error:
-        found = Run(job.size, failure=str(error) or "Out of memory.")
-    except ValueError as error:
-        found = Run(job.size, failure=str(error))
-    (Path(sys.argv[2]) / "run.json").write_text(json.dumps(asdict(found)))
-
-
-if __name__ == "__main__":
-    main()

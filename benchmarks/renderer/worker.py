@@ -1,26 +1,18 @@
-"""One peer, one scene, one process: clean thread pools and a peak of memory that is its own.
-
-    python -m benchmarks.renderer.worker PEER FOLDER LIGHTS DEVICE
-
-reads density.npy and target.npy from the folder and writes image.npy, gradient.npy and result.json there. What a
-framework prints is not shown.
-"""
+"""One peer, one scene, one process: clean thread pools and a peak of memory that is its own."""
 
 from __future__ import annotations
 
 import importlib
-import json
-import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import psutil
 
-from benchmarks.process import run_module, why_it_ended
+from benchmarks.process import apart
 from benchmarks.renderer.peers import PEERS, Iteration
 from benchmarks.renderer.scene import BenchScene, bench_scene, plume
 from smokelift.render.device import DeviceName, start
@@ -66,17 +58,21 @@ class Result:
 
 
 def run_apart(peer: str, folder: Path, lights: int = 1, device: DeviceName = "cpu") -> Result:
-    """Run a peer in a process of its own, on the scene in a folder; its image and gradient are written there.
+    """Run a peer in a process of its own on density.npy and target.npy of a folder; leaves image.npy and gradient.npy.
 
     The device is Smokelift's; the other peers choose their own.
     """
-    result = folder / "result.json"
-    result.unlink(missing_ok=True)
-    ended = run_module("benchmarks.renderer.worker", peer, str(folder), str(lights), device)
-    if result.exists():
-        found = json.loads(result.read_text())
-        return Result(**{**found, "seconds": tuple(found["seconds"])})
-    return Result(failure=why_it_ended(ended))
+    found = apart(_in_folder, peer, folder, lights, device)
+    return Result(failure=found) if isinstance(found, str) else found
+
+
+def _in_folder(peer: str, folder: Path, lights: int, device: DeviceName) -> Result:
+    scene = bench_scene(np.load(folder / "density.npy"), np.load(folder / "target.npy"), lights)
+    start(device)
+    result, image, gradient = measure(peer, scene)
+    np.save(folder / "image.npy", image)
+    np.save(folder / "gradient.npy", gradient)
+    return result
 
 
 def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
@@ -133,25 +129,3 @@ def _reset_peak() -> int | None:
     except OSError:
         return None
     return int(psutil.Process().memory_info().rss)
-
-
-def main() -> None:
-    """Run the peer that the command line names."""
-    peer, folder, lights, device = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), cast(DeviceName, sys.argv[4])
-    try:
-        scene = bench_scene(np.load(folder / "density.npy"), np.load(folder / "target.npy"), lights)
-        start(device)
-        result, image, gradient = measure(peer, scene)
-    except MemoryError:
-        result = Result(failure="Out of memory.")
-    except Exception as error:  # whatever a framework raises, the others go on
-        lines = str(error).strip().splitlines() or [type(error).__name__]
-        result = Result(failure=lines[-1])
-    else:
-        np.save(folder / "image.npy", image)
-        np.save(folder / "gradient.npy", gradient)
-    (folder / "result.json").write_text(json.dumps(asdict(result)))
-
-
-if __name__ == "__main__":
-    main()
