@@ -17,7 +17,6 @@ from PIL import Image
 
 from benchmarks.blender.looks import rendered, shown_example
 from benchmarks.blender.pictures import beside, save
-from benchmarks.blender.room import painted, panel
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
 from tests.example_shot import FULL_SIZE, add, set_world
@@ -57,10 +56,23 @@ def build_stage(scene: bpy.types.Scene, keep: set[bpy.types.Object]) -> None:
         if obj not in keep:
             bpy.data.objects.remove(obj)
     scene.render.film_transparent = False
-    panel(scene, [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], (0.012, 0.0115, 0.011))
+    mesh = bpy.data.meshes.new("Floor")
+    mesh.from_pydata([(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(painted((0.012, 0.0115, 0.011)))
+    add(scene, "Floor", mesh)
     bpy.ops.mesh.primitive_cylinder_add(radius=0.3, depth=0.1, location=(-0.14, 0.10, 0.05))
     bpy.context.object.data.materials.append(painted((0.01, 0.01, 0.01)))
     set_world(scene, (0.006, 0.0075, 0.01))
+
+
+def painted(color: tuple[float, float, float]) -> bpy.types.Material:
+    """A dull paint."""
+    material = bpy.data.materials.new("Paint")
+    if material.node_tree is None:
+        material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value, shader.inputs["Roughness"].default_value = (*color, 1.0), 0.9
+    return material
 
 
 def light(scene: bpy.types.Scene, direction: tuple[float, float, float], degrees: float) -> None:
