@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from benchmarks.tables import markdown
 from smokelift.direct import (
@@ -27,14 +26,13 @@ from smokelift.direct import (
     open_source,
     steady_part,
 )
+from smokelift.evaluation.orbit import Orbit
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Domain
 from smokelift.transport import Array, at_centres, faces_in
 
 HEADER = ["case", "room", "left by a face", "dissolved", "box at the end", "seconds a frame: first, last six"]
-AMBIENT = 0.35
-"""Fraction of the light in the picture that comes from everywhere; the rest comes from above."""
 
 COLUMNS = 8
 
@@ -77,18 +75,9 @@ def share_inside(faces: tuple[Array, Array, Array], scale: float) -> Array:
 
 
 def seen(sequence: Sequence, number: int, around: Domain, degrees: float) -> npt.NDArray[np.uint8]:
-    """Return smoke lit from above, from the front or turned, z up."""
-    medium, inner = sequence.scene.medium, sequence.scene.domain
-    ends = [
-        (part.start, count - part.stop) for part, count in zip(inner.slices_in(around), around.resolution, strict=True)
-    ]
-    density = np.pad(sequence.density(number), ends)
-    if degrees:
-        density = ndimage.rotate(density, degrees, axes=(0, 1), reshape=False, order=1)
-    optical = density * np.float32(medium.extinction * around.voxel_size)
-    lit = AMBIENT + (1 - AMBIENT) * np.exp(-np.cumsum(optical[:, :, ::-1], axis=2)[:, :, ::-1])
-    picture = (np.exp(-np.cumsum(optical, axis=1)) * optical * lit).sum(axis=1).T[::-1]
-    return eight_bit(np.repeat(np.ascontiguousarray(picture)[..., None].astype(np.float32), 3, axis=-1))
+    """Return smoke in a box, from the front or turned."""
+    part = sequence.within(around)
+    return eight_bit(Orbit(part.scene).image(part.density(number), degrees))
 
 
 def rows_of(sequence: Sequence, numbers: list[int], around: Domain) -> list[list[npt.NDArray[np.uint8]]]:

@@ -54,7 +54,6 @@ LIGHTS: dict[str, FiniteLight] = {
 }
 ROTATION = 40.0
 COUNTS = (4, 8, 16, 32, 64, 128, 256)
-BLOCK = 8  # pixels, as in `mitsuba_pictures`
 
 
 def truth() -> Array:
@@ -130,12 +129,6 @@ def difference(picture: Array, reference: Array) -> float:
     return 100 * volume_error(picture, reference)
 
 
-def blocks(picture: Array) -> Array:
-    """Averages over blocks of pixels."""
-    rows, columns = picture.shape[0] // BLOCK, picture.shape[1] // BLOCK
-    return np.asarray(picture.reshape(rows, BLOCK, columns, BLOCK, -1).mean(axis=(1, 3)))
-
-
 class Comparison:
     """Our pictures against Mitsuba's.
 
@@ -158,7 +151,7 @@ class Comparison:
     def pictures(self, kind: str) -> dict[int, Array]:
         """A light's pictures, ever finer."""
         names = [name for name in self.reference if name.rpartition("/")[0] == kind]
-        return {int(name.rpartition("/")[2]): self.reference[name] for name in names if "volpath" not in name}
+        return {int(name.rpartition("/")[2]): self.reference[name] for name in names}
 
     def finest(self, kind: str) -> Array:
         """A light's most exact pictures."""
@@ -237,37 +230,12 @@ class Comparison:
             rows,
         )
 
-    def path_traced(self) -> str:
-        """The references against volpath, over blocks."""
-        rows = []
-        for kind in (*LIGHTS, "environment"):
-            cells = []
-            for case in self.cases:
-                mean, error = self.reference[f"{kind}/volpath"][case]
-                true = blocks(self.finest(kind)[case])
-                noise = 100 * np.linalg.norm(error) / np.linalg.norm(true)
-                cells.append(f"{difference(mean, true):.2f} ({noise:.2f}), {100 * (mean.sum() / true.sum() - 1):+.2f}")
-            rows.append([kind, *cells])
-        return markdown(["light", *(", ".join(self.named(case)) for case in self.cases)], rows)
-
-    def transmittance(self) -> str:
-        """Mitsuba's transmittance as volpath has it, over blocks."""
-        cells = []
-        for depth, traced in enumerate(self.reference["transmittance/volpath"]):
-            mean, error = traced[..., :1]
-            true = blocks(self.reference["transmittance"][depth])
-            noise = 100 * np.linalg.norm(error) / np.linalg.norm(true)
-            cells.append(f"{difference(mean, true):.2f} ({noise:.2f}) at depth {DEPTHS[depth]:g}")
-        return ", ".join(cells)
-
     def tables(self) -> Iterator[tuple[str, str]]:
         """Yield what each table shows, and the table."""
         yield "Scattered light alone / the picture before a constant background, where there is smoke", self.grids()
         yield "Environment: scattered light by the number of parallel lights, 128^3 voxels", self.counts()
         yield "Directional: what the sampling of the field adds + what the rendering of the samples adds", self.parts()
         yield "How exact the references are; columns are depth, anisotropy", self.convergence()
-        yield "Reference against volpath, single scattering, over blocks (noise), and of the sums", self.path_traced()
-        yield "Transmittance, volpath before a constant emitter", self.transmittance()
 
 
 def main() -> None:

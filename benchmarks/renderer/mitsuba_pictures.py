@@ -3,12 +3,11 @@
     python -m benchmarks.renderer.mitsuba_pictures FOLDER     (with scene.json and fields.npz; writes reference.npz)
 
 Single scattering, integrated by the midpoint rule over Mitsuba's own sensor, emitters, phase function and trilinear
-grid, so the pictures carry no noise; the step is halved until nothing changes. Block averages of `volpath`, which
-shares no integrator with that, check it.
+grid, so the pictures carry no noise; the step is halved until nothing changes. `benchmarks.truth.picture --check`
+compares such pictures with `volpath`, which shares no integrator with them.
 """
 
 import json
-import math
 import sys
 import time
 from pathlib import Path
@@ -18,13 +17,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from benchmarks.mitsuba_scene import emitter, integral, path_traced, pixel_rays, sensor, smoke, surroundings, volume
+from benchmarks.mitsuba_scene import emitter, integral, pixel_rays, surroundings, volume
 
 STEPS = (4, 8, 16)  # a voxel; the last is the reference
 ENVIRONMENT_STEPS = 4
 DIRECTIONS = ((8, 16), (12, 24), (16, 32))  # Gauss points in z, equal ones in azimuth; the last is the reference
-BLOCK = 8  # pixels; volpath's noise is averaged over such blocks
-PASSES, SAMPLES = 16, 4096  # a block
 
 
 def phase_value(function: Any, towards_eye: Any, towards_light: Any) -> Any:
@@ -106,6 +103,8 @@ class Reference:
         self.box = mi.BoundingBox3f(mi.ScalarPoint3f(self.low), mi.ScalarPoint3f(self.high))
         self.phases = [mi.load_dict({"type": "hg", "g": g}) for g in self.anisotropies]
         self.rays = pixel_rays(self.camera)
+        place = mi.ScalarTransform4f().translate((self.low + self.high) / 2).scale((self.high - self.low) / 2)
+        self.cube = {"type": "cube", "to_world": place}
 
     def single(self, light: Any, steps: int) -> tuple[np.ndarray, np.ndarray]:
         """Render one light; every sample on a camera ray marches to it. Radiance and transmittance."""
@@ -124,7 +123,7 @@ class Reference:
 
     def lit(self, name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
         """Render a directional or a point light."""
-        scene = mi.load_dict({"type": "scene", "domain": self.cube(), "light": emitter(self.lights[name])})
+        scene = mi.load_dict({"type": "scene", "domain": self.cube, "light": emitter(self.lights[name])})
         source = scene.emitters()[0]
 
         def light(where: Any) -> tuple[Any, Any]:
@@ -139,28 +138,6 @@ class Reference:
         for pair in surroundings(self.lights["environment"], directions):
             total = total + self.single(lambda _, pair=pair: pair, steps)[0]
         return total
-
-    def cube(self, extinction: float = 1.0, anisotropy: float = 0.0) -> dict[str, Any]:
-        """Describe the smoke for Mitsuba's own integrators."""
-        medium = {"extinction": extinction, "albedo": self.albedo}
-        return smoke(self.field, self.low, self.high, medium, {"type": "hg", "g": anisotropy})
-
-    def traced(self, light: dict[str, Any], extinction: float, anisotropy: float, depth: int) -> np.ndarray:
-        """Render with `volpath`; pixels are blocks of the camera's.
-
-        Returns
-        -------
-        numpy.ndarray
-            Mean over passes and its standard error, [2, row, column, rgb].
-        """
-        scene = {
-            "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": depth > 1},
-            "camera": sensor(self.camera, BLOCK),
-            "domain": self.cube(extinction, anisotropy),
-            "light": light,
-        }
-        pictures = path_traced(scene, PASSES, SAMPLES)
-        return np.stack([np.mean(pictures, axis=0), np.std(pictures, axis=0, ddof=1) / math.sqrt(PASSES)])
 
 
 def main() -> None:
@@ -191,15 +168,6 @@ def main() -> None:
         began = time.perf_counter()
         picture = reference.surrounded(directions, ENVIRONMENT_STEPS)
         keep(began, **{f"environment/{directions[0] * directions[1]}": picture})
-    for name, light in reference.lights.items():
-        began = time.perf_counter()
-        traced = [
-            [reference.traced(emitter(light), e, g, 2) for g in reference.anisotropies] for e in reference.extinctions
-        ]
-        keep(began, **{f"{name}/volpath": np.array(traced)})
-    began = time.perf_counter()
-    traced = [reference.traced({"type": "constant"}, e, 0.0, 1) for e in reference.extinctions]
-    keep(began, **{"transmittance/volpath": np.array(traced)})
 
 
 if __name__ == "__main__":

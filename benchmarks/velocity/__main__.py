@@ -13,11 +13,9 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -29,12 +27,6 @@ from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.metrics import volume_error
 from smokelift.evaluation.truth import Truth
 from smokelift.velocity import CoarseToFine, DensityPair, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings
-
-Made = TypeVar("Made")
-
-ENOUGH_SECONDS = 2.0
-MAX_RUNS = 5
-"""Work is timed again until it took this long in all, or ran this often."""
 
 ESTIMATORS: Mapping[str, VelocityEstimator] = {
     **{f"{n} iterations": CoarseToFine(VelocitySettings(solver=ProjectedCG(iterations=n))) for n in (2, 3, 5, 10, 20)},
@@ -54,40 +46,16 @@ MANY_VOXELS = 1 << 20
 """Most voxels of a grid on which all estimators are measured, each on three pairs."""
 
 
-class PairedClock:
-    """Times work on one grid, in seconds and in Poisson solves just before and just after.
-
-    Parameters
-    ----------
-    shape
-        Voxels along x, y and z.
-    """
-
-    def __init__(self, shape: tuple[int, int, int]) -> None:
-        self._shape = shape
-
-    def time(self, work: Callable[[], Made]) -> tuple[float, float, Made]:
-        """Return seconds and solves, medians, and the result of the work."""
-        seconds: list[float] = []
-        solves: list[float] = []
-        before = machine.poisson_seconds(self._shape)
-        while len(seconds) < MAX_RUNS and sum(seconds) < ENOUGH_SECONDS:
-            began = time.perf_counter()
-            made = work()
-            seconds.append(time.perf_counter() - began)
-            after = machine.poisson_seconds(self._shape)
-            solves.append(2 * seconds[-1] / (before + after))
-            before = after
-        return float(np.median(seconds)), float(np.median(solves)), made
-
-
 def against_truth(pairs: Sequence[Pair], estimator: VelocityEstimator) -> tuple[float, float, float]:
     """Return the mean error over pairs, and the medians of seconds and solves."""
     found = []
     for pair in pairs:
         nx, ny, nz = pair.before.shape
-        work = partial(estimator.estimate, DensityPair(pair.before, pair.after, 1.0, 1.0))
-        seconds, solves, velocity = PairedClock((nx, ny, nz)).time(work)
+        before = machine.poisson_seconds((nx, ny, nz))
+        began = time.perf_counter()
+        velocity = estimator.estimate(DensityPair(pair.before, pair.after, 1.0, 1.0))
+        seconds = time.perf_counter() - began
+        solves = 2 * seconds / (before + machine.poisson_seconds((nx, ny, nz)))
         found.append((volume_error(velocity.centres(), pair.motion, pair.counted), seconds, solves))
     errors, times, counts = zip(*found, strict=True)
     return float(np.mean(errors)), float(np.median(times)), float(np.median(counts))

@@ -19,14 +19,14 @@ def peers(monkeypatch):
 
     The n-th run of Smokelift takes n ms an iteration, as on a machine that gets busier; the peers take 60.
     """
-    for key in ("drjit", "paper", "mitsuba-4"):
+    for key in ("drjit", "paper", "mitsuba-16"):
         monkeypatch.setitem(PEERS, key, replace(PEERS[key], packages=()))
     monkeypatch.setitem(PEERS, "mitsuba-1", replace(PEERS["mitsuba-1"], packages=("no_such_package",)))
     runs = itertools.count(1)
 
     def run_here(peer: str, folder: Path, lights: int, device: str) -> worker.Result:
         assert device == "cpu"
-        if peer == "mitsuba-4":
+        if peer == "mitsuba-16":
             return worker.Result(failure="Out of memory.")
         scene = bench_scene(np.load(folder / "density.npy"), np.load(folder / "target.npy"), lights)
         result, image, gradient = worker.measure(OURS, scene)
@@ -38,7 +38,7 @@ def peers(monkeypatch):
 
 
 def test_peers_are_paired_and_scored(peers, tmp_path):
-    rows = bench.Stage(tmp_path, 8, PLUME, "cpu").compare(["drjit", "paper", "mitsuba-4", "mitsuba-1"])
+    rows = bench.Stage(tmp_path, 8, PLUME, "cpu").compare(["drjit", "paper", "mitsuba-16", "mitsuba-1"])
     ours, right, wrong, failed, missing = rows
     assert ours.image_error < 1e-6 and ours.gradient_error < bench.EXACT
     assert ours.result.seconds == pytest.approx([1e-3] * 5 + [2e-3] * 5 + [3e-3] * 5)

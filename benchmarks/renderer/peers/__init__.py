@@ -84,6 +84,5 @@ PEERS = {
     "drjit": Peer("Dr.Jit, loops and adjoint by hand", "drjit_loops", ("drjit",)),
     "paper": Peer("The paper's algorithms 2 and 3", "paper"),
     "mitsuba-1": Peer("Mitsuba 3 prbvolpath, 1 sample", "mitsuba_prbvolpath", ("mitsuba",), (1,), True),
-    "mitsuba-4": Peer("Mitsuba 3 prbvolpath, 4 samples", "mitsuba_prbvolpath", ("mitsuba",), (4,), True),
     "mitsuba-16": Peer("Mitsuba 3 prbvolpath, 16 samples", "mitsuba_prbvolpath", ("mitsuba",), (16,), True),
 }
