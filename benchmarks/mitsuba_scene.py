@@ -141,7 +141,7 @@ def march(
     density
         The volume.
     source
-        Returns what points scatter into the direction of the ray, per optical depth (the source function).
+        Returns what points scatter into the direction of the ray, per optical depth (the source function), gray or rgb.
     box
         Where there is smoke.
     ray
@@ -161,7 +161,7 @@ def march(
     count = mi.UInt32(dr.ceil(length / step))
     width = length / mi.Float(dr.maximum(count, 1))
     where = dr.zeros(mi.Interaction3f, dr.width(ray))
-    radiance, transmittance = mi.Float(0.0), mi.Float(1.0)
+    radiance, transmittance = dr.zeros(type(source(where)), dr.width(ray)), mi.Float(1.0)
     i = mi.UInt32(0)
     while i < count:
         where.p = ray(near + (mi.Float(i) + 0.5) * width)

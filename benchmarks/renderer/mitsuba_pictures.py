@@ -17,7 +17,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from benchmarks.mitsuba_scene import emitter, integral, pixel_rays, surroundings, volume
+from benchmarks.mitsuba_scene import emitter, integral, march, pixel_rays, surroundings, volume
 
 STEPS = (4, 8, 16)  # a voxel; the last is the reference
 ENVIRONMENT_STEPS = 4
@@ -31,63 +31,6 @@ def phase_value(function: Any, towards_eye: Any, towards_light: Any) -> Any:
     medium.sh_frame = mi.Frame3f(towards_eye)
     value, _ = function.eval_pdf(mi.PhaseFunctionContext(None), medium, towards_light)
     return value
-
-
-@dr.syntax
-def march(
-    texture: Any, box: Any, ray: Any, step: float, extinctions: list, phases: list, light: Any, shade: Any
-) -> Any:
-    """March through the smoke, in several media at once.
-
-    Parameters
-    ----------
-    texture
-        The density.
-    box
-        Where it is.
-    ray
-        The camera's rays.
-    step
-        Largest step (m).
-    extinctions, phases
-        Of the media.
-    light
-        Of points: direction towards the light, irradiance.
-    shade
-        Of points and that direction: the integral of density towards the light.
-
-    Returns
-    -------
-    list
-        Radiance for each extinction and phase function, extinctions first, for an albedo of 1.
-    list
-        Transmittance of the ray for each extinction.
-    """
-    hit, near, far = box.ray_intersect(ray)
-    length = dr.select(hit, far - near, 0.0)
-    count = mi.UInt32(dr.ceil(length / step))
-    width = length / mi.Float(dr.maximum(count, 1))
-    where = dr.zeros(mi.Interaction3f, dr.width(ray))
-    radiance = [mi.Color3f(0.0) for _ in extinctions for _ in phases]
-    transmittance = [mi.Float(1.0) for _ in extinctions]
-
-    def add_sample(where: Any, radiance: list, transmittance: list) -> tuple[list, list]:
-        density = texture.eval_1(where)
-        towards, irradiance = light(where)
-        shadow = shade(where, towards)
-        scattered = [irradiance * phase_value(function, -ray.d, towards) for function in phases]
-        passed = [dr.exp(-e * density * width) for e in extinctions]
-        lit = [t * (1 - p) * dr.exp(-e * shadow) for t, p, e in zip(transmittance, passed, extinctions, strict=True)]
-        arriving = [weight * color for weight in lit for color in scattered]
-        brighter = [r + a for r, a in zip(radiance, arriving, strict=True)]
-        return brighter, [t * p for t, p in zip(transmittance, passed, strict=True)]
-
-    i = mi.UInt32(0)
-    while i < count:
-        where.p = ray(near + (mi.Float(i) + 0.5) * width)
-        radiance, transmittance = add_sample(where, radiance, transmittance)
-        i += 1
-    return radiance, transmittance
 
 
 class Reference:
@@ -107,19 +50,22 @@ class Reference:
         self.cube = {"type": "cube", "to_world": place}
 
     def single(self, light: Any, steps: int) -> tuple[np.ndarray, np.ndarray]:
-        """Render one light; every sample on a camera ray marches to it. Radiance and transmittance."""
+        """Render one light in every medium; each sample on a camera ray marches to it. Radiance and transmittance."""
         step = self.voxel / steps
-
-        def shade(where: Any, towards: Any) -> Any:
-            return integral(self.texture, self.box, where.p, towards, step)
-
-        radiance, transmittance = march(
-            self.texture, self.box, self.rays, step, self.extinctions, self.phases, light, shade
-        )
         width, height = self.camera["size"]
-        pictures = np.stack([np.array(picture).T.reshape(height, width, 3) for picture in radiance])
-        pictures = pictures.reshape(len(self.extinctions), len(self.anisotropies), height, width, 3)
-        return self.albedo * pictures, np.stack([t.numpy().reshape(height, width) for t in transmittance])
+
+        def picture(extinction: float, function: Any) -> tuple[np.ndarray, np.ndarray]:
+            def scattered(where: Any) -> Any:
+                towards, irradiance = light(where)
+                shadow = integral(self.texture, self.box, where.p, towards, step)
+                return irradiance * phase_value(function, -self.rays.d, towards) * dr.exp(-extinction * shadow)
+
+            radiance, transmittance = march(self.texture, scattered, self.box, self.rays, step, extinction)
+            return np.array(radiance).T.reshape(height, width, 3), transmittance.numpy().reshape(height, width)
+
+        views = [[picture(extinction, function) for function in self.phases] for extinction in self.extinctions]
+        pictures = np.array([[radiance for radiance, _ in row] for row in views])
+        return self.albedo * pictures, np.array([row[0][1] for row in views])
 
     def lit(self, name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
         """Render a directional or a point light."""

@@ -16,8 +16,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from benchmarks.mitsuba_scene import emitter, sensor, smoke
 from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.scene import BenchScene
+from smokelift.scene import Camera
 
 mi.set_variant("llvm_ad_mono")
 
@@ -78,39 +80,18 @@ def _turned(volume: Any) -> Any:
 
 
 def _description(scene: BenchScene) -> dict[str, Any]:
-    camera, matrix = scene.camera, np.array(scene.camera.matrix)
-    eye, forward, up = matrix[:3, 3], -matrix[:3, 2], matrix[:3, 1]
-    place = mi.ScalarTransform4f
-    to_domain = place().translate(list(scene.domain.min)).scale(scene.domain.max[0] - scene.domain.min[0])
-    grid = mi.VolumeGrid(_turned(scene.density)[..., None])
+    camera, (low, high) = scene.camera, (np.array(side, float) for side in (scene.domain.min, scene.domain.max))
+    seen = sensor({"size": camera.size, "matrix": camera.matrix, "fov_y_degrees": _degrees(camera)})
+    seen["film"]["pixel_format"] = "luminance"
+    medium = {"extinction": scene.medium.extinction, "albedo": scene.medium.albedo}
     return {
         "type": "scene",
         "integrator": {"type": "through_middles", "max_depth": 2, "rr_depth": 100},
-        "sensor": {
-            "type": "perspective",
-            "fov_axis": "y",
-            "fov": float(2 * np.degrees(np.arctan(0.5 * camera.size[1] / camera.fy))),
-            "to_world": place().look_at(eye.tolist(), (eye + forward).tolist(), up.tolist()),
-            "film": {
-                "type": "hdrfilm",
-                "width": camera.size[0],
-                "height": camera.size[1],
-                "pixel_format": "luminance",
-                "rfilter": {"type": "box"},
-            },
-            "sampler": {"type": "independent"},
-        },
-        "light": {"type": "directional", "direction": list(scene.light.direction), "irradiance": 1.0},
-        "smoke": {
-            "type": "cube",
-            "to_world": to_domain.translate([0.5, 0.5, 0.5]).scale(0.5),
-            "bsdf": {"type": "null"},
-            "interior": {
-                "type": "heterogeneous",
-                "albedo": scene.medium.albedo,
-                "scale": scene.medium.extinction,
-                "sigma_t": {"type": "gridvolume", "grid": grid, "to_world": to_domain, "filter_type": "trilinear"},
-                "phase": {"type": "hg", "g": scene.medium.anisotropy},
-            },
-        },
+        "sensor": seen | {"sampler": {"type": "independent"}},
+        "light": emitter({"type": "directional", "direction": list(scene.light.direction), "irradiance": 1.0}),
+        "smoke": smoke(scene.density, low, high, medium, {"type": "hg", "g": scene.medium.anisotropy}),
     }
+
+
+def _degrees(camera: Camera) -> float:
+    return float(2 * np.degrees(np.arctan(0.5 * camera.size[1] / camera.fy)))
