@@ -11,7 +11,6 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
 - ``billboard``, ``blurred``: the front picture in every view, as it is or blurred
-- ``billboard:depth=-0.02``: it stands so many meters behind the middle of the box of a capture
 """
 
 from __future__ import annotations
@@ -46,11 +45,6 @@ SOLVERS = {"primal-dual": PrimalDual(), "projected-cg": ProjectedCG()}
 def run_name(run: str) -> str:
     """Return a run's name without its views and changes: "balanced" of "balanced+90:transport=0"."""
     return run.partition(":")[0].split("+")[0]
-
-
-def billboard_depth(run: str) -> float:
-    """Return how far behind the middle of the box (m) a billboard stands: -0.02 of "billboard:depth=-0.02"."""
-    return float(dict(_changes(run)).get("depth", 0))
 
 
 def run_views(run: str) -> list[str]:

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from benchmarks.baked import FRONT, Baked, camera_of
 from smokelift import Camera, Clip, Scene
-from smokelift.density.upright_plane import view_frame
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.render import Image
@@ -45,7 +44,7 @@ class KnownScene:
     seen
         Returns what a camera saw in a frame, linear (rows, columns, 3).
     billboard
-        Returns the input picture of a frame as it is put into a view, so many meters behind the middle of the box.
+        Returns the input picture of a frame as it is put into a view, on a screen in the middle of the box.
     truth
         Volumes and velocities, if they are known.
     """
@@ -56,7 +55,7 @@ class KnownScene:
     scored: range
     cameras: dict[str, Camera]
     seen: Callable[[str, int], Image]
-    billboard: Callable[[str, int, float], Image]
+    billboard: Callable[[str, int], Image]
     truth: Truth | None
 
 
@@ -68,7 +67,7 @@ def baked_scene(folder: Path, frames: int | None = None) -> KnownScene:
     def seen(view: str, frame: int) -> Image:
         return np.repeat(baked.views[view].radiance[frame][..., None], 3, axis=-1)
 
-    def billboard(_: str, frame: int, __: float) -> Image:
+    def billboard(_: str, frame: int) -> Image:
         return seen(FRONT, frame)
 
     return KnownScene(folder.name, folder / "scene.toml", span, span, baked.cameras, seen, billboard, truth)
@@ -94,7 +93,7 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
         raise ValueError(f"{paths['input']}: has no [domain].")
     cameras = {view: camera_of(path).resized(*REAL_SIZE) for view, path in paths.items()}
     clips = {view: Clip.open(scene.clip) for view, scene in described.items() if scene.clip is not None}
-    center, behind = np.array(domain.centre), view_frame(cameras["input"])[1]
+    center = np.array(domain.centre)
 
     def seen(view: str, frame: int) -> Image:
         picture = clips[view].frame(frame)
@@ -103,8 +102,8 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
             picture = moved(picture, round(rows * len(picture) / 1920), round(columns * len(picture) / 1920))
         return area_average(picture, *REAL_SIZE)
 
-    def billboard(view: str, frame: int, depth: float) -> Image:
-        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], center + depth * behind)
+    def billboard(view: str, frame: int) -> Image:
+        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], center)
 
     name = f"{folder.name}, {'registered' if registered else 'as calibrated'}"
     frames = range(REAL_FRAMES[-1] + 1)

@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.optimize import minimize_scalar
 
 from benchmarks.accuracy import worker
-from benchmarks.accuracy.runs import billboard_depth, run_name, run_views
+from benchmarks.accuracy.runs import run_name, run_views
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.baked import BLACK
 from benchmarks.process import apart
@@ -71,9 +71,9 @@ def images(known: KnownScene, run: str, folder: Path, frames: range) -> Iterator
     """Yield frames with the linear picture (rows, columns, 3) that a run shows in every view."""
     views, name = known.cameras, run_name(run)
     if name in BILLBOARDS:
-        depth, width = billboard_depth(run), BLUR if name == "blurred" else 0.0
+        width = BLUR if name == "blurred" else 0.0
         for frame in frames:
-            yield frame, {view: _blurred(known.billboard(view, frame, depth), width) for view in views}
+            yield frame, {view: _blurred(known.billboard(view, frame), width) for view in views}
     elif run == "black":
         yield from ((frame, {view: 0 * known.seen(view, frame) for view in views}) for frame in frames)
     elif (densities := known_densities(known, run, folder)) is not None:

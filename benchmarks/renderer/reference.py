@@ -67,6 +67,17 @@ def light_optical_depth(kappa: Doubles, voxel_size: float, direction: Doubles) -
     return np.moveaxis(depth, 0, axis)
 
 
+def phase_volume(scene: BenchScene) -> Doubles:
+    """Return albedo x Henyey-Greenstein phase function from the light to the camera, 1/sr, at every voxel."""
+    h, g = scene.domain.voxel_size, scene.medium.anisotropy
+    axes = [low + (np.arange(n) + 0.5) * h for low, n in zip(scene.domain.min, scene.domain.resolution, strict=True)]
+    to_eye = [e - a for e, a in zip(scene.camera.position, np.meshgrid(*axes, indexing="ij", sparse=True), strict=True)]
+    cosine = sum(t * o for t, o in zip(scene.light.direction, to_eye, strict=True)) / np.sqrt(
+        sum(o * o for o in to_eye)
+    )
+    return np.asarray(scene.medium.albedo * (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5))
+
+
 def _blend(plane: Doubles, f: float, g: float) -> Doubles:
     """Weigh every 2 x 2 cell of a plane; f and g belong to the lower index."""
     across = f * plane[:-1] + (1 - f) * plane[1:]
@@ -75,13 +86,9 @@ def _blend(plane: Doubles, f: float, g: float) -> Doubles:
 
 def _inscatter(scene: BenchScene) -> Doubles:
     """In-scattered radiance J of every voxel for unit irradiance."""
-    h, travel, g = scene.domain.voxel_size, np.array(scene.light.direction), scene.medium.anisotropy
-    axes = [low + (np.arange(n) + 0.5) * h for low, n in zip(scene.domain.min, scene.domain.resolution, strict=True)]
-    to_eye = [e - a for e, a in zip(scene.camera.position, np.meshgrid(*axes, indexing="ij", sparse=True), strict=True)]
-    cosine = sum(t * o for t, o in zip(travel, to_eye, strict=True)) / np.sqrt(sum(o * o for o in to_eye))
-    phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
+    h, travel = scene.domain.voxel_size, np.array(scene.light.direction)
     depth = light_optical_depth(scene.medium.extinction * scene.density.astype(np.float64), h, travel)
-    return np.asarray(scene.medium.albedo * phase * np.exp(-depth))
+    return np.asarray(phase_volume(scene) * np.exp(-depth))
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,16 +138,3 @@ def light_table(scene: BenchScene) -> LightTable:
         columns=(rows, columns),
         step=scene.domain.voxel_size / abs(float(direction[axis])),
     )
-
-
-def phase_volume(scene: BenchScene) -> Array:
-    """Return albedo x Henyey-Greenstein phase function from the light to the camera, 1/sr, at every voxel."""
-    h, g = scene.domain.voxel_size, scene.medium.anisotropy
-    centers = (low + (np.arange(n) + 0.5) * h for low, n in zip(scene.domain.min, scene.domain.resolution, strict=True))
-    x, y, z = (
-        e - a for e, a in zip(scene.camera.position, np.meshgrid(*centers, indexing="ij", sparse=True), strict=True)
-    )
-    u, v, w = scene.light.direction
-    cosine = (u * x + v * y + w * z) / np.sqrt(x * x + y * y + z * z)
-    phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-    return np.asarray(scene.medium.albedo * phase, np.float32)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.stability.environments import ENVIRONMENTS
-from benchmarks.stability.forked import Ended, Limits, run
+from benchmarks.stability.forked import Ended, run
 from benchmarks.stability.judge import files_of, verdict
 from benchmarks.stability.mutations import damaged_bytes, damaged_json, damaged_text, extreme_array
 from benchmarks.stability.recovery import recovered
@@ -138,7 +138,7 @@ def damaged(prepare: Prepare, out: str, shot: TinyShot, place: Path, random: Dam
     """
     words = prepare(shot, place, random)
     before = files_of(place)
-    ended = run(main, words, place, Limits())
+    ended = run(main, words, place)
     return ended, verdict(ended, before, files_of(place), out)
 
 

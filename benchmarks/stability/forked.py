@@ -16,13 +16,8 @@ CRASHED = 70
 """Status of an exception that the command does not handle (EX_SOFTWARE)."""
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a case may take: seconds of processor time, seconds in all, and bytes of address space."""
-
-    processor_seconds: int = 30
-    seconds: float = 600.0
-    memory: int = 6 * 2**30
+PROCESSOR_SECONDS, SECONDS, MEMORY = 30, 600.0, 6 * 2**30
+"""Seconds of processor time, seconds in all, and bytes of address space that a case may take."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +38,8 @@ def run(
     command: Callable[[Sequence[str]], int],
     words: Sequence[str],
     folder: Path,
-    limits: Limits,
     begin: Callable[[], None] = nothing,
+    seconds: float = SECONDS,
 ) -> Ended:
     """Run a command in a fork of this process.
 
@@ -56,10 +51,10 @@ def run(
         Of the command line.
     folder
         Working directory; standard output and error are kept beside it.
-    limits
-        A command that takes more is stopped.
     begin
         Done in the fork before the command.
+    seconds
+        A command that takes more is stopped.
     """
     spoken = [folder.with_name(f"{folder.name}.{name}") for name in ("out", "err")]
     child = os.fork()
@@ -71,8 +66,8 @@ def run(
                 os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
             faulthandler.disable()
             sys.stdout, sys.stderr = (os.fdopen(n, "w", encoding="utf-8", closefd=False) for n in (1, 2))
-            resource.setrlimit(resource.RLIMIT_CPU, (limits.processor_seconds, limits.processor_seconds + 5))
-            resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
+            resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS + 5))
+            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             os.chdir(folder)
             begin()
@@ -85,7 +80,7 @@ def run(
             sys.stdout.flush()
             sys.stderr.flush()
             os._exit(status)
-    status, hung = _wait(child, limits.seconds)
+    status, hung = _wait(child, seconds)
     output, errors = (path.read_text(encoding="utf-8", errors="replace") for path in spoken)
     return Ended(status, output, errors, hung or status in (-signal.SIGXCPU, -signal.SIGKILL))
 

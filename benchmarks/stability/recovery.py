@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.environments import Environment
-from benchmarks.stability.forked import Ended, Limits, nothing, run
+from benchmarks.stability.forked import Ended, nothing, run
 from benchmarks.stability.judge import files_of, verdict
 from benchmarks.stability.shot import TinyShot
 from smokelift.app.cli import main
@@ -85,7 +85,7 @@ def _command(words: Words[str]) -> int:
 
 def _reconstruct(place: Path, begin: Callable[[], None], *words: str) -> Ended:
     """Run the command; what its events call an error counts as said on standard error."""
-    ended = run(_command, (*RECONSTRUCT, *words), place, Limits(), begin)
+    ended = run(_command, (*RECONSTRUCT, *words), place, begin)
     said = [event["text"] for event in _events(ended) if event["event"] == "error"]
     return replace(ended, errors="\n".join([*ended.errors.splitlines(), *said]))
 

@@ -49,17 +49,6 @@ def test_the_input_view_counts_where_it_is_known(tmp_path) -> None:
     assert set(billboard.errors) == {"input_error", "view_error"}
 
 
-def test_a_run_says_what_was_changed() -> None:
-    run = Run("fine:resolution=32x32x48,transport=0", "default", "32x32x48", 1.0, {})
-    assert (run.series, run.changes, run.label) == ("fine", {"transport": "0"}, "transport 0")
-    grid = Run("fine:resolution=32x32x48", "default", "32x32x48", 1.0, {})
-    assert (grid.changes, grid.chosen, grid.label) == ({}, False, "48")
-    detail = Run("balanced:velocity.coarsening=2,detail=0.25", "default", "32x32x48", 1.0, {})
-    assert detail.changes == {"coarsening": "2", "detail": "0.25"}
-    chosen = Run("fine:resolution=auto", "default", "62x62x93", 1.0, {})
-    assert (chosen.changes, chosen.chosen, chosen.label) == ({}, True, "fine")
-
-
 def test_the_default_is_what_a_user_gets_who_says_nothing(tmp_path) -> None:
     assert Settings().quality == DEFAULT
     given = (HEADER + ROWS).replace("draft", "balanced")
@@ -90,20 +79,8 @@ def test_no_label_lies_over_another_or_leaves_its_panel() -> None:
         assert all(window.y0 <= box.y0 and box.y1 <= window.y1 for box in boxes)
 
 
-def test_only_scenes_that_all_share_count(tmp_path) -> None:
-    text = (HEADER + ROWS).replace("b,paper,paper,24,8,20,1.0,0.8,box,2026-01-01\n", "")
-    found = read_runs(write(tmp_path, text))
-    assert found.runs[0].seconds == 0.5
-    assert found.caption.startswith("a; 24 frames")
-
-
 def test_the_pareto_front() -> None:
     points = [(1.0, 5.0), (2.0, 3.0), (3.0, 4.0), (2.0, 6.0), (9.0, 1.0), (9.5, 1.0)]
     assert pareto_front(points) == [0, 1, 4]
     assert pareto_front([(1.0, 2.0), (1.0, 1.0)]) == [1]
     assert pareto_front([]) == []
-
-
-def test_runs_without_a_time_are_no_chart(tmp_path) -> None:
-    with pytest.raises(ValueError, match="nothing to draw"):
-        chart(read_runs(write(tmp_path, HEADER + "a,billboard,baseline,24,,20,,,box,2026-01-01\n")))

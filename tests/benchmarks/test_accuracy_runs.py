@@ -69,15 +69,6 @@ def test_even_depth_does_not_change_along_the_rays():
     assert np.ptp(along, axis=1).max() < 0.05 * along.max() < np.ptp(round_[4:8, :, 5:7], axis=1).max()
 
 
-def test_without_the_hull_smoke_may_be_beside_what_the_picture_shows():
-    picture = np.zeros((16, 16, 3), np.float32)
-    picture[6:10, 6:10] = 0.2
-    views = ViewSet.of((Observation(CAMERA, picture),), OPTICS)
-    depth = RoundDepth().estimate(views)
-    bounded, free = (fit.fit(views, depth, None) for fit in (QUICK, WithoutHull(QUICK)))
-    assert bounded.figures["hull_share"] < free.figures["hull_share"]
-
-
 def test_a_picture_on_a_screen_is_unchanged_for_its_own_camera():
     picture = np.random.default_rng(0).random((16, 16, 3)).astype(np.float32)
     np.testing.assert_array_equal(picture_on_screen(picture, CAMERA, CAMERA, np.zeros(3)), picture)

@@ -82,7 +82,3 @@ def test_a_front_drawn_out_in_depth_shows_in_its_orbit(known, drawn_out) -> None
     row = score(known, "draft", drawn_out)
     assert row["patches_worst"] > row["patches"] > row["patches_own"]
     assert row["halo"] > 0.02
-
-
-def test_a_run_without_densities_has_no_orbit(known, tmp_path) -> None:
-    assert "patches" not in score(known, "black", tmp_path)

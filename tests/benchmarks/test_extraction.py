@@ -1,6 +1,5 @@
 """Smoke before plates: the files that are composed, and the figures of elements and volumes."""
 
-import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +9,9 @@ import pytest
 from benchmarks.baked import Baked
 from benchmarks.extraction.__main__ import main
 from benchmarks.extraction.compose import FRAME, GIVEN, KNOWN, UNKNOWN, Composed, Filming, compose
-from benchmarks.extraction.score import score_densities, score_element, scored_frames
-from benchmarks.plates import PAINTED, PHOTOGRAPHS, plate
-from benchmarks.tables import Rows
+from benchmarks.extraction.score import score_densities, score_element
 from smokelift import Background, Camera, Clip, DirectionalLight, Domain, Medium, Scene
 from smokelift.footage.images import linear_to_srgb, read_image
-from smokelift.output.images import write_image
 from smokelift.render import scene_renderer
 from smokelift.scene import completed, orbit
 from smokelift.transport import face_shapes
@@ -100,46 +96,6 @@ def test_what_is_composed_stays_and_is_not_taken_for_another_clip(smoke, folder,
         compose(Baked.load(folder, 3), "planks", Filming(), before_planks)
 
 
-def test_the_transmittance_that_is_stored_goes_before_the_renderer_s(folder, smoke, tmp_path) -> None:
-    assert 0 < smoke.front.transmittance.min() < 0.2
-    for path in folder.iterdir():
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    stored = np.full(smoke.front.radiance.shape, 0.5, np.float16)
-    np.savez(tmp_path / "front.npz", image=smoke.front.radiance.astype(np.float16), transmittance=stored)
-    assert (Baked.load(tmp_path, FRAMES).front.transmittance == 0.5).all()
-
-
-def test_a_camera_adds_what_its_name_says(smoke, tmp_path) -> None:
-    pictures = smoke.front.before(plate("sky", 72, 48))
-    spoiled = Filming(crf=30, noise=0.02, drifts=True)
-    assert (Filming().name, spoiled.name) == ("", "-crf30-noise2-drift")
-    Filming(crf=0, drifts=True).write(tmp_path / "a.mp4", pictures)
-    with Clip.open(tmp_path / "a.mp4") as clip:
-        redder = linear_to_srgb(clip.frame(FRAMES - 1))[..., 0].mean() / linear_to_srgb(pictures)[-1, ..., 0].mean()
-    assert redder == pytest.approx(1.1, abs=0.03)  # a quarter more light
-
-
-@pytest.mark.parametrize("name", PAINTED)
-def test_a_painted_plate_is_one_picture_for_ever(name) -> None:
-    painted = plate(name, 72, 48)
-    assert painted.shape == (72, 48, 3)
-    assert painted.min() >= 0 and painted.max() <= 1
-    np.testing.assert_array_equal(painted, plate(name, 72, 48))
-
-
-def test_a_picture_is_cropped_to_the_clip_about_its_middle(tmp_path) -> None:
-    picture = np.zeros((60, 120, 3), np.float32)
-    picture[:, 40:80] = 0.5
-    write_image(tmp_path / "strip.png", picture)
-    assert plate(str(tmp_path / "strip.png"), 30, 20) == pytest.approx(0.5, abs=0.005)
-
-
-@pytest.mark.skipif(importlib.util.find_spec("skimage") is None, reason="scikit-image is not installed")
-@pytest.mark.parametrize("name", PHOTOGRAPHS)
-def test_photographs_come_from_scikit_image(name) -> None:
-    assert np.std(plate(name, 96, 64)) > 0.05
-
-
 def test_the_true_element_has_nothing_wrong(composed) -> None:
     figures = score_element(composed.seen.transmittance, composed.seen.radiance, composed)
     assert figures["transmittance_error"] == figures["radiance_error"] == figures["imprint"] == 0
@@ -153,14 +109,6 @@ def test_a_plate_that_is_printed_on_the_smoke_is_an_imprint(composed) -> None:
     assert figures["imprint"] > 0.99
     noise = 0.01 * np.random.default_rng(0).standard_normal(composed.seen.transmittance.shape)
     assert score_element(composed.seen.transmittance + noise, composed.seen.radiance, composed)["imprint"] < 0.1
-
-
-def test_a_plate_without_detail_cannot_be_printed(smoke, tmp_path) -> None:
-    before_black = compose(smoke, "black", Filming(), tmp_path / "ball-black")
-    figures = score_element(0.9 * before_black.seen.transmittance, before_black.seen.radiance, before_black)
-    assert figures["imprint"] is None
-    assert figures["transmittance_error"] > 0.01
-    assert figures["psnr"] > 100  # nothing shows behind
 
 
 def test_a_cut_tail_and_too_thin_smoke_are_seen(composed) -> None:
@@ -186,27 +134,6 @@ def test_the_true_volumes_score_as_the_truth(smoke, composed) -> None:
     dark = score_densities(scene, lambda frame: 0.5 * smoke.densities[frame].astype(np.float32), smoke, composed)
     assert dark["mass"] == pytest.approx(0.5)
     assert dark["psnr_90"] < 40
-
-
-def test_a_long_clip_is_compared_at_moments_apart() -> None:
-    assert scored_frames(28) == [8, 14, 20, 26]
-    assert scored_frames(5) == [4]
-
-
-def test_rows_are_kept(tmp_path) -> None:
-    key = ("ball", "planks")
-    rows = Rows(tmp_path / "rows.csv", ("scene", "plate"), ("mass", "imprint", "said"))
-    assert rows.find(key) is None
-    rows.add(key, {"mass": 0.5, "imprint": None, "said": "no."})
-    again = Rows(tmp_path / "rows.csv", ("scene", "plate"), ("mass", "imprint", "said"))
-    assert again.keys == [key]
-    assert again.find(key) == rows.find(key) == {"mass": 0.5, "imprint": None, "said": "no."}
-
-
-def test_the_command_only_composes_where_nothing_is_known(folder, tmp_path, capsys) -> None:
-    main([str(tmp_path), str(folder), "--plates", "sky", "--known", "--frames", "3"])
-    assert (tmp_path / f"{folder.name}-sky" / "clip.mp4").exists()
-    assert len((tmp_path / "rows.csv").read_text().splitlines()) == 1
 
 
 def test_the_command_measures_once(folder, tmp_path, capsys) -> None:

@@ -50,7 +50,3 @@ def test_peers_are_paired_and_scored(peers, tmp_path):
     assert missing.result.failure == "not installed: pip install no_such_package"
     assert ours.cells(8, 0.5)[3] == "4"
     assert "not exact" in wrong.cells(8, 0.5)[-1]
-
-
-def test_several_lights_are_timed_alone(peers, tmp_path):
-    assert bench.Stage(tmp_path, 8, PLUME, "cpu").run(OURS, 16).milliseconds > 0

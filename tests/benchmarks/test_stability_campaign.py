@@ -19,7 +19,7 @@ import pytest
 from benchmarks.stability.__main__ import failures
 from benchmarks.stability.cases import DAMAGED, EXTRACTED
 from benchmarks.stability.environments import ENVIRONMENTS, Failure, lacking
-from benchmarks.stability.forked import Ended, Limits, run
+from benchmarks.stability.forked import Ended, run
 from benchmarks.stability.judge import verdict
 from benchmarks.stability.recovery import recovered
 from benchmarks.stability.shot import TinyShot, tiny_shot
@@ -115,7 +115,7 @@ def fails(words):
     [("raise", "traceback"), ("signal", "signal"), ("hang", "hung"), ("status", "status"), ("lines", "not one line")],
 )
 def test_the_judge_sees_every_failure(tmp_path, kind, wrong) -> None:
-    ended = run(fails, [kind], tmp_path, Limits(seconds=0.5))
+    ended = run(fails, [kind], tmp_path, seconds=0.5)
     assert verdict(ended, {}, {}, "new") == wrong
 
 

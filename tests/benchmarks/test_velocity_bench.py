@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.velocity.__main__ import ESTIMATORS, SHORT, against_truth
+from benchmarks.velocity.__main__ import ESTIMATORS, against_truth
 from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.pairs import Pair, pair_of_truth
 from smokelift.evaluation.truth import Truth
@@ -23,11 +23,6 @@ def test_smoke_at_rest_has_the_error_of_the_motion_that_it_has_not():
     pair = built_in_pair(SHAPE, 0)
     rest = Pair(pair.before, pair.before, pair.motion, pair.inlet)
     assert against_truth([rest], CoarseToFine())[0] == pytest.approx(1, abs=0.01)
-
-
-def test_one_of_the_estimators_is_the_default():
-    assert [name for name, each in ESTIMATORS.items() if each == CoarseToFine()] == ["10 iterations"]
-    assert set(SHORT) <= set(ESTIMATORS)
 
 
 def test_a_baked_pair_has_its_motion_in_voxels_a_frame():

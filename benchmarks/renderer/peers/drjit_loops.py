@@ -17,7 +17,8 @@ import numpy as np
 from drjit.llvm import Array2f, Float, Int32, UInt32
 
 from benchmarks.renderer.peers import Iteration
-from benchmarks.renderer.sampling import LightTable, RayTable, light_table, phase_volume, ray_table
+from benchmarks.renderer.reference import phase_volume
+from benchmarks.renderer.sampling import LightTable, RayTable, light_table, ray_table
 from benchmarks.renderer.scene import BenchScene
 from smokelift.render.camera_rays import LATERAL
 
@@ -36,7 +37,7 @@ def prepare(scene: BenchScene) -> Iteration:
     count, length = Int32(rays.count), Float(rays.step)
     b, db, c, dc = (Float(a) for a in (rays.b, rays.db, rays.c, rays.dc))
     first, following, across, down = (Int32(a) for a in (rays.first, rays.next, rays.across, rays.down))
-    phase = Float(phase_volume(scene).ravel())
+    phase = Float(phase_volume(scene).astype(np.float32).ravel())
     target = [Float(np.ascontiguousarray(scene.target.reshape(-1, 3)[rays.pixel, channel])) for channel in range(3)]
     colors = list(zip(scene.light.irradiance, scene.background, target, strict=True))
     mode = without_atomics()
