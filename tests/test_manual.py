@@ -73,17 +73,6 @@ def test_commands_in_sentences_exist_with_their_options(page: Path) -> None:
         assert given <= options, (command, given - options)
 
 
-def test_a_wrong_command_is_found(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(
-        "    smokelift reconstruct clip.mp4 \\\n        --out smoke  # comment\n\n```\nsmokelift nothing\n```\n"
-    )
-    taken, wrong = commands(page, "smokelift")
-    parse(shlex.split(taken))
-    with pytest.raises(pytest.fail.Exception):
-        parse(shlex.split(wrong))
-
-
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_make_targets_of_a_page_exist(page: Path) -> None:
     targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
@@ -207,11 +196,6 @@ def test_sentences_of_the_troubleshooting_page_are_said() -> None:
 def holds(words: list[str], part: list[str]) -> bool:
     """Whether words hold others in one piece."""
     return any(words[first : first + len(part)] == part for first in range(len(words) - len(part) + 1))
-
-
-def test_a_sentence_that_nobody_says_is_found() -> None:
-    assert holds(["a", "b", "c"], ["b", "c"])
-    assert not holds(["a", "b", "c"], ["c", "b"])
 
 
 def test_the_notebook_lists_every_experiment_with_its_question() -> None:

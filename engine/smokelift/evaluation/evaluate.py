@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
-from smokelift.evaluation.orbit import Orbit, orbit_curves, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit import Orbit, orbit_tiles, write_orbit_page
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
 from smokelift.evaluation.truth import Truth, on_grid, resampled
@@ -45,8 +45,7 @@ class Evaluation:
             true = _true_density(sequence, self.truth, number)
             rows[f"truth, frame {number}"] = orbit_tiles(Orbit(on_grid(sequence.scene, self.truth.shape)), true)
         rows[f"sequence, frame {number}"] = orbit_tiles(Orbit(sequence.scene), sequence.density(number))
-        scores = self.figures["orbit"]
-        write_orbit_page(path, rows, scores["azimuths"], orbit_curves(scores, "sequence"))
+        write_orbit_page(path, rows, self.figures["orbit"])
 
 
 def evaluate(

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image as Pillow
-from PIL import ImageDraw
 
 from smokelift.density.turntable import Turntable
-from smokelift.output.images import GAP, Tile, eight_bit, write_sheet
+from smokelift.output.images import Tile, eight_bit, write_sheet
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.scene import Camera, CompleteScene, FiniteLight, PointLight
 from smokelift.transport import Array
@@ -27,13 +24,11 @@ DEGREES = tuple(range(0, 180, 18))
 
 TITLES = tuple(f"{degrees}\N{DEGREE SIGN}" for degrees in DEGREES)
 
-TILE_ROWS, CURVE_ROWS = 240, 180
+TILE_ROWS = 240
 """Pixels."""
 
-COLORS = ((240, 170, 60), (90, 170, 250), (120, 220, 120), (240, 110, 180), (180, 140, 250))
-"""Colors of the curves, in order."""
-
-GRAY = (120, 120, 120)
+SHOWN = ("patches", "patches_worst", "patches_own", "edges", "flicker")
+"""Scores in the label of a row."""
 
 
 class Orbit:
@@ -91,46 +86,8 @@ def orbit_tiles(orbit: Orbit, density: Volume) -> list[Tile]:
     return [eight_bit(orbit.image(density, degrees, TILE_ROWS)) for degrees in DEGREES]
 
 
-def orbit_curves(scores: Mapping[str, Any], name: str) -> dict[str, list[float | None]]:
-    """Return the curves of some `orbit_scores`: of the sequence, and of the reference itself."""
-    curves = {f"{name}: patches": scores["patches_by_azimuth"]}
-    own = scores["patches_own_by_azimuth"] or len(scores["azimuths"]) * [scores["patches_own"]]
-    return curves | {f"{scores['reference']}: patches, own": own}
-
-
-def write_orbit_page(
-    path: Path,
-    rows: Mapping[str, Sequence[Tile]],
-    azimuths: Sequence[float],
-    curves: Mapping[str, Sequence[float | None]],
-) -> None:
-    """Write rows of `orbit_tiles` by their labels, and curves over azimuths (degrees) below them, as a PNG."""
-    widths = [tile.shape[1] for tile in next(iter(rows.values()))]
-    curve = _drawn(sum(widths) + GAP * (len(widths) - 1), azimuths, curves)
-    write_sheet(path, [*rows.values(), [curve]], TITLES, [*rows, "patches by azimuth: 0 is the reference's texture"])
-
-
-def _drawn(width: int, azimuths: Sequence[float], curves: Mapping[str, Sequence[float | None]]) -> Tile:
-    """A tile with curves from 0 up, their names, and the scales of both axes; azimuths lie below their columns."""
-    known = [value for values in curves.values() for value in values if value is not None]
-    top = 1.15 * max(known, default=1.0) or 1.0
-    picture = Pillow.new("RGB", (width, CURVE_ROWS), (16, 16, 16))
-    draw = ImageDraw.Draw(picture)
-    column = width / len(DEGREES)
-
-    def place(degrees: float, value: float) -> tuple[float, float]:
-        return column * (degrees / DEGREES[1] + 0.5), (CURVE_ROWS - 4) * (1 - value / top)
-
-    step = 10 ** np.floor(np.log10(top / 2))
-    step *= max(factor for factor in (1, 2, 5) if factor * step <= top / 2)
-    for value in np.arange(0, top, step):
-        height = place(0, value)[1]
-        draw.line([(0, height), (width, height)], fill=(50, 50, 50))
-        draw.text((2, height - 12), f"{value:g}", fill=GRAY)
-    for index, (name, values) in enumerate(curves.items()):
-        color = COLORS[index % len(COLORS)]
-        points = [place(at, value) for at, value in zip(azimuths, values, strict=True) if value is not None]
-        for ends in pairwise(points):
-            draw.line(ends, fill=color, width=2)
-        draw.text((column, 2 + 12 * index), name, fill=color)
-    return np.asarray(picture)
+def write_orbit_page(path: Path, rows: Mapping[str, Sequence[Tile]], scores: Mapping[str, Any]) -> None:
+    """Write rows of `orbit_tiles` by their labels as a PNG; the last is labelled with its `orbit_scores`."""
+    figures = ", ".join(f"{name.replace('_', ', ')} {scores[name]:.3f}" for name in SHOWN if scores[name] is not None)
+    *others, last = rows
+    write_sheet(path, [*rows.values()], TITLES, [*others, f"{last}, beside the {scores['reference']}: {figures}"])
