@@ -88,6 +88,6 @@ def orbit_tiles(orbit: Orbit, density: Volume) -> list[Tile]:
 
 def write_orbit_page(path: Path, rows: Mapping[str, Sequence[Tile]], scores: Mapping[str, Any]) -> None:
     """Write rows of `orbit_tiles` by their labels as a PNG; the last is labelled with its `orbit_scores`."""
-    figures = ", ".join(f"{name.replace('_', ', ')} {scores[name]:.3f}" for name in SHOWN if scores[name] is not None)
+    figures = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in SHOWN if scores[name] is not None)
     *others, last = rows
     write_sheet(path, [*rows.values()], TITLES, [*others, f"{last}, beside the {scores['reference']}: {figures}"])
