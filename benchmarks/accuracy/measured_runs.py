@@ -10,11 +10,8 @@ from pathlib import Path
 import numpy as np
 
 ERRORS = {
-    "input_error": "error of the input view (RMS of sRGB values, white is 1)",
     "view_error": "error of new views (RMS of sRGB values, white is 1)",
     "patches": "patches of the orbit, distance from the truth's",
-    "density_error": "error of the density (relative L2)",
-    "velocity_error": "error of the velocity in smoke (relative L2)",
 }
 
 DEFAULT = "balanced"
@@ -37,8 +34,6 @@ class Run:
     ----------
     name
         A quality, "paper" or a baseline, and after a colon what was changed: "fine:resolution=32x32x48".
-    method
-        "default", "paper" or "baseline".
     resolution
         "64x64x96"; empty for a baseline that has none.
     seconds
@@ -48,7 +43,6 @@ class Run:
     """
 
     name: str
-    method: str
     resolution: str
     seconds: float | None
     errors: dict[str, float]
@@ -114,37 +108,32 @@ def read_runs(path: Path) -> Runs:
         If there is no scene that all runs share.
     """
     with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        rows, columns = list(reader), reader.fieldnames or ()
+        rows = list(csv.DictReader(file))
     by_run: dict[str, dict[str, dict[str, str]]] = {}
     for row in (row for row in rows if row["method"] != _REFERENCE):
         by_run.setdefault(row["run"], {})[row["scene"]] = row
     shared = sorted(set.intersection(*(set(scenes) for scenes in by_run.values())))
     if not shared:
         raise ValueError(f"{path}: there is no scene that all runs share; measure all of them on the same scenes.")
-    decibels = {"view_error": "psnr_new"}
-    if (first := next(name for name in columns if name.startswith("psnr_"))) != "psnr_new":
-        decibels = {"input_error": first, **decibels}
-    runs = tuple(_mean(name, [scenes[scene] for scene in shared], decibels) for name, scenes in by_run.items())
+    runs = tuple(_mean(name, [scenes[scene] for scene in shared]) for name, scenes in by_run.items())
     return Runs(runs, _caption([scenes[scene] for scenes in by_run.values() for scene in shared], shared))
 
 
-def _mean(name: str, rows: list[dict[str, str]], decibels: dict[str, str]) -> Run:
+def _mean(name: str, rows: list[dict[str, str]]) -> Run:
     def mean(column: str) -> float | None:
         values = [float(row[column]) for row in rows if row[column] != ""]
         return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
 
-    errors = {"density_error": mean("density_error"), "velocity_error": mean("velocity_error")}
-    if "patches" in rows[0]:
-        errors["patches"] = mean("patches")
-    for key, column in decibels.items():
-        if (value := mean(column)) is not None:
-            errors[key] = 10 ** (-value / 20)
+    decibels = mean("psnr_new")
+    errors = {
+        "view_error": None if decibels is None else 10 ** (-decibels / 20),
+        "patches": mean("patches") if "patches" in rows[0] else None,
+    }
     known = {key: value for key, value in errors.items() if value is not None and value > 0}
     seconds = mean("seconds")
     if seconds is not None and seconds <= 0:
         seconds = None
-    return Run(name, rows[0]["method"], rows[0].get("resolution") or "", seconds, known)
+    return Run(name, rows[0].get("resolution") or "", seconds, known)
 
 
 def _caption(rows: list[dict[str, str]], scenes: Sequence[str]) -> str:

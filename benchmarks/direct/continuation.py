@@ -17,30 +17,17 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
-from benchmarks.accuracy.score import known_densities
 from benchmarks.direct.clips import density_error, reconstructed_moment, true_moment
-from benchmarks.measure import view_figures
 from benchmarks.tables import markdown
 from smokelift.direct import SmokeState, coarse, fit_simulation, spun_up
 from smokelift.direct.continuation import FITTED_FRAMES
 from smokelift.direct.fitting import BUOYANCY_FRAMES
 from smokelift.direct.simulation import Physics, Simulation
 from smokelift.output.images import eight_bit, write_sheet
-from smokelift.transport import Array, Velocity, advect, at_centres, divergence
+from smokelift.transport import Array, Velocity, advect, at_centres
 
 RUN = "balanced"
-HEADER = [
-    "scene",
-    "from",
-    "",
-    "buoyancy",
-    "rise",
-    "error",
-    "error, last frame",
-    "new views (dB)",
-    "mass over the truth's",
-    "divergence",
-]
+HEADER = ("scene", "from", "", "buoyancy", "rise", "error", "error, last frame")
 
 
 def ways(
@@ -89,12 +76,6 @@ def rise(velocities: list[Velocity], density: Array, dt: float) -> float:
     return way
 
 
-def largest_divergence(moment: SmokeState) -> float:
-    """Return the largest |div u| times voxel size over the largest |u|."""
-    largest = max(float(np.abs(component).max()) for component in moment.velocity.faces)
-    return float(np.abs(divergence(moment.velocity)).max()) * moment.velocity.voxel_size / largest
-
-
 def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list[str]]:
     """Yield the rows of a scene from its truth, or from a run in a folder; its head dissolves at a rate (1/s)."""
     truth = known.truth
@@ -107,22 +88,13 @@ def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list
     else:
         moments = [reconstructed_moment(folder, truth, frame) for frame in shown]
     really = rise([truth.velocity(frame - 1) for frame in frames], truth.density(cut - 1), truth.dt)
-    run, at = ("truth", Path()) if folder is None else (RUN, folder)
-    about = known_densities(known, run, at)
-    assert about is not None
     fitted = with_dissolving_heads(moments, truth.dt, heads)
     for how, found, physics in ways(moments, len(frames), truth.dt, fitted):
         errors = [density_error(m.density, truth.density(f)) for m, f in zip(found, frames, strict=True)]
-        new = dict(list(known.cameras.items())[1:])
-        at_frame = {frame: moment.density for frame, moment in zip(frames, found, strict=True)}
-        views = view_figures(about.scene, at_frame.__getitem__, new, known.seen, frames[::3])["psnr_new"]
-        ratio = truth.density(cut).size / found[-1].density.size
-        mass = ratio * found[-1].density.sum(dtype=float) / truth.density(frames[-1]).sum(dtype=float)
-        figures = [f"{np.mean(errors):.2f}", f"{errors[-1]:.2f}", f"{views:.1f}", f"{mass:.2f}"]
         up = rise([moment.velocity for moment in found], moments[-1].density, truth.dt) / really
         own = [f"{physics.buoyancy:.2f}", f"{up:.2f}"] if physics else ["", ""]
         source = "truth" if folder is None else "clip"
-        yield [known.name, source, how, *own, *figures, f"{largest_divergence(found[-1]):.0e}"]
+        yield [known.name, source, how, *own, f"{np.mean(errors):.2f}", f"{errors[-1]:.2f}"]
 
 
 def tile(density: Array, white: float) -> npt.NDArray[np.uint8]:

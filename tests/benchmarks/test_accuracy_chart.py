@@ -30,23 +30,12 @@ def write(folder: Path, text: str = HEADER + ROWS) -> Path:
 def test_runs_are_means_over_the_scenes(tmp_path) -> None:
     found = read_runs(write(tmp_path))
     draft, paper, billboard = found.runs  # a reference is not drawn
-    assert (draft.name, draft.method, draft.seconds) == ("draft", "default", 1.0)
+    assert (draft.name, draft.seconds) == ("draft", 1.0)
     assert draft.errors["view_error"] == pytest.approx(10 ** (-25 / 20))
-    assert draft.errors["density_error"] == pytest.approx(0.8)
-    assert draft.errors["velocity_error"] == pytest.approx(0.6)
     assert paper.seconds == 7
     assert billboard.seconds is None
     assert list(billboard.errors) == ["view_error"]
     assert found.caption == "a, b; 24 frames; box; 2026-01-01, 2026-01-02"
-
-
-def test_the_input_view_counts_where_it_is_known(tmp_path) -> None:
-    text = (HEADER + ROWS).replace("seconds,psnr_new", "seconds,psnr_0,psnr_new")
-    text = text.replace(",20,", ",40,20,").replace(",30,", ",40,30,").replace(",60,", ",60,60,")
-    draft, _, billboard = read_runs(write(tmp_path, text)).runs
-    assert draft.errors["input_error"] == pytest.approx(0.01)
-    assert draft.errors["view_error"] == pytest.approx(10 ** (-25 / 20))
-    assert set(billboard.errors) == {"input_error", "view_error"}
 
 
 def test_the_default_is_what_a_user_gets_who_says_nothing(tmp_path) -> None:
@@ -64,10 +53,10 @@ def test_no_label_lies_over_another_or_leaves_its_panel() -> None:
     names = [*crowd, "balanced:resolution=auto", *(f"balanced:detail={share}" for share in (0, 0.25, 0.5, 0.75))]
     error = dict.fromkeys(("view_error", "patches"), 0.07)
     runs = [
-        Run(name, "default", "8x8x96", 1 + 0.02 * index, {key: value + 1e-4 * index for key, value in error.items()})
+        Run(name, "8x8x96", 1 + 0.02 * index, {key: value + 1e-4 * index for key, value in error.items()})
         for index, name in enumerate(names)
     ]
-    figure = chart(Runs((*runs, Run("billboard", "baseline", "", None, error)), "crowded"))
+    figure = chart(Runs((*runs, Run("billboard", "", None, error)), "crowded"))
     panels = [axes for axes in figure.axes if axes.axison]
     assert len(panels) == 2
     for axes in panels:
