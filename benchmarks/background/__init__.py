@@ -1,6 +1,5 @@
 """How well the background of a clip and the smoke before it are found, and what that costs the volume.
 
 - ``cases``: clips of baked smoke before known backgrounds
-- ``plate_score``: the figures of a background that is found
 - ``colors``: whether the smoke's own color is found
 """

@@ -18,21 +18,74 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.background.cases import CASES, SMOKES, VOLUMES, Case
-from benchmarks.background.plate_score import score
 from benchmarks.baked import Baked
 from benchmarks.disturbances.known import GRID, SIZE
 from benchmarks.measure import Figures, optical_mass, reconstructed, view_figures
 from benchmarks.plates import BRIGHT
 from benchmarks.tables import line, markdown
-from smokelift import Background, Domain, Settings
+from smokelift import Background, Clip, Domain, Settings
 from smokelift.footage.backdrop import find_backdrop
-from smokelift.footage.plate import Plates, known_plate, without_noise_light
+from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plates, evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
 
 FIGURES = ("plate", "lost", "missed", "false", "unknown")
 
 SCORED = range(4, 40, 5)
 """Frames of a clip that is reconstructed in which it is scored."""
+
+
+VISIBLE, CLEAR = 6.0, 0.5
+"""8 bit codes of contrast from which smoke should be found, and up to which a pixel is clear."""
+
+LOOKED_AT = 8
+"""Frames of a clip."""
+
+
+def plate_score(clip: Clip, plates: Plates, background: Picture, clean: Picture) -> dict[str, float]:
+    """Judge the plates that were found for a clip.
+
+    Parameters
+    ----------
+    clip, plates
+        What was filmed, and what was found behind it.
+    background : (rows, columns, 3)
+        The true background, linear.
+    clean : (frames, rows, columns, 3)
+        The true pictures, linear.
+
+    Returns
+    -------
+    ``plate``: 95th percentile of the error where smoke passes (8 bit codes); ``lost``: fraction of the smoke's light
+    that the plate holds; ``missed``: visible smoke outside the matte; ``false``: clear pixels inside it; ``unknown``:
+    fraction of the picture.
+    """
+    clip = evened(clip, plates)
+    truth = linear_to_srgb(background)
+    missed, false, errors, lost, smoke = [], [], [], 0.0, 0.0
+    touched = np.zeros(clean.shape[1:3], np.bool_)
+    unknown = 0.0
+    for number in clip.spread(LOOKED_AT):
+        plate = plates.at(number)
+        contrast = np.abs(linear_to_srgb(clean[number]) - truth).max(-1) * 255
+        found = matte(clip.frame(number), plate).mask
+        visible = contrast > VISIBLE
+        touched |= visible
+        if visible.any():
+            missed.append(float((visible & ~found).sum() / visible.sum()))
+        false.append(float(found[contrast < CLEAR].mean()) if (contrast < CLEAR).any() else 0.0)
+        lost += float(np.abs(plate.image - background)[visible].sum())
+        smoke += float(np.abs(clean[number] - background)[visible].sum())
+        errors.append(np.abs(linear_to_srgb(plate.image) - truth).max(-1) * 255)
+        unknown = float((plate.confidence < 0.5).mean())
+    return {
+        "plate": float(np.percentile(np.stack(errors)[:, touched], 95)),
+        "lost": lost / smoke,
+        "missed": float(np.mean(missed)),
+        "false": float(np.mean(false)),
+        "unknown": unknown,
+    }
 
 
 def plate_row(case: Case, scenes: Sequence[Baked]) -> list[str]:
@@ -49,7 +102,7 @@ def plate_row(case: Case, scenes: Sequence[Baked]) -> list[str]:
             found = find_backdrop(clip, None, None)
             plates, clip = found.plates, found.clip
         seconds += time.process_time() - began
-        rows.append(score(clip, plates, background, case.clean(seen)))
+        rows.append(plate_score(clip, plates, background, case.clean(seen)))
     figures = {name: [row[name] for row in rows] for name in FIGURES}
     cells = [f"{np.mean(figures['plate']):.1f} ({np.max(figures['plate']):.1f})"]
     cells += [f"{np.mean(figures[name]):.1%} ({np.max(figures[name]):.1%})" for name in FIGURES[1:]]

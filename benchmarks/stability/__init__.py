@@ -5,8 +5,7 @@
 - ``cases``: the classes of cases
 - ``environments``: what of the system fails: disk, folder, memory, threads, files, network, a signal
 - ``recovery``: a run whose system fails, and the run that goes on from it
-- ``forked``: one case after the other, each in a fork of a process that has loaded the engine
-- ``judge``: what a command may do, and what not
+- ``forked``: one case after the other, each in a fork of a process that has loaded the engine, and what it may do
 
 ``python -m benchmarks.stability FOLDER --cases 100`` runs so many cases of every class and prints a table.
 """

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.stability.environments import ENVIRONMENTS
-from benchmarks.stability.forked import Ended, run
-from benchmarks.stability.judge import files_of, verdict
+from benchmarks.stability.forked import Ended, files_of, run, verdict
 from benchmarks.stability.mutations import damaged_bytes, damaged_json, damaged_text, extreme_array
 from benchmarks.stability.recovery import recovered
 from benchmarks.stability.shot import TinyShot

@@ -1,4 +1,7 @@
-"""Runs a command in a fork of this process, which has loaded the engine: that saves its second for every case."""
+"""Runs a command in a fork of this process, which has loaded the engine, and says what is wrong with how it ended.
+
+The fork saves the engine's second for every case. A command may end well, or with one line and a status.
+"""
 
 import faulthandler
 import gc
@@ -8,13 +11,16 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 CRASHED = 70
 """Status of an exception that the command does not handle (EX_SOFTWARE)."""
 
+
+STATUSES = (0, 2, 3, 130)
+"""Done, bad input, device or memory, cancelled."""
 
 PROCESSOR_SECONDS, SECONDS, MEMORY = 30, 600.0, 6 * 2**30
 """Seconds of processor time, seconds in all, and bytes of address space that a case may take."""
@@ -83,6 +89,39 @@ def run(
     status, hung = _wait(child, seconds)
     output, errors = (path.read_text(encoding="utf-8", errors="replace") for path in spoken)
     return Ended(status, output, errors, hung or status in (-signal.SIGXCPU, -signal.SIGKILL))
+
+
+def files_of(folder: Path) -> dict[str, tuple[int, int]]:
+    """Size and time of change of everything below a folder."""
+    return {
+        str(path.relative_to(folder)): (path.lstat().st_size, path.lstat().st_mtime_ns)
+        for path in sorted(folder.rglob("*"))
+        if not path.is_dir()
+    }
+
+
+def verdict(ended: Ended, before: Mapping[str, object], after: Mapping[str, object], out: str) -> str:
+    """Return in a word what is wrong with how a command ended; "" if nothing is.
+
+    Parameters
+    ----------
+    before, after
+        `files_of` its folder.
+    out
+        Beginning of the names that it may write.
+    """
+    if ended.hung:
+        return "hung"
+    if "Traceback" in ended.errors:
+        return "traceback"
+    if ended.status < 0:
+        return "signal"
+    if ended.status not in STATUSES:
+        return "status"
+    if ended.status and len(ended.errors.strip().splitlines()) != 1:
+        return "not one line"
+    touched = {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+    return "other files" if any(not name.startswith(out) for name in touched) else ""
 
 
 def _wait(child: int, seconds: float) -> tuple[int, bool]:

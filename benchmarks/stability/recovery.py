@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.environments import Environment
-from benchmarks.stability.forked import Ended, nothing, run
-from benchmarks.stability.judge import files_of, verdict
+from benchmarks.stability.forked import Ended, files_of, nothing, run, verdict
 from benchmarks.stability.shot import TinyShot
 from smokelift.app.cli import main
 from smokelift.output.files import INDEX

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.background.__main__ import plate_score as score
 from benchmarks.background.cases import CASES, with_column
-from benchmarks.background.plate_score import score
 from benchmarks.baked import FRONT, Baked
 from benchmarks.measure import optical_mass, view_figures
 from smokelift import Camera, DirectionalLight, Domain, Medium, Scene

@@ -19,8 +19,7 @@ import pytest
 from benchmarks.stability.__main__ import failures
 from benchmarks.stability.cases import DAMAGED, EXTRACTED
 from benchmarks.stability.environments import ENVIRONMENTS, Failure, lacking
-from benchmarks.stability.forked import Ended, run
-from benchmarks.stability.judge import verdict
+from benchmarks.stability.forked import Ended, run, verdict
 from benchmarks.stability.recovery import recovered
 from benchmarks.stability.shot import TinyShot, tiny_shot
 
