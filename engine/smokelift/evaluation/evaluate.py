@@ -11,13 +11,20 @@ import numpy.typing as npt
 
 from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
-from smokelift.evaluation.orbit import Orbit, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit import Orbit
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
 from smokelift.evaluation.truth import Truth, on_grid, resampled
+from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Volume
+
+TILE_AZIMUTHS, TILE_ROWS = tuple(range(0, 180, 18)), 240
+"""Azimuths of the pictures (degrees), and their pixels."""
+
+SHOWN = ("patches", "patches_worst", "patches_own", "edges", "flicker")
+"""Scores in the label of a picture's row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +44,23 @@ class Evaluation:
     truth: Truth | None
 
     def write_picture(self, path: Path) -> None:
-        """Write a late frame from all around, above the truth's where it is known, with its scores, as a PNG."""
+        """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""
         sequence = self.sequence
         number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
-        rows = {}
+        scores = self.figures["orbit"]
+        shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in SHOWN if scores[name] is not None)
+        rows = [
+            (f"frame {number}, beside the {scores['reference']}: {shown}", sequence.scene, sequence.density(number))
+        ]
         if self.truth is not None:
             true = _true_density(sequence, self.truth, number)
-            rows[f"truth, frame {number}"] = orbit_tiles(Orbit(on_grid(sequence.scene, self.truth.shape)), true)
-        rows[f"sequence, frame {number}"] = orbit_tiles(Orbit(sequence.scene), sequence.density(number))
-        write_orbit_page(path, rows, self.figures["orbit"])
+            rows.insert(0, (f"truth, frame {number}", on_grid(sequence.scene, self.truth.shape), true))
+        labels = [said for said, _, _ in rows]
+        tiles = [
+            [eight_bit(Orbit(scene).image(density, degrees, TILE_ROWS)) for degrees in TILE_AZIMUTHS]
+            for _, scene, density in rows
+        ]
+        write_sheet(path, tiles, [f"{degrees}\N{DEGREE SIGN}" for degrees in TILE_AZIMUTHS], labels)
 
 
 def evaluate(

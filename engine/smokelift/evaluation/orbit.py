@@ -1,34 +1,19 @@
-"""Smoke on a turntable, lit, before black: the pictures in which it is compared from all around, and a page of them."""
+"""Smoke on a turntable, lit, before black: the pictures in which it is compared from all around."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from smokelift.density.turntable import Turntable
-from smokelift.output.images import Tile, eight_bit, write_sheet
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.scene import Camera, CompleteScene, FiniteLight, PointLight
 from smokelift.transport import Array
 
 GAMMA = 2.2
 """Exponent of the gray values: differences count as they are seen."""
-
-DEGREES = tuple(range(0, 180, 18))
-"""Azimuths of the columns."""
-
-TITLES = tuple(f"{degrees}\N{DEGREE SIGN}" for degrees in DEGREES)
-
-TILE_ROWS = 240
-"""Pixels."""
-
-SHOWN = ("patches", "patches_worst", "patches_own", "edges", "flicker")
-"""Scores in the label of a row."""
 
 
 class Orbit:
@@ -79,15 +64,3 @@ def gray(image: Image) -> Array:
 
 def _axes(camera: Camera) -> npt.NDArray[np.float64]:
     return np.array(camera.matrix)[:3, :3]
-
-
-def orbit_tiles(orbit: Orbit, density: Volume) -> list[Tile]:
-    """Return sRGB tiles (rows, columns, 3) of a density from `DEGREES`."""
-    return [eight_bit(orbit.image(density, degrees, TILE_ROWS)) for degrees in DEGREES]
-
-
-def write_orbit_page(path: Path, rows: Mapping[str, Sequence[Tile]], scores: Mapping[str, Any]) -> None:
-    """Write rows of `orbit_tiles` by their labels as a PNG; the last is labelled with its `orbit_scores`."""
-    figures = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in SHOWN if scores[name] is not None)
-    *others, last = rows
-    write_sheet(path, [*rows.values()], TITLES, [*others, f"{last}, beside the {scores['reference']}: {figures}"])

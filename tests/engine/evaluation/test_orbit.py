@@ -1,12 +1,11 @@
-"""Smoke on a turntable: what is lit, what only absorbs, lights that go around with the camera, and the page of it."""
+"""Smoke on a turntable: what is lit, what only absorbs, and lights that go around with the camera."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from smokelift.evaluation.orbit import DEGREES, Orbit, gray, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit import Orbit, gray
 from smokelift.scene import Background, CompleteScene, DirectionalLight, Medium, PointLight, completed
 
 
@@ -48,14 +47,3 @@ def test_smoke_that_only_absorbs_is_seen_by_its_shadow(plume, scene):
 
 def test_gray_values_are_as_they_are_seen():
     np.testing.assert_allclose(gray(np.array([[[0.2, 0.2, 0.2], [-1, -1, -1]]])), [[0.2 ** (1 / 2.2), 0]])
-
-
-def test_a_page_has_ten_azimuths_a_row(plume, tmp_path):
-    tiles = orbit_tiles(Orbit(completed(plume.scene)), plume.densities[2])
-    assert len(tiles) == len(DEGREES) == 10
-    assert np.abs(tiles[0].astype(float) - tiles[5]).max() > 20
-    scores = {"reference": "front", "patches": 0.1, "patches_worst": 0.2, "patches_own": None, "edges": 1, "flicker": 1}
-    write_orbit_page(tmp_path / "page.png", {"one": tiles, "other": tiles}, scores)
-    page = np.asarray(Image.open(tmp_path / "page.png"))
-    assert page.shape[1] == sum(tile.shape[1] + 4 for tile in tiles) + 4
-    assert page.shape[0] > 2 * tiles[0].shape[0]
