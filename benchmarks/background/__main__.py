@@ -1,10 +1,10 @@
 """Find the background of clips whose background is known, or reconstruct them.
 
-    python -m benchmarks.background SCENES/plume-1 SCENES/jet-2 ... [--only wall black] [--runs]
+    python -m benchmarks.background SCENES/plume-1 SCENES/jet-2 ... [--only wall black] [--runs | --colors]
 
 A scene is a folder that `benchmarks.truth.picture` filled. Without --runs only the background is looked for. With it
 each clip whose volume is known is reconstructed, `balanced` without detail on 24 x 24 x 36 voxels, its camera, box,
-medium and light given, and compared with the clean one.
+medium and light given, and compared with the clean one. With --colors the smoke's own color is looked for.
 """
 
 import argparse
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.background.cases import CASES, SMOKES, VOLUMES, Case
+from benchmarks.background.colors import print_colors
 from benchmarks.baked import Baked
 from benchmarks.disturbances.known import GRID, SIZE
 from benchmarks.measure import Figures, optical_mass, reconstructed, view_figures
@@ -168,8 +169,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--only", nargs="*", default=[""], help="cases whose names begin so")
     parser.add_argument("--runs", action="store_true", help="new views and mass beside the clean clip")
+    parser.add_argument("--colors", action="store_true", help="angles from the smoke's own color")
     options = parser.parse_args(arguments)
     scenes = [Baked.load(folder, views=("0", "20", "45", "90") if options.runs else "0") for folder in options.scenes]
+    if options.colors:
+        print_colors(scenes)
+        return
     cases = {name: case for name, case in CASES.items() if name.startswith(tuple(options.only))}
     if not options.runs:
         header = ("plate error (codes)", "smoke's light lost", "smoke missed", "clear pixels masked", "unknown", "s")

@@ -1,20 +1,15 @@
 """Whether the smoke's own color is found, of baked smoke before several backgrounds.
 
-    python -m benchmarks.background.colors SCENES/plume-1 SCENES/jet-2 ... [--every 2]
-
-A scene is a folder that `benchmarks.truth.picture` filled. Its radiance is multiplied by the colors of light and smoke,
-as single scattering does. A cell has the scenes where the smoke's own color was found, and the mean angle between it
-and the true one in degrees.
+Its radiance is multiplied by the colors of light and smoke, as single scattering does. A cell has the scenes where the
+smoke's own color was found, and the mean angle between it and the true one in degrees.
 """
 
-import argparse
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.baked import FRONT, Baked, Seen
+from benchmarks.baked import Baked, Seen
 from benchmarks.filming import exposed, filmed
 from benchmarks.plates import PAINTED, backdrop
 from benchmarks.tables import line, markdown
@@ -37,13 +32,9 @@ COLORS = {
 }
 
 
-def main() -> None:
+def print_colors(scenes: Sequence[Baked]) -> None:
     """Print the table row by row."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="+", type=Path)
-    parser.add_argument("--every", type=int, default=1, help="take every so many frames")
-    options = parser.parse_args()
-    smokes = [Baked.load(folder, views=FRONT).front.at(slice(None, None, options.every)) for folder in options.scenes]
+    smokes = [baked.front for baked in scenes]
     shape = smokes[0].shape
     wall = PAINTED["wall"](*shape)
     plates = {
@@ -71,7 +62,3 @@ def _angles(smokes: Sequence[Seen], light: Doubles, color: Doubles, plate: Pictu
             cosine = float(own @ color / (np.linalg.norm(own) * np.linalg.norm(color)))
             angles.append(math.degrees(math.acos(min(cosine, 1.0))))
     return f"{len(angles)} of {len(smokes)}" + (f", {np.mean(angles):.0f}" if angles else "")
-
-
-if __name__ == "__main__":
-    main()

@@ -28,7 +28,7 @@ from smokelift.direct import (
 )
 from smokelift.evaluation.orbit import Orbit
 from smokelift.output.images import eight_bit, write_sheet
-from smokelift.output.sequence import Sequence
+from smokelift.output.sequence import Sequence, box_around_all
 from smokelift.scene import Domain
 from smokelift.transport import Array, at_centres, faces_in
 
@@ -125,7 +125,7 @@ def main() -> None:
         overlap = default_overlap(last - first + 1)
         list(loop_sequence(source, options.out / "loop", first, last, overlap))
         loop = Sequence.open(options.out / "loop")
-        wide = _around([sequence.scene.domain for sequence in made.values()])
+        wide = box_around_all(source.scene.domain, [sequence.scene.domain for sequence in made.values()])
         steps = np.round(np.linspace(0, options.frames, COLUMNS)).astype(int).tolist()
         rows, labels = [], []
         for name, sequence in made.items():
@@ -135,15 +135,6 @@ def main() -> None:
         rows += rows_of(loop, numbers, wide)
         labels += ["loop's last frame and its seam, front", "loop, 45 degrees"]
         write_sheet(options.picture, rows, [f"+{step}" for step in steps], labels)
-
-
-def _around(boxes: list[Domain]) -> Domain:
-    """The smallest box around boxes of one lattice."""
-    first = boxes[0]
-    parts = [box.slices_in(first) for box in boxes]
-    below = tuple(max(-part[axis].start for part in parts) for axis in range(3))
-    above = tuple(max(part[axis].stop for part in parts) - first.resolution[axis] for axis in range(3))
-    return first.grown(below, above)
 
 
 if __name__ == "__main__":

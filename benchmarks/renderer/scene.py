@@ -85,18 +85,22 @@ def bench_scene(density: NDArray[np.float32], target: NDArray[np.float32], light
         camera=Camera.look_at((2.2, -1.6, 1.9), (0.5, 0.5, 0.5), fov_y_degrees=32, size=(size, size)),
         domain=Domain((0, 0, 0), (1, 1, 1), (size, size, size)),
         medium=Medium(extinction=OPTICAL_DEPTH * size / float(density.sum(1).max()), albedo=0.9, anisotropy=0.3),
-        lights=(_LIGHT,) if lights == 1 else _around(lights),
+        lights=(_LIGHT,) if lights == 1 else shining(-spread(lights), _LIGHT.irradiance),
         background=_BACKGROUND,
         density=density,
         target=target,
     )
 
 
-def _around(count: int) -> tuple[DirectionalLight, ...]:
-    """Return as many directional lights from the upper half of the sky, spread evenly, with the one light's power."""
-    height = (np.arange(count) + 0.5) / count
+def shining(directions: NDArray[np.float64], irradiance: tuple[float, float, float]) -> tuple[DirectionalLight, ...]:
+    """Return lights that travel in directions (count, 3) and have an irradiance together."""
+    r, g, b = (value / len(directions) for value in irradiance)
+    return tuple(DirectionalLight((x, y, z), (r, g, b)) for x, y, z in directions.tolist())
+
+
+def spread(count: int, lowest: float = 0.0) -> NDArray[np.float64]:
+    """Return directions (count, 3) towards the sky, spread evenly from the top down to a height of a unit sphere."""
+    height = lowest + (1 - lowest) * (np.arange(count) + 0.5) / count
     azimuth = np.pi * (1 + 5**0.5) * np.arange(count)
     level = np.sqrt(1 - height**2)
-    r, g, b = (value / count for value in _LIGHT.irradiance)
-    travel = -np.stack([level * np.cos(azimuth), level * np.sin(azimuth), height], -1)
-    return tuple(DirectionalLight((x, y, z), (r, g, b)) for x, y, z in travel.tolist())
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), height], -1)

@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.renderer.reference import image_and_gradient
-from benchmarks.renderer.scene import PLUME, BenchScene, bench_scene, plume
+from benchmarks.renderer.scene import PLUME, BenchScene, bench_scene, plume, shining, spread
 from benchmarks.tables import markdown
 from smokelift.evaluation.metrics import volume_error
 from smokelift.render import Renderer, Volume
-from smokelift.scene import DirectionalLight, Medium
+from smokelift.scene import Medium
 
 SIZE = 40
 DEPTHS = (0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
@@ -63,14 +63,7 @@ def row(scene: BenchScene) -> list[str]:
 
 def white_room(scene: BenchScene) -> float:
     """Return the brightest pixel where radiance 1 arrives from every side, in isotropic smoke."""
-    spiral = (np.arange(ROOM_LIGHTS) + 0.5) / ROOM_LIGHTS
-    height, turn = 1 - 2 * spiral, np.pi * (1 + 5**0.5) * np.arange(ROOM_LIGHTS)
-    level = np.sqrt(1 - height**2)
-    irradiance = (4 * np.pi / ROOM_LIGHTS,) * 3
-    lights = [
-        DirectionalLight((float(x), float(y), float(z)), irradiance)
-        for x, y, z in zip(level * np.cos(turn), level * np.sin(turn), height, strict=True)
-    ]
+    lights = shining(spread(ROOM_LIGHTS, -1.0), (4 * np.pi,) * 3)
     room = replace(scene.medium, anisotropy=0.0)
     wall = np.ones(3, np.float32)
     return float(Renderer(scene.camera, scene.domain, room, lights, wall).image(scene.density).max())

@@ -85,7 +85,7 @@ class Sequence:
             raise SequenceError(str(error)) from error
         return cls(
             directory,
-            replace(scene, domain=_around(scene.domain, boxes.values())),
+            replace(scene, domain=box_around_all(scene.domain, boxes.values())),
             index.settings,
             index.versions,
             index.numbers,
@@ -228,8 +228,8 @@ class Sequence:
         return {} if values is None else {name: values}
 
 
-def _around(domain: Domain, boxes: Iterable[Domain]) -> Domain:
-    """The domain, grown until it holds all boxes."""
+def box_around_all(domain: Domain, boxes: Iterable[Domain]) -> Domain:
+    """Return a domain, grown until it holds all boxes, whose voxels are in line with its own."""
     below, above = [0, 0, 0], [0, 0, 0]
     for box in boxes:
         for axis, part in enumerate(box.slices_in(domain)):
