@@ -10,9 +10,8 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from scipy import sparse
+from scipy import ndimage
 
-from smokelift.checks.array_types import Doubles
 from smokelift.density.turntable import Turntable
 from smokelift.evaluation.frame_means import finite_mean
 from smokelift.evaluation.metrics import RayShapes
@@ -66,30 +65,12 @@ def _band_ratio(shape: RayShapes, band: int) -> float | None:
 
 def _turned(upright: Volume, table: Turntable, degrees: float) -> Volume:
     """Smoke (columns, voxels along the rays of an azimuth, rows), read linearly from an upright volume."""
-    counts = upright.shape[:2]
     camera = np.array(table.camera(degrees).matrix)
     axes = [axis for axis in range(3) if axis != table.axis]
-    right, ray = camera[axes, 0], -camera[axes, 2]
+    turn = np.eye(3)
+    turn[:2, :2] = np.stack([camera[axes, 0], -camera[axes, 2]], -1)
     # voxels stay where they are as the box is turned by quarters
-    reach = [(np.abs(direction) @ counts - 1) / 2 for direction in (right, ray)]
-    across, along = (np.arange(-each, each + 0.5) for each in reach)
-    places = across[:, None, None] * right + along[:, None] * ray + (np.array(counts) - 1) / 2
-    read = _linear(places.reshape(-1, 2), (counts[0], counts[1]))
-    turned = read @ upright.reshape(-1, upright.shape[2])
-    return np.asarray(turned, np.float32).reshape(len(across), len(along), -1)
-
-
-def _linear(places: Doubles, counts: tuple[int, int]) -> sparse.csr_array:
-    """Weights (places, grid points) of a linear interpolation; what is outside the grid is zero."""
-    low = np.floor(places + 1e-6).astype(int)
-    fraction = places - low
-    rows, columns, weights = [], [], []
-    for corner in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        at = low + corner
-        weight = np.prod(np.where(corner, fraction, 1 - fraction), axis=1)
-        inside = ((at >= 0) & (at < counts)).all(1) & (weight > 1e-6)
-        rows.append(np.flatnonzero(inside))
-        columns.append(at[inside] @ (counts[1], 1))
-        weights.append(weight[inside])
-    found = np.concatenate(weights).astype(np.float32), (np.concatenate(rows), np.concatenate(columns))
-    return sparse.csr_array(found, shape=(len(places), counts[0] * counts[1]))
+    sizes = np.abs(turn).T @ upright.shape
+    offset = (np.array(upright.shape) - 1) / 2 - turn @ (sizes - 1) / 2
+    shape = tuple(np.ceil(sizes - 0.5).astype(int).tolist())
+    return np.asarray(ndimage.affine_transform(upright, turn, offset, shape, order=1, mode="grid-constant"))
