@@ -20,9 +20,6 @@ _VOXELS = "_voxels"
 """Ends the name of the bits that say where an array is not 0, by which its values alone are written: most of a large
 grid is empty."""
 
-_SHAPE = "_shape"
-"""Ends the name of such an array's shape."""
-
 
 @dataclass(frozen=True)
 class ResumeState:
@@ -35,8 +32,8 @@ class ResumeState:
     density : (nx, ny, nz)
     velocity
         On faces, m/s; the grid may be coarser than that of the density.
-    extra
-        Further arrays by name.
+    extra : (nx, ny, nz) each
+        Further volumes by name.
     """
 
     number: int
@@ -50,11 +47,7 @@ class ResumeState:
         volumes = {"density": self.density, **{_EXTRA + name: values for name, values in self.extra.items()}}
         for name, values in volumes.items():
             there = values != 0
-            arrays |= {
-                name: values[there],
-                name + _VOXELS: np.packbits(there.ravel()),
-                name + _SHAPE: np.array(values.shape),
-            }
+            arrays |= {name: values[there], name + _VOXELS: np.packbits(there.ravel())}
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod
@@ -74,11 +67,11 @@ class ResumeState:
         number = arrays.pop("number")
         x, y, z = (arrays.pop(name) for name in VELOCITY)
         try:
-            volumes = {name: _filled(arrays, name, shape) for name in arrays if not name.endswith((_VOXELS, _SHAPE))}
+            volumes = {name: _filled(arrays, name, shape) for name in arrays if not name.endswith(_VOXELS)}
             density = volumes.pop("density")
         except (KeyError, TypeError, ValueError) as error:
             raise OSError(f"{path}: cannot be read: what it says of its voxels does not fit") from error
-        if number.dtype.kind != "i" or number < 0 or density.shape != shape or density.min() < 0:
+        if number.dtype.kind != "i" or number < 0 or density.min() < 0:
             raise OSError(f"{path}: cannot be read: its number or density is not one that a run writes")
         if (x.shape, y.shape, z.shape) not in _grids(shape):
             raise OSError(
@@ -88,14 +81,11 @@ class ResumeState:
         return ResumeState(int(number), density, (x, y, z), extra)
 
 
-def _filled(arrays: Mapping[str, npt.NDArray[Any]], name: str, most: Shape) -> npt.NDArray[Any]:
-    """Give the array of that name, zeros included; KeyError, TypeError or ValueError if its parts do not fit."""
-    values, shape = arrays[name], tuple(arrays[name + _SHAPE].tolist())
-    if len(shape) > len(most) or any(not 0 <= n <= m for n, m in zip(shape, most, strict=False)):
-        raise ValueError(f"{name} cannot have the shape {shape}")
+def _filled(arrays: Mapping[str, npt.NDArray[Any]], name: str, shape: Shape) -> npt.NDArray[Any]:
+    """Give the volume of that name, zeros included; KeyError, TypeError or ValueError if its parts do not fit."""
     there = np.unpackbits(arrays[name + _VOXELS], count=math.prod(shape)).view(bool).reshape(shape)
-    filled = np.zeros(shape, values.dtype)
-    filled[there] = values
+    filled = np.zeros(shape, arrays[name].dtype)
+    filled[there] = arrays[name]
     return filled
 
 
