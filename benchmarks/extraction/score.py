@@ -12,7 +12,7 @@ from benchmarks.baked import BLACK, FRONT, Baked
 from benchmarks.extraction.compose import Composed
 from benchmarks.measure import Figures, optical_mass, view_figures
 from smokelift.evaluation.frame_means import finite_mean
-from smokelift.footage.images import Picture, area_average
+from smokelift.footage.images import Picture
 from smokelift.render import Volume, scene_renderer
 from smokelift.scene import CompleteScene
 
@@ -56,7 +56,7 @@ def score_element(transmittance: npt.ArrayLike, radiance: npt.ArrayLike, truth: 
     radiance : (frames, rows, columns) or (frames, rows, columns, 3)
         What the smoke sends, linear.
     truth
-        The same frames. It is averaged down to the element's size if that is smaller.
+        The same frames, rows and columns.
 
     Returns
     -------
@@ -72,12 +72,11 @@ def score_element(transmittance: npt.ArrayLike, radiance: npt.ArrayLike, truth: 
     clear = clear.mean(-1) if clear.ndim == 4 else clear
     light = light if light.ndim == 4 else np.repeat(light[..., None], 3, -1)
     true_clear = truth.seen.transmittance
-    if clear.shape != light.shape[:3] or len(clear) != len(true_clear):
+    if clear.shape != light.shape[:3] or clear.shape != true_clear.shape:
         raise ValueError(
             f"T {clear.shape}, S {light.shape} and the truth's {true_clear.shape} must have the same frames, "
             "rows and columns."
         )
-    truth = _resized(truth, clear.shape[1:])
     plate, pictures = _detail(truth.plate.mean(-1)), truth.pictures()
     frames: list[dict[str, float | None]] = []
     for number, (t, s, true) in enumerate(zip(clear, light, truth.seen.transmittance, strict=True)):
@@ -143,13 +142,6 @@ def seen_element(scene: CompleteScene, densities: Iterable[Volume]) -> tuple[Pic
     shown = [(renderer.image(density), renderer.transmittance) for density in densities]
     light, clear = (np.stack(pictures) for pictures in zip(*shown, strict=True))
     return clear, light
-
-
-def _resized(truth: Composed, shape: tuple[int, ...]) -> Composed:
-    rows, columns = shape
-    if truth.plate.shape[:2] == (rows, columns):
-        return truth
-    return Composed(truth.seen.sized((columns, rows)), area_average(truth.plate, columns, rows))
 
 
 def _detail(picture: Picture) -> Picture:

@@ -118,13 +118,6 @@ def test_a_cut_tail_and_too_thin_smoke_are_seen(composed) -> None:
     assert score_element(np.sqrt(clear), composed.seen.radiance, composed)["thin_mass"] == pytest.approx(0.5, abs=0.01)
 
 
-def test_a_smaller_element_is_compared_at_its_size(composed) -> None:
-    half = composed.seen.transmittance[:, ::2, ::2], composed.seen.radiance[:, ::2, ::2]
-    assert score_element(*half, composed)["transmittance_error"] < 0.06
-    with pytest.raises(ValueError, match="same frames"):
-        score_element(composed.seen.transmittance[1:], composed.seen.radiance[1:], composed)
-
-
 def test_the_true_volumes_score_as_the_truth(smoke, composed) -> None:
     scene = completed(smoke.scene)
     figures = score_densities(scene, lambda frame: smoke.densities[frame].astype(np.float32), smoke, composed)
