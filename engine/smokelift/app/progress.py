@@ -250,4 +250,5 @@ class _Json(Reporter):
 
     def _say(self, event: str, **fields: Any) -> None:
         with _output():
-            print(json.dumps({"event": event, **fields}), file=sys.stdout, flush=True)
+            # in one piece, since shots of a batch speak side by side
+            print(json.dumps({"event": event, **fields}) + "\n", end="", flush=True)

@@ -10,10 +10,10 @@ from contextlib import suppress
 from html import escape
 from pathlib import Path
 from statistics import fmean, median
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import Record, read_index
+from smokelift.batch.work import Record, is_finished, read_index
 from smokelift.checks import counted
 from smokelift.output.files import atomic_path
 
@@ -30,9 +30,6 @@ img { height: 12em; max-width: 24em; object-fit: contain }
 _HEADINGS = ("clip and smoke", "shot", "state", "frames", "fit (dB)", "time (s)", "memory (GiB)", "what was said")
 
 
-Basis = Literal["measured", "scaled", "foretold"]
-
-
 class Remaining(NamedTuple):
     """What is left of a shot: how many frames, their seconds, and bytes at the peak, as measured or foretold.
 
@@ -44,23 +41,23 @@ class Remaining(NamedTuple):
     frames: int
     seconds: float
     memory: int
-    basis: Basis
+    basis: str
 
 
 def remaining_work(records: Mapping[BatchShot, Record]) -> tuple[Remaining, ...]:
     """Return what is left of each shot that is not finished and whose clip was inspected, longest first."""
-    known = [(shot, record, record.forecast, read_index(shot)) for shot, record in records.items() if record.forecast]
-    foretold = {shot: forecast["seconds"] / max(1, forecast["frames"]) for shot, _, forecast, _ in known}
-    measured = {shot: fmean(map(_seconds, index.frames.values())) for shot, _, _, index in known if index.frames}
+    known = {shot: (record.forecast, read_index(shot)) for shot, record in records.items() if record.forecast}
+    foretold = {shot: forecast["seconds"] / max(1, forecast["frames"]) for shot, (forecast, _) in known.items()}
+    measured = {shot: fmean(map(_seconds, index.frames.values())) for shot, (_, index) in known.items() if index.frames}
     ratios = [seconds / foretold[shot] for shot, seconds in measured.items() if foretold[shot] > 0]
     scale = median(ratios) if ratios else 1.0
     left = []
-    for shot, record, forecast, index in known:
-        if not (record.status == "done" and index.complete):
+    for shot, (forecast, index) in known.items():
+        if not is_finished(shot, records[shot]):
             missing = max(0, forecast["frames"] - len(index.frames))
-            basis: Basis = "measured" if shot in measured else "scaled" if ratios else "foretold"
+            basis = "measured" if shot in measured else "scaled" if ratios else "foretold"
             seconds = missing * measured.get(shot, scale * foretold[shot])
-            left.append(Remaining(shot, missing, seconds, max(forecast["memory"], record.memory), basis))
+            left.append(Remaining(shot, missing, seconds, max(forecast["memory"], records[shot].memory), basis))
     return tuple(sorted(left, key=lambda each: -each.seconds))
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from smokelift.checks import shown
-from smokelift.scene.toml_files import Place, line_of, parse_toml, read_text
+from smokelift.scene.toml_files import Place, TomlFile, read_toml
 
 OPTIONS = (
     *("quality", "method", "resolution", "scattering", "frames", "mask"),
@@ -44,80 +44,57 @@ class BatchShot:
         return self.folder / f"{self.name}.{extension}"
 
 
-class _ListError(ValueError):
-    """What is wrong in a list, and in which table or key."""
+def read_shots(path: Path, parser: argparse.ArgumentParser) -> tuple[BatchShot, ...]:
+    """Read a list of shots, with options that the parser of ``smokelift reconstruct`` takes.
 
-    def __init__(self, message: str, *place: str | int) -> None:
-        super().__init__(message)
-        self.place: Place = place
-
-
-def read_shots(path: Path, check: Callable[[Sequence[str]], None]) -> tuple[BatchShot, ...]:
-    """Read a list of shots; `check` raises ValueError for arguments that ``smokelift reconstruct`` does not take.
-
-    It raises ValueError with the file, the line and what was expected, and OSError if the file cannot be read.
+    It raises SceneError with the file, the line and what was expected.
     """
-    data, lines = parse_toml(read_text(path), path.name)
-    try:
-        return tuple(_shots(path.absolute().parent, data, check))
-    except _ListError as error:
-        raise ValueError(f"{path.name}{line_of(error.place, lines)}: {error}") from error
-
-
-def _shots(base: Path, data: Mapping[str, Any], check: Callable[[Sequence[str]], None]) -> Iterator[BatchShot]:
-    _require_known(data, ("out", "defaults", "shots"))
-    folder = base / _text(data.get("out", "results"), "out")
+    data, file = read_toml(path)
+    file.require_known((), data, ("out", "defaults", "shots"))
+    folder = file.base / _text(file, (), "out", data.get("out", "results"))
     tables, defaults = data.get("shots"), data.get("defaults", {})
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
-        raise _ListError("lists no shots; write a table [[shots]] with an input for each")
+        raise file.error((), "lists no shots; write a table [[shots]] with an input for each")
     if not isinstance(defaults, dict):
-        raise _ListError(f"defaults must be a table, not {shown(defaults)}", "defaults")
-    _require_known(defaults, OPTIONS, "defaults")
-    names = set()
-    for place, table in ((("shots", index), table) for index, table in enumerate(tables)):
-        _require_known(table, ("name", "input", *OPTIONS), *place)
+        raise file.error((), f"defaults must be a table, not {shown(defaults)}", "defaults")
+    file.require_known(("defaults",), defaults, OPTIONS)
+    shots: dict[str, BatchShot] = {}
+    for index, table in enumerate(tables):
+        place = "shots", index
+        file.require_known(place, table, ("name", "input", *OPTIONS))
         if "input" not in table:
-            raise _ListError("input is missing", *place)
-        source = base / _text(table["input"], *place, "input")
-        name = _text(table.get("name", source.stem.rstrip("#_-. ") or "shot"), *place, "name")
+            raise file.error(place, "lacks input")
+        source = file.base / _text(file, place, "input", table["input"])
+        name = _text(file, place, "name", table.get("name", source.stem.rstrip("#_-. ") or "shot"))
         if not _NAME.fullmatch(name):
-            raise _ListError(f"{shown(name)} cannot be the name of a file; choose another name", *place, "name")
-        if name.casefold() in names:  # some file systems do not tell a from A
-            raise _ListError(f"several shots are called {shown(name)}; give each a name", *place)
-        names.add(name.casefold())
+            raise file.error(place, f"{shown(name)} cannot be the name of a file; choose another name", "name")
+        if name.casefold() in shots:  # some file systems do not tell a from A
+            raise file.error(place, f"several shots are called {shown(name)}; give each a name")
         chosen = {**defaults, **table}
-        options = [word for key in OPTIONS if key in chosen for word in _words(base, chosen[key], *place, key)]
+        words = [word for key in OPTIONS if key in chosen for word in _words(file, place, key, chosen[key])]
         try:
-            check([str(source), "--out", str(folder / name), *options])
-        except ValueError as error:
-            raise _ListError(str(error), *place) from error
-        yield BatchShot(name, source, tuple(options), folder)
+            parser.parse_args([str(source), "--out", str(folder / name), *words])
+        except argparse.ArgumentError as error:
+            raise file.error(place, str(error)) from error
+        shots[name.casefold()] = BatchShot(name, source, tuple(words), folder)
+    return tuple(shots.values())
 
 
-def _words(base: Path, value: Any, *place: str | int) -> list[str]:
+def _words(file: TomlFile, place: Place, key: str, value: Any) -> list[str]:
     """The words of the command line that say an option."""
-    key = str(place[-1])
-    if key == "npz":
-        if not isinstance(value, bool):
-            raise _ListError(f"npz must be true or false, not {shown(value)}", *place)
+    if key == "npz" and isinstance(value, bool):
         return ["--npz"] * value
     if key == "mask":
-        value = str(base / _text(value, *place))
+        value = str(file.base / _text(file, place, key, value))
     between = {"frames": ":", "resolution": ","}.get(key)
     if isinstance(value, list) and between and all(type(part) is int for part in value):
         value = between.join(map(str, value))
-    if not isinstance(value, str | int | float) or isinstance(value, bool):
-        raise _ListError(f"{key} cannot be {shown(value)}", *place)
+    if key == "npz" or not isinstance(value, str | int | float) or isinstance(value, bool):
+        raise file.error(place, f"{key} cannot be {shown(value)}", key)
     return [f"--{key.replace('_', '-')}={value}"]  # one word, because a number may be negative
 
 
-def _text(value: Any, *place: str | int) -> str:
+def _text(file: TomlFile, place: Place, key: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise _ListError(f"{place[-1]} must be a text, not {shown(value)}", *place)
+        raise file.error(place, f"{key} must be a text, not {shown(value)}", key)
     return value
-
-
-def _require_known(table: Mapping[str, Any], keys: Sequence[str], *place: str | int) -> None:
-    for key in table:
-        if key not in keys:
-            raise _ListError(f"there is no key {shown(key)} here; known are {', '.join(keys)}", *place, key)

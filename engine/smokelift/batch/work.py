@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal
 
 import psutil
 
@@ -41,25 +41,13 @@ Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "c
 _STATUS: dict[int, Status] = {DONE: "done", CANCELLED: "cancelled", BAD_INPUT: "refused", NO_DEVICE: "refused"}
 
 
-Needs = Sequence[tuple[BatchShot, int]]
-"""Shots with the bytes of memory that each needs; 0 if that is not known."""
-
-
-class Forecast(TypedDict):
-    """What ``smokelift inspect`` foretells of a shot: its frames, seconds, and bytes of memory at the peak."""
-
-    frames: int
-    seconds: float
-    memory: int
-
-
 @dataclass(frozen=True)
 class Record:
     """What is known of a shot besides its sequence.
 
     That is its options and the size and time of change of its input and mask (``of``); how its last run ended, what
     the engine said then, assumed and noticed; how often it was run; the seconds of all runs and the bytes at the peak.
-    There is no forecast before the clip was inspected.
+    ``forecast`` has the ``frames``, ``seconds`` and ``memory`` (bytes) that ``smokelift inspect`` foretells.
     """
 
     of: dict[str, Any]
@@ -69,7 +57,7 @@ class Record:
     runs: int = 0
     seconds: float = 0.0
     memory: int = 0
-    forecast: Forecast | None = None
+    forecast: dict[str, Any] | None = None
 
     def write(self, shot: BatchShot) -> None:
         """Write the file; OSError if that fails."""
@@ -79,6 +67,9 @@ class Record:
 
 Task = Callable[[BatchShot, threading.Event], Record]
 """Work on a shot, and what ends it; a worker of a cluster has to be able to import it."""
+
+Needs = Sequence[tuple[BatchShot, int]]
+"""Shots with the bytes of memory that each needs; 0 if that is not known."""
 
 
 def read_record(shot: BatchShot) -> Record:
@@ -108,7 +99,7 @@ def is_finished(shot: BatchShot, record: Record) -> bool:
     return record.status == "done" and read_index(shot).complete
 
 
-def look_at_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
+def inspect_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
     """Ask the engine what a shot will take, unless that is known; a record without a forecast says why not."""
     record = read_record(shot)
     if record.forecast is None:
@@ -118,8 +109,7 @@ def look_at_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] =
         ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine)
         if ended.status != "done":
             return ended
-        forecast = Forecast(frames=said["frames"], seconds=said["seconds"], memory=said["memory"])
-        record = replace(record, forecast=forecast)
+        record = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
         record.write(shot)
     return record
 
@@ -139,7 +129,7 @@ def finish_shot(
     crashes, waited, frames = 0, 0.0, 0
     while True:
         try:
-            record = _try(shot, stop, engine)
+            record = _reconstruct(shot, stop, engine)
         except OSError as error:  # the storage itself
             record = replace(read_record(shot), status="stuck", sentence=str(error))
         if stop.is_set() and record.status != "done":
@@ -156,7 +146,7 @@ def finish_shot(
             return record
 
 
-def _try(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> Record:
+def _reconstruct(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> Record:
     """Run the engine once, if nobody else does."""
     shot.folder.mkdir(parents=True, exist_ok=True)
     lock = Lock(shot.folder / f".{shot.name}.lock")
@@ -184,7 +174,8 @@ def _run(
     All that the engine says is appended to the shot's log; what does not fit on the disk is left out.
     """
     began, peak = time.monotonic(), [record.memory]
-    notes, message, last_words = [], {"text": ""}, "it said nothing"
+    notes: list[str] = []
+    message, last_words = {"text": ""}, "it said nothing"
     command, pipe = [*engine, *words, "--progress", "json"], subprocess.PIPE
     with (
         shot.file("log").open("ab", buffering=0) as log,
@@ -213,10 +204,15 @@ def _run(
     if message.get("later") and status not in ("done", "cancelled"):
         status = "stuck"
     how = f"signal {-code}" if code < 0 else f"status {code}"
-    sentence = message["text"] or f"The engine ended by itself ({how}): {last_words}"
-    seconds = record.seconds + time.monotonic() - began
-    known = notes or record.notes
-    return replace(record, status=status, sentence=sentence, notes=known, seconds=seconds, memory=peak[0]), message
+    ended = replace(
+        record,
+        status=status,
+        sentence=message["text"] or f"The engine ended by itself ({how}): {last_words}",
+        notes=notes or record.notes,
+        seconds=record.seconds + time.monotonic() - began,
+        memory=peak[0],
+    )
+    return ended, message
 
 
 def _watch(process: subprocess.Popen[bytes], stop: threading.Event, peak: list[int]) -> None:

@@ -15,7 +15,7 @@ each of them optional. Their keys are the fields of the classes of the same name
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -25,7 +25,7 @@ from smokelift.scene.checks import SceneError, file_path, positive, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet
 from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
-from smokelift.scene.toml_files import Place, line_of, parse_toml, read_text
+from smokelift.scene.toml_files import Place, TomlFile, read_toml
 from smokelift.scene.view import Background, ClipSource, View
 
 Table = Mapping[str, Any]
@@ -47,11 +47,8 @@ def read_file(path: Path, build: Callable[..., Described]) -> Described:
     SceneError
         With the file, the line, the key, what was expected and what was found.
     """
-    try:
-        data, lines = parse_toml(read_text(path), path.name)
-    except (OSError, ValueError) as error:
-        raise SceneError(str(error)) from error
-    return _Reader(path.name, path.absolute().parent, lines).scene(data, build)
+    data, file = read_toml(path)
+    return _Reader(file.name, file.base, file.lines).scene(data, build)
 
 
 def from_tables(data: Table, build: Callable[..., Described], name: str, base: Path | None) -> Described:
@@ -59,13 +56,8 @@ def from_tables(data: Table, build: Callable[..., Described], name: str, base: P
     return _Reader(name, (base or Path()).absolute(), {}).scene(data, build)
 
 
-@dataclass(frozen=True)
-class _Reader:
+class _Reader(TomlFile):
     """Makes the parts of a scene from the tables of one file and puts file and line into every message."""
-
-    name: str
-    base: Path
-    lines: Mapping[Place, int]
 
     def scene(self, data: Table, build: Callable[..., Described]) -> Described:
         readers: dict[str, Callable[[Place, Any], Any]] = {
@@ -78,7 +70,7 @@ class _Reader:
             "background": self._table(self._part(Background)),
             "views": self._tables(self._view),
         }
-        self._known((), data, tuple(readers))
+        self.require_known((), data, tuple(readers))
         parts = {name: readers[name]((name,), value) for name, value in data.items()}
         for table, key in (("domain", "closed"), ("medium", "scattering")):
             if key in data.get(table, {}):
@@ -89,42 +81,27 @@ class _Reader:
             return build(**parts)
         except SceneError as error:
             place = tuple(int(part) if part.isdigit() else part for part in error.table.split("."))
-            raise self._error(place, str(error), error.key) from error
-
-    def _error(self, place: Place, message: str, key: str = "") -> SceneError:
-        """Return an error that names the file, the line of the key (or of its table) and the table."""
-        line = line_of((*place, key) if key else place, self.lines)
-        header = ".".join(part for part in place if isinstance(part, str))
-        if place:
-            header = f"[[{header}]] " if isinstance(place[-1], int) else f"[{header}] "
-        return SceneError(f"{self.name}{line}: {header}{message}", key=key, table=".".join(map(str, place)))
-
-    def _known(self, place: Place, data: Table, keys: tuple[str, ...]) -> None:
-        for key in data:
-            if key not in keys:
-                what = "key" if place else "table"
-                known = ", ".join(keys)
-                raise self._error(place, f"there is no {what} {shown(key)} here; known are {known}", key)
+            raise self.error(place, str(error), error.key) from error
 
     def _table(self, build: Callable[[Place, Table], Any]) -> Callable[[Place, Any], Any]:
         """Return a reader of one table that turns a SceneError without a place into one with it."""
 
         def read(place: Place, data: Any) -> Any:
             if not isinstance(data, dict):
-                raise self._error(place, f"must be a table, not {shown(data)}")
+                raise self.error(place, f"must be a table, not {shown(data)}")
             try:
                 return build(place, data)
             except SceneError as error:
                 if error.table:
                     raise
-                raise self._error(place, str(error), error.key) from error
+                raise self.error(place, str(error), error.key) from error
 
         return read
 
     def _tables(self, build: Callable[[Place, Table], Any]) -> Callable[[Place, Any], tuple[Any, ...]]:
         def read(place: Place, data: Any) -> tuple[Any, ...]:
             if not isinstance(data, list):
-                raise self._error(place, f"must be a list of tables, written [[{place[0]}]]")
+                raise self.error(place, f"must be a list of tables, written [[{place[0]}]]")
             return tuple(self._table(build)((*place, index), item) for index, item in enumerate(data))
 
         return read
@@ -137,7 +114,7 @@ class _Reader:
         """
 
         def read(place: Place, data: Table) -> Any:
-            self._known(place, data, (*(each.name for each in fields(kind)), *beside))
+            self.require_known(place, data, (*(each.name for each in fields(kind)), *beside))
             values = {key: value for key, value in data.items() if key not in beside}
             if data and not values:
                 return None
@@ -169,7 +146,7 @@ class _Reader:
             "clip": self._part(ClipSource),
             "background": self._part(Background),
         }
-        self._known(place, data, tuple(readers))
+        self.require_known(place, data, tuple(readers))
         _require(data, "camera", "clip")
         return View(**{key: self._table(readers[key])((*place, key), value) for key, value in data.items()})
 
@@ -177,7 +154,7 @@ class _Reader:
         kind = data.get("type", "perspective")
         lens = "height" if kind == "orthographic" else "fov_y_degrees"
         pose = ("matrices", "matrix", "position", "target", "up")
-        self._known(place, data, ("type", "size", *pose, "fx", "fy", "cx", "cy", lens))
+        self.require_known(place, data, ("type", "size", *pose, "fx", "fy", "cx", "cy", lens))
         _require(data, "size")
         width, height = picture_size(data["size"])
         matrices = _matrices(data)

@@ -1,12 +1,16 @@
-"""Text files that a user names, and the lines of a TOML file on which its tables and keys stand."""
+"""TOML files that a user names, with the lines on which their tables and keys stand."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from smokelift.checks import shown
+from smokelift.scene.checks import SceneError
 
 Place = tuple[str | int, ...]
 """Names of nested tables and a key, with the index of a table in a list of them: ``("lights", 1, "direction")``."""
@@ -16,6 +20,48 @@ LARGEST_TEXT = 64 * 2**20
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w\-.\"' ]+?)\s*\]")
 _KEY = re.compile(r"\s*([\w\-.\"' ]+?)\s*=")
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """What messages say of a TOML file: its name, and the line of each place. Paths in it are relative to ``base``."""
+
+    name: str
+    base: Path
+    lines: Mapping[Place, int]
+
+    def error(self, place: Place, message: str, key: str = "") -> SceneError:
+        """Return an error that names the file, the line of the key (or of its table) and the table."""
+        stands: Place = (*place, key) if key else place
+        while stands and stands not in self.lines:
+            stands = stands[:-1]
+        line = f", line {self.lines[stands]}" if stands else ""
+        header = ".".join(part for part in place if isinstance(part, str))
+        if place:
+            header = f"[[{header}]] " if isinstance(place[-1], int) else f"[{header}] "
+        return SceneError(f"{self.name}{line}: {header}{message}", key=key, table=".".join(map(str, place)))
+
+    def require_known(self, place: Place, table: Mapping[str, Any], keys: tuple[str, ...]) -> None:
+        """Refuse a key that a table does not have."""
+        for key in table:
+            if key not in keys:
+                what, known = "key" if place else "table", ", ".join(keys)
+                raise self.error(place, f"there is no {what} {shown(key)} here; known are {known}", key)
+
+
+def read_toml(path: Path) -> tuple[dict[str, Any], TomlFile]:
+    """Read a TOML file; SceneError with the path if it cannot be read or is none."""
+    try:
+        text = read_text(path)
+    except (OSError, ValueError) as error:
+        raise SceneError(str(error)) from error
+    try:
+        return tomllib.loads(text), TomlFile(path.name, path.absolute().parent, _find_lines(text))
+    except RecursionError as error:
+        raise SceneError(f"{path.name}: is not valid TOML: lists or tables are nested too deeply") from error
+    except ValueError as error:  # an integer of 5000 digits is no error of TOML's
+        advice = "; write a path with / or between single quotes" if "\\" in text else ""
+        raise SceneError(f"{path.name}: is not valid TOML: {error}{advice}") from error
 
 
 def read_text(path: Path) -> str:
@@ -35,17 +81,6 @@ def read_text(path: Path) -> str:
         if error.strerror is None:
             raise
         raise type(error)(f"{path}: cannot be read: {error.strerror}") from error
-
-
-def parse_toml(text: str, name: str) -> tuple[dict[str, Any], dict[Place, int]]:
-    """Return the tables of a TOML file of a name, and the line of each; ValueError if it is none."""
-    try:
-        return tomllib.loads(text), _find_lines(text)
-    except RecursionError as error:
-        raise ValueError(f"{name}: is not valid TOML: lists or tables are nested too deeply") from error
-    except ValueError as error:  # an integer of 5000 digits is no error of TOML's
-        advice = "; write a path with / or between single quotes" if "\\" in text else ""
-        raise ValueError(f"{name}: is not valid TOML: {error}{advice}") from error
 
 
 def _find_lines(text: str) -> dict[Place, int]:
@@ -80,13 +115,6 @@ def _find_lines(text: str) -> dict[Place, int]:
         bare = re.sub(r'"(\\.|[^"\\])*"|\'[^\']*\'|#.*', "", line)
         depth += bare.count("[") + bare.count("{") - bare.count("]") - bare.count("}")
     return lines
-
-
-def line_of(place: Place, lines: Mapping[Place, int]) -> str:
-    """Return ", line 12" for a key or, where that has no line, for its table; nothing without either."""
-    while place and place not in lines:
-        place = place[:-1]
-    return f", line {lines[place]}" if place else ""
 
 
 def _names(dotted: str) -> list[str]:

@@ -46,5 +46,5 @@ def test_a_wrong_option_of_a_shot_is_refused(shots, capsys) -> None:
     shots.write_text(shots.read_text().replace('"draft"', '"best"'))
     assert main(["batch", str(shots)]) == 2
     sentence = capsys.readouterr().err
-    assert sentence.startswith("shots.toml, line 5: argument --quality: invalid choice: 'best'")
+    assert sentence.startswith("shots.toml, line 5: [[shots]] argument --quality: invalid choice: 'best'")
     assert not (shots.parent / "results").exists()

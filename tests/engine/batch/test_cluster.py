@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,8 +25,7 @@ if importlib.util.find_spec("distributed") is None:
 
 import distributed
 
-from smokelift.batch import cluster as batch_cluster
-from smokelift.batch.cluster import Stop, run_on_cluster
+from smokelift.batch.cluster import Stop, work
 
 posix = pytest.mark.skipif(os.name == "nt", reason="processes are killed by signals")
 
@@ -36,7 +34,6 @@ ENVIRONMENT = {
     "PYTHONPATH": os.pathsep.join([str(Path(smokelift.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
     "DASK_DISTRIBUTED__COMM__RETRY__COUNT": "0",
 }
-DONE = Record({}, "done")
 
 SECONDS = 120.0
 """For a machine that does much else."""
@@ -121,95 +118,37 @@ def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, 
     assert [ledger(shot) for shot in shots] == [list(range(1, 13))] * 3
 
 
-@dataclass(frozen=True, eq=False)
-class Given:
-    """A task that a `LaterWorker` was given; done as soon as it is begun."""
+@pytest.mark.parametrize("ends", ["done", "stuck", "cancelled"])
+def test_a_worker_returns_its_shot_unless_it_ends_itself(make_shot, monkeypatch, ends) -> None:
+    """A storage that fails is no lost connection; a shot that was cancelled goes to another worker."""
+    plugin = Stop()
+    plugin.setup(None)
+    monkeypatch.setattr(distributed, "get_worker", lambda: SimpleNamespace(plugins={"batch": plugin}))
 
-    record: Record
-    priority: int
-    status: str = "finished"
+    def task(_shot: BatchShot, stop: threading.Event) -> Record:
+        if ends == "stuck":
+            raise OSError("Read-only file system")
+        if ends == "cancelled":
+            plugin.teardown(None)
+        assert stop.is_set() == (ends == "cancelled")
+        return Record({}, ends)
 
-    def result(self) -> Record:
-        return self.record
-
-
-class LaterWorker:
-    """Dask's client before a scheduler whose only worker comes after the tasks."""
-
-    loop = None
-
-    def __init__(self, *_: object, **__: object) -> None:
-        pass
-
-    def __enter__(self) -> LaterWorker:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    status = "closed"
-
-    def register_plugin(self, _: object, name: str) -> None:
-        pass
-
-    def run_on_scheduler(self, _: object) -> bool:
-        return False
-
-    def submit(self, _: object, shot: BatchShot, *__: object, priority: int = 0, **___: object) -> Given:
-        return Given(DONE, priority)
-
-
-def begun(tasks: list[Given], loop: None) -> list[Given]:
-    """The order in which a worker begins them: by priority, and of those with the same one the last first."""
-    ordered = sorted(enumerate(tasks), key=lambda given: (given[1].priority, given[0]), reverse=True)
-    return [task for _, task in ordered]
-
-
-def test_a_worker_that_comes_later_begins_the_shots_in_their_order(make_shot, monkeypatch) -> None:
-    monkeypatch.setattr("distributed.Client", LaterWorker)
-    monkeypatch.setattr("distributed.as_completed", begun)
-    shots = [make_shot(name) for name in ("west", "east", "north")]
-    ended = run_on_cluster([(shot, 0) for shot in shots], lambda shot, stop: DONE, "tcp://", print)
-    assert [shot.name for shot, _ in ended] == ["west", "east", "north"]
-
-
-@pytest.fixture
-def on_worker(make_shot, monkeypatch) -> Callable[..., Record]:
-    """Work on a shot by a task on a worker that has the plugin of the batch."""
-    worker = SimpleNamespace(plugins={"batch": Stop()})
-    worker.plugins["batch"].setup(worker)
-    monkeypatch.setattr(batch_cluster.distributed, "get_worker", lambda: worker)
-    return lambda task: batch_cluster.work(make_shot(), lambda shot, stop: task(worker.plugins["batch"], stop), "batch")
-
-
-def test_a_shot_that_ended_is_returned(on_worker) -> None:
-    assert on_worker(lambda plugin, stop: DONE) == DONE
-
-
-def test_storage_that_fails_is_no_lost_connection(on_worker) -> None:
-    def fail(_plugin: Stop, _stop: threading.Event) -> Record:
-        raise OSError("Read-only file system")
-
-    record = on_worker(fail)
-    assert (record.status, record.sentence) == ("stuck", "Read-only file system")
-
-
-def test_a_worker_that_ends_gives_its_shot_back(on_worker) -> None:
-    def end(plugin: Stop, stop: threading.Event) -> Record:
-        plugin.teardown(None)
-        assert stop.is_set()
-        return replace(DONE, status="cancelled")
-
-    with pytest.raises(distributed.Reschedule):
-        on_worker(end)
+    if ends == "cancelled":
+        with pytest.raises(distributed.Reschedule):
+            work(make_shot(), task, "batch")
+    else:
+        record = work(make_shot(), task, "batch")
+        assert (record.status, record.sentence) == (ends, "Read-only file system" if ends == "stuck" else "")
 
 
 @posix
 def test_a_batch_that_is_cancelled_ends_its_shots_at_once(cluster, make_shot, tmp_path, ledger) -> None:
     shots = [make_shot(f"shot{n}", frames=1000, seconds=0.02) for n in range(2)]
-    cluster.scheduler(), cluster.worker()
+    cluster.scheduler()
     driver = cluster.drive()
-    until(lambda: shots[0].file("ledger").exists())
+    assert driver.stdout is not None and driver.stdout.readline() == "began\n"
+    cluster.worker()  # later than the shots, of which it begins with the first
+    until(lambda: any(shot.file("ledger").exists() for shot in shots))
     driver.send_signal(signal.SIGINT)
     said, _ = driver.communicate(timeout=SECONDS)
     assert said.splitlines()[-1] == "cancelled"

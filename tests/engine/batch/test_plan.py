@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from smokelift.batch.plan import duration, remaining_work, write_report
-from smokelift.batch.work import Forecast, Record
+from smokelift.batch.work import Record
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def filmed(make_shot):
 
 
 def foretold(frames: int, seconds: float, memory: int = 1, **known) -> Record:
-    return Record(of={}, forecast=Forecast(frames=frames, seconds=seconds, memory=memory), **known)
+    return Record(of={}, forecast={"frames": frames, "seconds": seconds, "memory": memory}, **known)
 
 
 def test_the_pace_is_measured_scaled_or_foretold(make_shot, filmed) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 import smokelift
 from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import ENGINE, finish_shot, is_finished, look_at_shot, read_index, read_record
+from smokelift.batch.work import ENGINE, finish_shot, inspect_shot, is_finished, read_index, read_record
 
 PYTHON = (sys.executable, "-c")
 
@@ -106,13 +106,13 @@ def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake) -> None:
 
 def test_a_shot_is_forecast_once(make_shot, fake) -> None:
     shot = make_shot(frames=5, memory=300)
-    record = look_at_shot(shot, threading.Event(), fake)
+    record = inspect_shot(shot, threading.Event(), fake)
     assert json.loads((shot.folder / "shot.json").read_text())["forecast"] == {
         "frames": 5,
         "seconds": 10,
         "memory": 300,
     }
-    assert look_at_shot(shot, threading.Event(), ("no such command",)) == record
+    assert inspect_shot(shot, threading.Event(), ("no such command",)) == record
     assert finish_shot(shot, threading.Event(), engine=fake).forecast == record.forecast
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, suppress
-from typing import Any, NoReturn
+from typing import Any
 
 import psutil
 
@@ -18,11 +17,11 @@ from smokelift.app.progress import Reporter
 from smokelift.batch.local import run_here
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
 from smokelift.batch.shots import BatchShot, read_shots
-from smokelift.batch.work import Needs, Record, Task, finish_shot, look_at_shot, read_record
+from smokelift.batch.work import Needs, Record, Task, finish_shot, inspect_shot, read_record
 from smokelift.checks import counted
 from smokelift.report.cost import memory_free
 
-MEMORY_SHARE = 0.9
+MEMORY_FRACTION = 0.9
 """Part of the free memory that shots may take together: forecasts are right to a tenth or two."""
 
 MAX_WORKERS = 99_999
@@ -38,6 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",
         type=whole_number(1, MAX_WORKERS),
+        default=os.cpu_count() or 1,
         metavar="N",
         help="run N shots at a time at most (default: one a processor core)",
     )
@@ -48,55 +48,50 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Run the shots that are not finished; ValueError if the list is wrong, or, at the end, if a shot failed."""
-    records = {shot: read_record(shot) for shot in read_shots(options.list, _check_arguments)}
-    workers = options.workers or os.cpu_count() or 1
+    of_a_shot = argparse.ArgumentParser(exit_on_error=False)
+    of_a_shot.add_argument("--device", choices=("auto", "cpu", "gpu"))
+    reconstruct.add_options(of_a_shot)
+    records = {shot: read_record(shot) for shot in read_shots(options.list, of_a_shot)}
     unknown = [(shot, 0) for shot, record in records.items() if record.forecast is None]
     if unknown:
         say.note(f"Inspecting {counted(len(unknown), 'clip')} ...")
-    with closing(_run_shots(options.scheduler, unknown, look_at_shot, say.note, 1)) as looked_at:
-        for shot, record in looked_at:
+    with closing(_run_shots(options.scheduler, unknown, inspect_shot, say.note, 1)) as inspected:
+        for shot, record in inspected:
             records[shot] = record
             if record.forecast is None:
                 say.note(f"{shot.name}: {record.sentence}")
     left = remaining_work(records)
-    for line in _forecast_lines(left, workers):
+    for line in _forecast_lines(left, options.workers):
         say.note(line)
     if options.plan:
-        say.finish(_summary(left, workers), _as_dict(left, workers))
+        say.finish(_summary(left, options.workers), _as_dict(left, options.workers))
     else:
-        _run_remaining(options, say, records, left, workers)
+        _run_remaining(options, say, records, left)
 
 
 def _run_remaining(
-    options: argparse.Namespace,
-    say: Reporter,
-    records: dict[BatchShot, Record],
-    left: Sequence[Remaining],
-    workers: int,
+    options: argparse.Namespace, say: Reporter, records: dict[BatchShot, Record], left: Sequence[Remaining]
 ) -> None:
     """Run what is left and keep the report up to date; ValueError, at the end, if a shot failed."""
     page = next(iter(records)).folder / "report.html"
-    one_at_a_time = threading.Lock()
-
-    def note(text: str) -> None:
-        with one_at_a_time:
-            say.note(text)
 
     def work(shot: BatchShot, stop: threading.Event) -> Record:
-        note(f"{shot.name}: begins.")
-        return finish_shot(shot, stop, note)
+        say.note(f"{shot.name}: begins.")
+        return finish_shot(shot, stop, say.note)
 
     total = psutil.virtual_memory().total
-    large = [each for each in left if options.scheduler is None and each.memory > total]
-    for each in large:
-        needs = f"needs {_gib(each.memory)} and this machine has {_gib(total)}"
-        say.note(f"{each.shot.name}: {needs}; choose a lower resolution.")
-    shots = [(each.shot, each.memory) for each in left if each not in large]
+    shots = []
+    for each in left:
+        if options.scheduler is None and each.memory > total:
+            needs = f"needs {_gib(each.memory)} and this machine has {_gib(total)}"
+            say.note(f"{each.shot.name}: {needs}; choose a lower resolution.")
+        else:
+            shots.append((each.shot, each.memory))
     task = finish_shot if options.scheduler is not None else work
-    with closing(_run_shots(options.scheduler, shots, task, note, workers)) as ended:
+    with closing(_run_shots(options.scheduler, shots, task, say.note, options.workers)) as ended:
         for shot, record in ended:
             records[shot] = record
-            note(f"{shot.name}: {record.status}. {record.sentence}")
+            say.note(f"{shot.name}: {record.status}. {record.sentence}")
             with suppress(OSError):  # the storage may be full for a while; the next shot updates the page
                 write_report(page, options.list.stem, records)
     write_report(page, options.list.stem, records)
@@ -117,7 +112,7 @@ def _run_shots(
 ) -> Generator[tuple[BatchShot, Record], None, None]:
     """Run shots, here or on a cluster, and yield each at its end."""
     if scheduler is None:
-        yield from run_here(shots, task, round(MEMORY_SHARE * memory_free()), workers)
+        yield from run_here(shots, task, round(MEMORY_FRACTION * memory_free()), workers)
         return
     try:
         from smokelift.batch.cluster import run_on_cluster
@@ -127,12 +122,12 @@ def _run_shots(
 
 
 def _forecast_lines(left: Sequence[Remaining], workers: int) -> Iterator[str]:
-    """Lines on what is left: one for each shot, and one for each useful number of workers."""
+    """Lines on what is left: one for each shot, and one for each power of two of workers."""
     for each in left:
         memory = f"{_gib(each.memory)} of memory"
         yield f"{each.shot.name}: {counted(each.frames, 'frame')}, {_time(each.seconds)}, {memory} ({each.basis})"
-    counts = sorted({2**n for n in range(math.ceil(math.log2(max(workers, 1))) + 1) if 2**n < workers} | {workers})
-    for count in counts if left else ():
+    fewer = [2**n for n in range(workers.bit_length()) if 2**n < workers]
+    for count in (*fewer, workers) if left else ():
         yield f"{count} at a time: {_time(duration(left, count))}"
 
 
@@ -147,20 +142,10 @@ def _summary(left: Sequence[Remaining], workers: int) -> str:
 
 
 def _as_dict(left: Sequence[Remaining], workers: int) -> dict[str, Any]:
-    return {
-        "seconds": round(duration(left, workers), 1),
-        "workers": workers,
-        "shots": [
-            {
-                "name": each.shot.name,
-                "frames": each.frames,
-                "seconds": round(each.seconds, 1),
-                "memory": each.memory,
-                "basis": each.basis,
-            }
-            for each in left
-        ],
-    }
+    shots = [{"name": each.shot.name, **each._asdict(), "seconds": round(each.seconds, 1)} for each in left]
+    for each in shots:
+        del each["shot"]
+    return {"seconds": round(duration(left, workers), 1), "workers": workers, "shots": shots}
 
 
 def _time(seconds: float) -> str:
@@ -172,18 +157,3 @@ def _time(seconds: float) -> str:
 
 def _gib(size: float) -> str:
     return f"{size / 2**30:.1f} GiB"
-
-
-class _RaisingParser(argparse.ArgumentParser):
-    """Raises what is wrong with a shot's options, instead of leaving."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ValueError(message)
-
-
-def _check_arguments(arguments: Sequence[str]) -> None:
-    """Raise ValueError unless ``smokelift reconstruct`` takes the arguments."""
-    parser = _RaisingParser()
-    parser.add_argument("--device", choices=("auto", "cpu", "gpu"))
-    reconstruct.add_options(parser)
-    parser.parse_args(arguments)
