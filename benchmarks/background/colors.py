@@ -18,7 +18,7 @@ from smokelift.checks.array_types import Doubles
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
 from smokelift.setup.first_estimate import sample_smoke
-from smokelift.setup.medium import smoke_colour
+from smokelift.setup.medium import smoke_color
 
 LIGHTS = {"white": (1.0, 1.0, 1.0), "4 degrees warm": (1.0, 0.93, 0.84), "10 degrees warm": (1.0, 0.82, 0.64)}
 COLORS = {
@@ -56,7 +56,7 @@ def _angles(smokes: Sequence[Seen], light: Doubles, color: Doubles, plate: Pictu
     behind: Picture = (plate * light).astype(np.float32)
     for smoke in smokes:
         clip = filmed(np.clip(exposed(smoke.before(behind, tuple(color * light))), 0, 1))
-        found, estimate = smoke_colour(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
+        found, estimate = smoke_color(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
         if estimate.value != UNDETERMINED:
             own = np.array(found)
             cosine = float(own @ color / (np.linalg.norm(own) * np.linalg.norm(color)))

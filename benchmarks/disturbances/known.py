@@ -86,6 +86,11 @@ class Known(Baked):
         assert isinstance(light, DirectionalLight)
         return light
 
+    def brighter_light(self, gain: float) -> DirectionalLight:
+        """Return the one light, so many times as strong."""
+        red, green, blue = (gain * channel for channel in self.light.irradiance)
+        return replace(self.light, irradiance=(red, green, blue))
+
 
 @dataclass(frozen=True, eq=False)
 class Take:

@@ -56,7 +56,7 @@ def exposed(known: Known) -> Known:
     pictured = known.pictured()
     gain = BRIGHTEST / float(pictured.front.radiance.max())
     views = {view: seen.scattering(gain) for view, seen in pictured.views.items()}
-    return replace(pictured, scene=replace(known.scene, lights=(known.light.scaled(gain),)), views=views)
+    return replace(pictured, scene=replace(known.scene, lights=(known.brighter_light(gain),)), views=views)
 
 
 def _stands(known: Known) -> Known:

@@ -105,7 +105,7 @@ def saturation(known: Known, fraction: float) -> Take:
     """An exposure at which a fraction of the smoke's pixels is white; the light is given as strong as it seems."""
     part = usual(known)
     gain = 1 / _brightness(part, 1 - fraction) if fraction else 1.0
-    return replace(taken(part, gains=gain, lights=(known.light.scaled(gain),)), gain=gain)
+    return replace(taken(part, gains=gain, lights=(known.brighter_light(gain),)), gain=gain)
 
 
 def crushing(known: Known, level: float) -> Take:

@@ -1,8 +1,17 @@
 """What every package says of a value that it is given: in which words, and when it refuses it; what a finding is."""
 
-from smokelift.checks.arguments import described, listed, numbers, radiance, require_kind
+from smokelift.checks.arguments import (
+    counted,
+    described,
+    listed,
+    numbers,
+    one_of,
+    printable,
+    radiance,
+    require_kind,
+    shown,
+)
 from smokelift.checks.finding import UNDETERMINED, Figure, Figures, Finding, Source
-from smokelift.checks.words import counted, one_of, printable, shown
 
 __all__ = [
     "UNDETERMINED",

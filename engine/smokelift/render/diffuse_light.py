@@ -35,8 +35,8 @@ class DiffuseLight:
         self._albedo = max(albedos)
         # gray smoke scatters all channels alike, whatever colors they are
         whole = slice(0, FIELDS * plan.lighting.channels)
-        self._alike = [(self._albedo, whole)] if plan.medium.is_grey else _channels(albedos)
-        relative = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo
+        self._alike = [(self._albedo, whole)] if plan.medium.is_gray else _channels(albedos)
+        relative = np.ones(plan.lighting.channels) if plan.medium.is_gray else np.array(albedos) / self._albedo
         self._relative_albedos = relative.astype(np.float32).repeat(FIELDS)[:, None, None, None]
         size = min(max(round(max(plan.domain.resolution) / BLOCKS), MIN_BLOCK), MAX_BLOCK)
         self._edge = size * plan.domain.voxel_size

@@ -87,7 +87,7 @@ def plan_render(
     corner, box = (x.start, y.start, z.start), domain.part(part)
     scatters = () if scattering == "absorption" else lights
     # light that is scattered again takes on more of the smoke's color
-    split = scattering == "multiple" and not medium.is_grey
+    split = scattering == "multiple" and not medium.is_gray
     found = lighting(scatters, domain, corner, box.resolution, medium.color, split)
     return RenderPlan(
         domain=domain,

@@ -11,43 +11,46 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from statistics import fmean
 
 import numpy as np
-import numpy.typing as npt
 import psutil
 import scipy.fft
 
+from smokelift.density import RoundDepth, ViewSet
 from smokelift.density.levels import MIN_COARSENED_VOXELS
-from smokelift.report.workload import Workload
+from smokelift.setup.first_estimate import SAMPLE_FRAMES
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
 
 Resolution = tuple[int, int, int]
 
 START_SECONDS = 1.5
 """Processor seconds to start and to measure the clip's texture."""
 
-VOXELS_A_FRAME = 1.2e7
+FRAME_VOXELS = 1.2e7
 """A frame's time without its voxels (decoding and files), in voxels of a solve."""
 
-SOLVES_A_VOXEL = 12.0
+VOXEL_SOLVES = 12.0
 """A frame's time for each voxel of the box, in solves."""
 
-SOLVES_A_SMOKY_VOXEL = 250.0, 130.0
+SMOKY_VOXEL_SOLVES = 250.0, 130.0
 """A frame's additional time for each voxel that may hold smoke, in solves: for those that are fitted on their own grid,
 and for those beyond, whose detail is found from coarse to fine."""
 
-SHARE_A_VIEW = 0.5
+VIEW_FRACTION = 0.5
 """Part of a frame's time that each further view adds."""
 
 WITHOUT_DETAIL = 0.55
 """Part of a frame's time that is left without detail in depth."""
 
-FRESH_FRAMES = 2.0
+EXTRA_FRAMES = 2.0
 """Additional time of the first two frames, to whose detail none is carried, in frames."""
 
-PAPER_SOLVES = 1100.0
+PAPER_VOXEL_SOLVES = 1100.0
 """A frame's time for each voxel by the paper's method, in solves."""
 
 BYTES_A_SMOKY_VOXEL_ON_DISK = 16
@@ -86,9 +89,52 @@ without an obstacle."""
 MIN_VOXELS = 8
 """Smallest number of voxels along the shortest side of a suggested grid."""
 
+MAX_SIDE_VOXELS = 96
+"""Largest number of voxels along a side of the grid that smoke is measured on. A rim of one voxel counts with it, which
+makes fractions up to two fifths too large."""
+
+MEASURED_FRAMES = 4
+"""Largest number of frames with smoke that are measured, from the one with the most on."""
+
 
 class NotEnoughMemoryError(MemoryError):
     """The grid does not fit into memory; the message says which would."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """What decides how much a run takes, besides the resolution.
+
+    Attributes
+    ----------
+    settings
+        The given ones: a velocity's grid that is chosen is coarse, and hardly takes memory.
+    frames, views, pixels
+        Numbers: of frames, of cameras, and of pixels in all cameras' pictures of one moment.
+    largest, mean
+        Fractions of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all.
+    """
+
+    settings: Settings
+    frames: int
+    views: int
+    pixels: int
+    largest: float
+    mean: float
+
+    @staticmethod
+    def of(shot: Shot, settings: Settings) -> Workload:
+        """Measure a shot that was prepared with settings."""
+        fractions = _smoky_fractions(shot, settings)
+        smoky = len(shot.smoky) / len(shot.spread(SAMPLE_FRAMES))
+        return Workload(
+            settings=settings,
+            frames=shot.length,
+            views=len(shot.views),
+            pixels=sum(width * height for width, height in (view.clip.size for view in shot.views)),
+            largest=max(fractions, default=0.0),
+            mean=smoky * fmean(fractions) if fractions else 0.0,
+        )
 
 
 @dataclass(frozen=True)
@@ -140,14 +186,14 @@ def voxel_solves(resolution: Resolution, work: Workload) -> float:
     """Return the time of a run's frames, in voxels of Poisson solves."""
     voxels = math.prod(resolution)
     if work.settings.method == "paper":
-        return work.frames * PAPER_SOLVES * voxels
-    on_own_grid, beyond = SOLVES_A_SMOKY_VOXEL
+        return work.frames * PAPER_VOXEL_SOLVES * voxels
+    on_own_grid, beyond = SMOKY_VOXEL_SOLVES
     smoky = work.mean * voxels
     fitted = on_own_grid * min(smoky, MIN_COARSENED_VOXELS) + beyond * max(smoky - MIN_COARSENED_VOXELS, 0)
-    a_frame = (VOXELS_A_FRAME + SOLVES_A_VOXEL * voxels + fitted) * (1 + SHARE_A_VIEW * (work.views - 1))
+    a_frame = (FRAME_VOXELS + VOXEL_SOLVES * voxels + fitted) * (1 + VIEW_FRACTION * (work.views - 1))
     if work.settings.detail == 0:
         return work.frames * WITHOUT_DETAIL * a_frame
-    return (work.frames + FRESH_FRAMES) * a_frame
+    return (work.frames + EXTRA_FRAMES) * a_frame
 
 
 def memory_needed(resolution: Resolution, work: Workload) -> int:
@@ -219,6 +265,18 @@ def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
             yield x, y, z
 
 
+def _smoky_fractions(shot: Shot, settings: Settings) -> list[float]:
+    """Fractions of the voxels that may hold smoke, in some of the frames with smoke, on a coarse grid."""
+    if settings.method == "paper":  # its densities are anywhere in the box
+        return [1.0]
+    optics = replace(shot.optics, domain=shot.optics.domain.with_at_most(MAX_SIDE_VOXELS))
+    prior = RoundDepth().of_clip(shot)
+    step = -(-len(shot.smoky) // MEASURED_FRAMES) or 1
+    moments = ((frame, shot.observe(frame)) for frame in shot.smoky[::step])
+    seen = [ViewSet.of(observations, optics, frame) for frame, observations in moments if observations]
+    return [float(prior.estimate(views).views.hull.mean()) for views in seen]
+
+
 @cache
 def _seconds_a_voxel() -> float:
     """Return the seconds that a Poisson solve takes on this machine for each voxel; timed once.
@@ -226,13 +284,9 @@ def _seconds_a_voxel() -> float:
     By its processor time on one thread: what passes is up to three times as much while other programs, or a run
     of our own, are at work.
     """
-    field = np.zeros(TIMED, np.float32)
-    _solve(field)  # the first finds nothing in the caches
-    began = time.process_time()
-    for _ in range(TIMES):
-        _solve(field)
+    field, began = np.zeros(TIMED, np.float32), 0.0
+    for n in range(TIMES + 1):
+        if n == 1:  # the first finds nothing in the caches
+            began = time.process_time()
+        scipy.fft.idctn(scipy.fft.dctn(field))  # on one thread: a system may allow no more
     return (time.process_time() - began) / (WORKERS * TIMES * field.size)
-
-
-def _solve(field: npt.NDArray[np.float32]) -> None:
-    scipy.fft.idctn(scipy.fft.dctn(field))  # on one thread: a system may allow no more

@@ -27,7 +27,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> list[Finding]:
     has_scale = given.domain is not None or shot.settings.distance is not None
     scale: Figures = {"size": scene.domain.size, "height": PICTURE_HEIGHT}
     has_medium = "medium" not in found
-    color = "gray" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
+    color = "gray" if medium.is_gray else ", ".join(f"{v:.2f}" for v in medium.color)
     spent = {"seconds": cost.seconds, "memory": cost.memory / 2**30, "disk": cost.disk / 1e6}
     return [
         known("background", "as given"),

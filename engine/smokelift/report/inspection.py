@@ -23,10 +23,10 @@ from smokelift.setup.shot import Shot
 Tile = NDArray[np.uint8]
 
 BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40), (230, 60, 200), (120, 255, 120)
-"""Colours (sRGB) of the box, light, smoke, unknown background and camera's path."""
+"""Colors (sRGB) of the box, light, smoke, unknown background and camera's path."""
 
 MASK = (255, 60, 60)
-"""Colour (sRGB) of the mask's outline."""
+"""Color (sRGB) of the mask's outline."""
 
 ARROW = 0.35
 """Length of a light's arrow over the diagonal of the box."""
@@ -109,21 +109,21 @@ def _line(
     draw: ImageDraw.ImageDraw,
     camera: Camera,
     points: NDArray[np.float64],
-    colour: tuple[int, int, int],
+    color: tuple[int, int, int],
     head: bool = False,
 ) -> None:
     """A line through world points (n, 3), if all are before the camera; with a ``head`` an arrow."""
     pixels, depth = project_points(camera, points)
     if (depth <= 0).any():
         return
-    draw.line([(float(x), float(y)) for x, y in pixels], fill=colour, width=3 if head else 1)
+    draw.line([(float(x), float(y)) for x, y in pixels], fill=color, width=3 if head else 1)
     along = pixels[-1] - pixels[-2]
     length = float(np.hypot(*along))
     if head and length > 0:
         along *= HEAD / length
         across = 0.5 * np.array([-along[1], along[0]])
         tip, base = pixels[-1], pixels[-1] - along
-        draw.polygon([(float(x), float(y)) for x, y in (tip, base + across, base - across)], fill=colour)
+        draw.polygon([(float(x), float(y)) for x, y in (tip, base + across, base - across)], fill=color)
 
 
 def _matte_picture(seen: Matte) -> Tile:
@@ -134,7 +134,7 @@ def _matte_picture(seen: Matte) -> Tile:
 
 
 def _unknown_picture(plate: Plate, unknown: NDArray[np.bool_]) -> Tile:
-    """The background, with its unknown part in one colour."""
+    """The background, with its unknown part in one color."""
     codes = eight_bit(plate.image).astype(np.float64)
     codes[unknown] = 0.4 * codes[unknown] + 0.6 * np.array(HIDDEN)
     return np.asarray(np.rint(codes), np.uint8)
@@ -145,17 +145,17 @@ def _histogram(picture: NDArray[np.float32], plate: Plate, seen: Matte) -> Tile:
     width, height = TILE[0], TILE[0] // 2
     shown = Image.new("RGB", (width, height), (12, 12, 14))
     draw = ImageDraw.Draw(shown)
-    grey = [np.clip(linear_to_srgb(each).mean(-1), 0, 1) for each in (picture, plate.image)]
-    parts = ((grey[0], (110, 110, 110)), (grey[0][seen.mask], SMOKE), (grey[1], (80, 140, 255)))
+    gray = [np.clip(linear_to_srgb(each).mean(-1), 0, 1) for each in (picture, plate.image)]
+    parts = ((gray[0], (110, 110, 110)), (gray[0][seen.mask], SMOKE), (gray[1], (80, 140, 255)))
     highest = np.log1p(picture.shape[0] * picture.shape[1])
-    for place, (values, colour) in enumerate(parts):
+    for place, (values, color) in enumerate(parts):
         counts = np.histogram(values, BINS, (0, 1))[0]
         tops = height - 1 - np.log1p(counts) / highest * (height - 8)
         points = [(float((n + 0.5) * width / BINS), float(top)) for n, top in enumerate(tops)]
         if place == 0:
-            draw.polygon([(0, height), *points, (width, height)], fill=colour)
+            draw.polygon([(0, height), *points, (width, height)], fill=color)
         else:
-            draw.line(points, fill=colour, width=2)
+            draw.line(points, fill=color, width=2)
     return np.asarray(shown)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import html
 import io
+import itertools
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +38,7 @@ PACKED = 2
 """Compression level of PNG files: half of the time of the usual 6, and a seventh more bytes."""
 
 _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165), (255, 170, 70)
-"""Colours, sRGB."""
+"""Colors, sRGB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,32 +104,17 @@ def _side_by_side(panels: Sequence[Panel]) -> NDArray[np.uint8]:
     return np.asarray(strip)
 
 
-def _written(cells: Sequence[str], colours: Sequence[tuple[int, int, int]], size: int = _TEXT) -> NDArray[np.uint8]:
+def _written(cells: Sequence[str], colors: Sequence[tuple[int, int, int]], size: int = _TEXT) -> NDArray[np.uint8]:
     """One text over the whole width, or those of a table's columns."""
     font = ImageFont.load_default(size)
     starts = _STARTS if len(cells) > 1 else (_GAP,)
-    ends = (*starts[1:], _WIDTH)
-    wrapped = [_wrapped(cell, font, end - start - _GAP) for cell, start, end in zip(cells, starts, ends, strict=True)]
+    letters = [int((end - start - _GAP) / font.getlength("n")) for start, end in itertools.pairwise((*starts, _WIDTH))]
+    wrapped = [textwrap.wrap(cell, width) for cell, width in zip(cells, letters, strict=True)]
     height = max(map(len, wrapped)) * (size + _LINE - _TEXT) + _LINE // 3
     strip = Image.new("RGB", (_WIDTH, height), _PAPER)
-    for lines, colour, left in zip(wrapped, colours, starts, strict=True):
-        ImageDraw.Draw(strip).text((left, 0), "\n".join(lines), colour, font, spacing=_LINE - _TEXT)
+    for lines, color, left in zip(wrapped, colors, starts, strict=True):
+        ImageDraw.Draw(strip).text((left, 0), "\n".join(lines), color, font, spacing=_LINE - _TEXT)
     return np.asarray(strip)
-
-
-def _wrapped(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: float) -> list[str]:
-    """The lines of a text; none is wider than so many pixels unless a single word is."""
-    lines: list[str] = []
-    space, taken = font.getlength(" "), 0.0
-    for word in text.split():
-        length = font.getlength(word)
-        if lines and taken + space + length <= width:
-            lines[-1] += f" {word}"
-            taken += space + length
-        else:
-            lines.append(word)
-            taken = length
-    return lines
 
 
 _STYLE = """

@@ -13,16 +13,16 @@ from smokelift.density.synthesis import unseen_sides
 from smokelift.density.turntable import Turntable
 from smokelift.setup.shot import Shot
 
-UNEXPLAINED_SHARE = 0.7
-"""Root mean square of what a fit leaves, as a share of what the smoke changes: half of the change's energy."""
+MAX_FITTED_ERROR = 0.7
+"""Root mean square of what a fit leaves, as a fraction of what the smoke changes: half of the change's energy."""
 
-DOUBTFUL_SHARE = 0.3
-"""Share left above which some of the change may be no smoke. Good results leave less; those that take labels, leaves, a
-head or the light for smoke leave more (docs/clips.md)."""
+MAX_SMOKE_ERROR = 0.3
+"""Fraction left above which some of the change may be no smoke. Good results leave less; those that take labels,
+leaves, a head or the light for smoke leave more (docs/clips.md)."""
 
-FORESEEN_SHARE = 0.25
-"""Share that a coarse fit leaves of the pixels that it leaves out, above which a run is likely to leave more than
-`DOUBTFUL_SHARE`. The example as it is, with leaves and with light that flickers leaves .04 to .07 (a run .05 to .12),
+MAX_COARSE_ERROR = 0.25
+"""Fraction that a coarse fit leaves of the pixels that it leaves out, above which a run is likely to leave more than
+`MAX_SMOKE_ERROR`. The example as it is, with leaves and with light that flickers leaves .04 to .07 (a run .05 to .12),
 with a person in it .12, .16, .29 and .35 (.14, .23, .37 and .39), with labels .10 (.27)."""
 
 
@@ -60,7 +60,7 @@ def foreseen(shot: Shot) -> list[Finding]:
     figures = next((found.figures for found in shot.findings if found.about == "scattering"), {})
     error = figures.get("error", 0.0)
     assert isinstance(error, float)
-    return [Finding("not all may be smoke", {"error": error}, doubt=True)] if error > FORESEEN_SHARE else []
+    return [Finding("not all may be smoke", {"error": error}, doubt=True)] if error > MAX_COARSE_ERROR else []
 
 
 def count_empty(figures: Sequence[Mapping[str, Any]]) -> int:
@@ -76,10 +76,10 @@ def shortcomings(figures: Sequence[Mapping[str, Any]], *, burns: bool = False) -
         doubts.append(doubt("empty frames", {"empty": empty, "frames": len(figures)}))
     errors = [of_frame["relative_error"] for of_frame in figures if of_frame.get("relative_error") is not None]
     typical = float(np.median(errors)) if errors else 0.0
-    if burns and typical > DOUBTFUL_SHARE:
+    if burns and typical > MAX_SMOKE_ERROR:
         doubts.append(doubt("fire beside what is fitted", {"error": typical}))
-    elif typical > UNEXPLAINED_SHARE:
+    elif typical > MAX_FITTED_ERROR:
         doubts.append(doubt("hardly any smoke fitted", {"error": typical}))
-    elif typical > DOUBTFUL_SHARE:
+    elif typical > MAX_SMOKE_ERROR:
         doubts.append(doubt("not all is smoke", {"error": typical}))
     return doubts

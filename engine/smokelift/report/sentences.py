@@ -48,13 +48,13 @@ SENTENCES: Mapping[str, str] = {
     "alpha channel": "The clip has an alpha channel, which says where smoke is: the smoke is shown before {behind}.",
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
-    "background of one colour": "Background not given: it is of one color, {color:.2g} (linear).",
+    "background of one color": "Background not given: it is of one color, {color:.2g} (linear).",
     "background assumed": (
         "Background not given, and no part of the picture shows it: {color:.2g} (linear) is assumed, and all that "
         "differs from it counts as smoke."
     ),
     "background with objects": (
-        "Background: {share:.1%} of the picture has other colors and never changes, as a nozzle, a floor or a logo "
+        "Background: {fraction:.1%} of the picture has other colors and never changes, as a nozzle, a floor or a logo "
         "does. If that is smoke, give the color as background."
     ),
     "background seen": "Background estimated from the clip, which shows every part of it free of smoke.",
@@ -97,7 +97,7 @@ SENTENCES: Mapping[str, str] = {
         "plate as background."
     ),
     "smoke in the background": (
-        "The background may hold most of the smoke: {share:.0%} of the area where smoke may be is never free of it. "
+        "The background may hold most of the smoke: {fraction:.0%} of the area where smoke may be is never free of it. "
         "Smoke that stays there all the time is missing from the result. Give a clean plate or a color as background."
     ),
     "clearest frame": (
@@ -122,12 +122,12 @@ SENTENCES: Mapping[str, str] = {
         "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is "
         "not seen: paint strokes over the smoke, or give a clean plate or a color as background."
     ),
-    "smoke of several colours": (
+    "smoke of several colors": (
         "The smoke has more than one color, but one is assumed for all of it: on average its light is {degrees:.0f} "
         "degrees from the nearest single color. Its colors are wrong, and its thickness may be. Use frames with smoke "
         "of one color, crop the clip to it, or give a mask."
     ),
-    "smoke that changes its colour": (
+    "smoke that changes its color": (
         "The color of the smoke changes over time, but one is assumed for all of it: on average its light is "
         "{degrees:.0f} degrees from the nearest single color. Use a range of frames in which it stays the same."
     ),
@@ -178,25 +178,25 @@ SENTENCES: Mapping[str, str] = {
     ),
     "extinction": "A picture shows it times the density only. Give the medium if you know it.",
     "albedo": "A picture shows it times the light only. Give the medium if you know it.",
-    "smoke colour": (
+    "measured smoke color": (
         "Smoke color: {value:.2f} (linear), at least {degrees:.0f} degrees from that of gray smoke; if the light has "
         "this color and the smoke is gray, give gray as the smoke's color."
     ),
-    "smoke colour unseen": (
+    "smoke color unseen": (
         "Smoke color: undetermined, so gray is assumed: no smoke is thick, bright and free of clipped pixels enough to "
         "show a color. Give the color if you know it."
     ),
-    "smoke colour near the light's": (
+    "smoke color near the light's": (
         "Smoke color: undetermined, so gray is assumed: its color may be {degrees:.0f} degrees from that of gray smoke "
         "or of what is behind it, and colored light alone can make {tolerance:g}. Give the color if you know it."
     ),
     "fire": (
-        "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
-        "{red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
+        "Fire: {fraction:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the "
+        "color {red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
     ),
     "possible fire": (
-        "Some of the smoke may be fire: {share:.1%} of its pixels have the colors of fire, and {bright:.0%} of these "
-        "are brighter than light explains, too few to be certain. If it is fire, give its color as the flame's, "
+        "Some of the smoke may be fire: {fraction:.1%} of its pixels have the colors of fire, and {bright:.0%} of "
+        "these are brighter than light explains, too few to be certain. If it is fire, give its color as the flame's, "
         "for example 1, 0.4, 0.1."
     ),
     "assumed light": (
@@ -315,7 +315,7 @@ _DEPTHS = tuple(f"axis depth by {cue}" for cue in ("box", "floor contact", "dist
 VALUES: Mapping[str, str] = {
     "alpha channel": "{behind}",
     "black background": "black",
-    "background of one colour": "one color, {color:.2g} (linear)",
+    "background of one color": "one color, {color:.2g} (linear)",
     "background assumed": "one color, {color:.2g} (linear)",
     "background seen": "a picture",
     "background partly seen": "a picture, {unknown:.0%} of it unknown",
@@ -332,9 +332,9 @@ VALUES: Mapping[str, str] = {
     "grown box": "as given, grown to whole voxels",
     "extinction": "{value:.3g} 1/m at density 1",
     "albedo": "{value:.3g}",
-    "smoke colour": "{value:.2f}",
-    "smoke colour unseen": "gray",
-    "smoke colour near the light's": "gray",
+    "measured smoke color": "{value:.2f}",
+    "smoke color unseen": "gray",
+    "smoke color near the light's": "gray",
     "source radiance": "smoke of radiance {taken:.2g}",
     "undetermined source radiance": "smoke of radiance {taken:.2g}",
     **dict.fromkeys(_DEPTHS, "{depth:place} of the box, give or take {spread:.2g} m"),
@@ -343,7 +343,7 @@ VALUES: Mapping[str, str] = {
 """What a line of a table says that is taken, by kind; of other kinds it is the value itself."""
 
 SHORT: Mapping[str, str] = {
-    "background of one colour": "one color",
+    "background of one color": "one color",
     "background assumed": "one color",
     "background partly seen": "a picture",
     "scale": "{size:.3g x} m",

@@ -86,7 +86,7 @@ def vector(value: Any, key: str, expected: str = "three numbers [x, y, z]") -> V
     return x, y, z
 
 
-def colour(value: Any, key: str) -> Vector:
+def color(value: Any, key: str) -> Vector:
     """Return ``value`` as linear red, green and blue, or raise a SceneError that names ``key``."""
     expected = "three numbers [r, g, b], none below 0"
     rgb = vector(value, key, expected)

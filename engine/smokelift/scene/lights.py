@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -11,7 +11,7 @@ from smokelift.checks import shown
 from smokelift.scene.checks import (
     SceneError,
     Vector,
-    colour,
+    color,
     file_path,
     integer,
     number,
@@ -53,16 +53,11 @@ class DirectionalLight:
         if abs(length - 1.0) > 1e-12:
             x, y, z = direction
             direction = (x / length, y / length, z / length)
-        set_fields(self, direction=direction, irradiance=colour(self.irradiance, "irradiance"))
+        set_fields(self, direction=direction, irradiance=color(self.irradiance, "irradiance"))
 
     def samples(self) -> tuple[FiniteLight, ...]:
         """Return the light itself; see `SampledLight`."""
         return (self,)
-
-    def scaled(self, factor: float) -> DirectionalLight:
-        """Return the light ``factor`` times as strong."""
-        red, green, blue = self.irradiance
-        return replace(self, irradiance=(factor * red, factor * green, factor * blue))
 
 
 @dataclass(frozen=True)
@@ -82,16 +77,11 @@ class PointLight:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        set_fields(self, position=vector(self.position, "position"), intensity=colour(self.intensity, "intensity"))
+        set_fields(self, position=vector(self.position, "position"), intensity=color(self.intensity, "intensity"))
 
     def samples(self) -> tuple[FiniteLight, ...]:
         """Return the light itself; see `SampledLight`."""
         return (self,)
-
-    def scaled(self, factor: float) -> PointLight:
-        """Return the light ``factor`` times as strong."""
-        red, green, blue = self.intensity
-        return replace(self, intensity=(factor * red, factor * green, factor * blue))
 
     def require_place(self, domain: Box) -> None:
         """Refuse a place from which no light can be swept through a box: inside it, or too far away."""
@@ -115,10 +105,6 @@ class SampledLight(Protocol):
 
     def samples(self) -> tuple[FiniteLight, ...]:
         """Return the simple lights."""
-        ...
-
-    def scaled(self, factor: float) -> SampledLight:
-        """Return the light ``factor`` times as strong."""
         ...
 
 
@@ -154,10 +140,6 @@ class EnvironmentLight:
         if self.directions is not None:
             expected = f"a whole number from 1 to {MAX_DIRECTIONS}"
             set_fields(self, directions=integer(self.directions, "directions", expected, 1, MAX_DIRECTIONS))
-
-    def scaled(self, factor: float) -> EnvironmentLight:
-        """Return the light ``factor`` times as strong."""
-        return replace(self, strength=factor * self.strength)
 
 
 Light = SampledLight | EnvironmentLight

@@ -30,10 +30,10 @@ class Medium:
     anisotropy
         Henyey-Greenstein g, -1 < g < 1.
     color
-        Colour of the smoke itself, red, green and blue from 0 to 1. Each channel's albedo is ``albedo`` times this.
+        Color of the smoke itself, red, green and blue from 0 to 1. Each channel's albedo is ``albedo`` times this.
         Extinction is the same for all.
     flame_color
-        Colour of the light of fire in the smoke, red, green and blue from 0 to 1. Times the emission in the grid
+        Color of the light of fire in the smoke, red, green and blue from 0 to 1. Times the emission in the grid
         ``flame`` it is the radiance per meter. What may be fire is fire then. None takes what the clip shows.
     """
 
@@ -50,8 +50,8 @@ class Medium:
             extinction=positive(self.extinction, "extinction"),
             albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
             anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
-            color=_share(self.color, "color"),
-            flame_color=None if self.flame_color is None else _share(self.flame_color, "flame_color"),
+            color=_fractions(self.color, "color"),
+            flame_color=None if self.flame_color is None else _fractions(self.flame_color, "flame_color"),
         )
 
     @property
@@ -61,13 +61,13 @@ class Medium:
         return self.albedo * red, self.albedo * green, self.albedo * blue
 
     @property
-    def is_grey(self) -> bool:
+    def is_gray(self) -> bool:
         """Whether the smoke scatters red, green and blue alike."""
         return min(self.color) == max(self.color)
 
 
-def _share(value: Any, key: str) -> Vector:
-    """Return ``value`` as shares of red, green and blue, or raise a SceneError that names ``key``."""
+def _fractions(value: Any, key: str) -> Vector:
+    """Return ``value`` as fractions of red, green and blue, or raise a SceneError that names ``key``."""
     expected = "three numbers [r, g, b] from 0 to 1, one of them above 0"
     rgb = vector(value, key, expected)
     if min(rgb) < 0.0 or max(rgb) > 1.0 or max(rgb) == 0.0:

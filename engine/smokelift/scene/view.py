@@ -11,7 +11,7 @@ from smokelift.scene.camera import Camera
 from smokelift.scene.checks import (
     SceneError,
     Vector,
-    colour,
+    color,
     file_path,
     integer,
     items,
@@ -98,7 +98,7 @@ class Background:
         if len(given) > 1:
             raise SceneError(f"takes {given[0]} or {given[1]}, not both", key=given[1])
         if self.color is not None:
-            set_fields(self, color=colour(self.color, "color"))
+            set_fields(self, color=color(self.color, "color"))
         if self.image is not None:
             set_fields(self, image=file_path(self.image, "image"))
         if self.frame is not None:

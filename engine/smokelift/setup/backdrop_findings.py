@@ -15,20 +15,21 @@ from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSa
 BLACK = 0.001
 """Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
 
-MOSTLY = 0.5
-"""Share that is a majority: of the smoke's pixels, those whose background is unknown; of what bars enclose, the smoke
-of a frame."""
+MAJORITY = 0.5
+"""Fraction that is a majority: of the smoke's pixels, those whose background is unknown; of what bars enclose, the
+smoke of a frame."""
 
-BETWEEN_BARS = 0.95
-"""Share of what two bars enclose, covered at some time, from which it is the picture and no smoke: smoke that crosses a
-picture has no two straight edges. A generated clip with bars has .98; fog and mist have .70 and .75 over all of their
-rows (docs/clips.md). Most of it has to be covered in a frame too, since a passing puff fills a strip in time."""
+MIN_BARS_FRACTION = 0.95
+"""Fraction of what two bars enclose, covered at some time, from which it is the picture and no smoke: smoke that
+crosses a picture has no two straight edges. A generated clip with bars has .98; fog and mist have .70 and .75 over all
+of their rows (docs/clips.md). Most of it has to be covered in a frame too, since a passing puff fills a strip in time.
+"""
 
 MIN_SAME_FRAMES = 4
 """Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
 
 COARSE_QUANTISER = 42.0
-"""Quantiser from which faint smoke is taken for background, if that has more than one colour. Before a brick wall crf
+"""Quantiser from which faint smoke is taken for background, if that has more than one color. Before a brick wall crf
 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/background.md)."""
 
 
@@ -44,7 +45,7 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     if samples.exposure:
         said.append(Finding("exposure", {"change": samples.exposure}, about="exposure", source="measured"))
     if estimate.fire is None and hot.may_burn:
-        said.append(Finding("possible fire", {"share": hot.share, "bright": hot.bright}, doubt=True))
+        said.append(Finding("possible fire", {"fraction": hot.share, "bright": hot.bright}, doubt=True))
     return said
 
 
@@ -77,18 +78,18 @@ def _behind_smoke(found: Backdrop, bars: bool) -> list[Finding]:
             background("background partly seen", {"unknown": unknown}) if unknown else background("background seen")
         ]
     image = plates.at(0).image
-    colour = image[0, 0]
-    if not (image == colour).all():
-        colour = np.median(image.reshape(-1, 3), axis=0)
-    red, green, blue = map(float, colour)
+    color = image[0, 0]
+    if not (image == color).all():
+        color = np.median(image.reshape(-1, 3), axis=0)
+    red, green, blue = map(float, color)
     figures = {"color": (red, green, blue)}
     if bars or found.source == "black for want of a picture":
         return [background("background assumed", figures, source="assumed")]
-    other = float((image != colour).any(-1).mean())
-    objects = [Finding("background with objects", {"share": other})] if other else []
+    other = float((image != color).any(-1).mean())
+    objects = [Finding("background with objects", {"fraction": other})] if other else []
     if max(red, green, blue) < BLACK:
         return [background("black background"), *objects]
-    return [background("background of one colour", figures), *objects]
+    return [background("background of one color", figures), *objects]
 
 
 def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]:
@@ -113,10 +114,10 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]
         said.append(doubt("strong compression", {"quantiser": found.quantiser}))
     unknown = samples.unknown
     if found.strokes is not None:  # what is painted as smoke is none of the background
-        unknown = unknown & (area_average(found.strokes.smoke, *unknown.shape[::-1]) < MOSTLY)
+        unknown = unknown & (area_average(found.strokes.smoke, *unknown.shape[::-1]) < MAJORITY)
     in_plate = unknown.sum() / max((unknown | samples.covered).sum(), 1)
-    if in_plate >= MOSTLY:
-        said.append(doubt("smoke in the background", {"share": float(in_plate)}))
+    if in_plate >= MAJORITY:
+        said.append(doubt("smoke in the background", {"fraction": float(in_plate)}))
     if not given and _between_bars(samples):
         said.append(doubt("bars"))
     return said
@@ -144,11 +145,11 @@ def _shows_smoke(clip: Clip) -> bool:
 
 def _between_bars(samples: SmokeSamples) -> bool:
     """Whether bars beside the picture are all that is background."""
-    at_a_time = len(samples.colours) / max(len(samples.gains), 1)
+    at_a_time = len(samples.colors) / max(len(samples.gains), 1)
     for covered in (samples.covered, samples.covered.T):
         rows = np.flatnonzero(covered.any(1))
         if len(rows) and rows[0] > 0 and rows[-1] < len(covered) - 1:
             picture = covered[rows[0] : rows[-1] + 1]
-            if picture.mean() >= BETWEEN_BARS and at_a_time > MOSTLY * picture.size:
+            if picture.mean() >= MIN_BARS_FRACTION and at_a_time > MAJORITY * picture.size:
                 return True
     return False

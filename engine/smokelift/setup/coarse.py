@@ -1,7 +1,7 @@
 """A few frames of a clip at low resolution, and the one judge of lights and scattering on them.
 
 A wrong light can reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
-shadow. So densities are fitted to one colour of a chequerboard of the clip's pixels and judged on the other. What they
+shadow. So densities are fitted to one color of a chequerboard of the clip's pixels and judged on the other. What they
 let through of the background is subtracted there; the rest is light that the smoke scatters. How strong the lights have
 to be for it is the least-squares factor, zero at least.
 """
@@ -41,6 +41,11 @@ PIXELS = 2.0
 FINER = 3
 """Cells of the extraction along a coarse pixel: about as many as a fit at full resolution has."""
 
+SCATTERING_TOLERANCE = 0.02
+"""Error, as a fraction of what the smoke changes in the picture, that a cheaper model of scattering may add. Without
+shadows that is reached at an optical depth of about 0.15, where the mass comes out 5 % too small
+(docs/experiments/scattering.md)."""
+
 MIN_CHANNEL_POWER = 1e-3
 """Power of a channel's light over the brightest one's, below which 8 bits lose it: it gets no strength of its own."""
 
@@ -50,7 +55,7 @@ class CoarseView:
     """One camera's small picture of one moment, with its camera and plate.
 
     ``picture``, ``fitted`` and ``held_out`` (rows, columns, 3) are linear radiance: of all pixels of the clip, and of
-    either colour of their chequerboard. Before a picture the smoke is shown before its mean color instead.
+    either color of their chequerboard. Before a picture the smoke is shown before its mean color instead.
     """
 
     camera: Camera
@@ -120,7 +125,7 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
 def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     """What one camera saw of a frame."""
     working = working_picture(view.camera.at(number), domain)
-    first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
+    first = (working.top + working.left) % 2  # the colors are those of the whole picture's pixels
     halves = view.clip.stored(number).cut(working.part).chequered(*working.camera.size, first)
     plate = view.plates.at(number).through(working.cut, working.pixels)
     pictures = (working.of(view.clip, number), *halves)
@@ -142,14 +147,14 @@ class HeldOut:
     Attributes
     ----------
     error
-        Root mean square difference, as a share of what the smoke changes there; of several cameras that of theirs.
-    colours : (cameras, 3)
+        Root mean square difference, as a fraction of what the smoke changes there; of several cameras that of theirs.
+    gains : (cameras, 3)
         Strength of the light, in multiples of the scene's, that fits best with the same densities, by camera and
         channel: more than 1 where they are too dark. 1 without scattered light.
     """
 
     error: float
-    colours: Doubles = field(default_factory=lambda: np.ones((1, 3)))
+    gains: Doubles = field(default_factory=lambda: np.ones((1, 3)))
 
 
 def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:
@@ -183,5 +188,5 @@ def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering
         return HeldOut(error, np.ones_like(power))
     whole = np.maximum(product.sum(1, keepdims=True) / np.maximum(power.sum(1, keepdims=True), 1e-30), 0)
     bright = power > MIN_CHANNEL_POWER * power.max(1, keepdims=True)
-    colours = np.where(bright, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
-    return HeldOut(error, colours)
+    gains = np.where(bright, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
+    return HeldOut(error, gains)

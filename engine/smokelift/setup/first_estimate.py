@@ -27,7 +27,7 @@ to a voxel of a draft."""
 UNKNOWN = 0.5
 """Confidence of a plate below which a background is unknown: it is as likely smoke as not."""
 
-CLEARER = 0.5
+MAX_CLEAR_FRACTION = 0.5
 """Area of smoke before a known background in a frame, over the median of all examined ones, below which the frame has
 much less smoke than most: set by hand. Before an unknown background a frame without smoke differs from the plate, too.
 """
@@ -43,14 +43,14 @@ class SmokeSamples:
         Full pixels along a reduced one.
     covered, unknown : (rows, columns) bool
         Pixels with smoke, and pixels with an unknown background, in at least one sample.
-    colours, behind : (n, 3)
+    colors, behind : (n, 3)
         Radiance of all smoke pixels, and of their background.
     smoky
         Numbers of the frames with smoke, those with the most first.
     gains
         Exposure (3,) of each sample over its background's, by frame number; the samples are divided by it.
     amounts
-        Numbers of smoke pixels of the samples with smoke, in the order of ``colours``.
+        Numbers of smoke pixels of the samples with smoke, in the order of ``colors``.
     over_known
         Numbers of smoke pixels before a known background in each sample, in the order of ``gains``.
     """
@@ -58,7 +58,7 @@ class SmokeSamples:
     scale: float
     covered: NDArray[np.bool_]
     unknown: NDArray[np.bool_]
-    colours: NDArray[np.float32]
+    colors: NDArray[np.float32]
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
@@ -76,17 +76,17 @@ class SmokeSamples:
         if not self.over_known:
             return None
         number, least = min(zip(self.gains, self.over_known, strict=True), key=lambda pair: pair[1])
-        return number if least < CLEARER * np.median(self.over_known) else None
+        return number if least < MAX_CLEAR_FRACTION * np.median(self.over_known) else None
 
     @property
     def exposure(self) -> float:
-        """Largest share by which the exposure of a sample differs from its background's."""
+        """Largest fraction by which the exposure of a sample differs from its background's."""
         return float(np.expm1(np.abs(np.log(list(self.gains.values()))).max()))
 
     @property
     def brightens(self) -> bool:
         """Whether smoke adds more light to what is behind it than it takes away."""
-        change = np.sum(self.colours - self.behind, -1)
+        change = np.sum(self.colors - self.behind, -1)
         return bool(np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)))
 
 
@@ -94,11 +94,11 @@ class SmokeSamples:
 class Fire:
     """What shines by itself.
 
-    ``share`` is that of the smoke's pixels. ``light`` is a clip of the added light in the place of smoke; ``color`` is
-    its colour in the clip.
+    ``fraction`` is that of the smoke's pixels. ``light`` is a clip of the added light in the place of smoke; ``color``
+    is its color in the clip.
     """
 
-    share: float
+    fraction: float
     light: Clip
     color: Vector
 
@@ -133,7 +133,7 @@ def first_estimate(
     found = find_backdrop(clip, camera, background)
     samples = sample_smoke(found.clip, found.plates)
     exposed = evened(found.clip, found.plates, samples.gains)
-    fire, hot = None, hot_pixels(samples.colours, samples.behind)
+    fire, hot = None, hot_pixels(samples.colors, samples.behind)
     if hot.burn or (flame_color is not None and hot.share):
         doused = without_fire(exposed, found.plates)
         light = firelight(exposed, doused)
@@ -172,7 +172,7 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = (max(1, round(side / scale)) for side in (width, height))
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
-    colours, behind, over_known = [], [], []
+    colors, behind, over_known = [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
@@ -187,10 +187,10 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
         hidden = unknown_part(reduced, clip, number)
         unknown |= hidden
         over_known.append(int((mask & ~hidden).sum()))
-        colours.append(picture[mask])
+        colors.append(picture[mask])
         behind.append(plate.image[mask])
         if mask.any():
             amounts[number] = int(mask.sum())
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
-    radiance = np.concatenate(colours), np.concatenate(behind)
+    radiance = np.concatenate(colors), np.concatenate(behind)
     return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, tuple(amounts.values()), tuple(over_known))

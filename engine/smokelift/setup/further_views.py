@@ -24,7 +24,7 @@ from smokelift.footage.plate import evened
 from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_findings import backdrop_findings
-from smokelift.setup.coarse import HeldOut, coarse_frames, held_out
+from smokelift.setup.coarse import SCATTERING_TOLERANCE, HeldOut, coarse_frames, held_out
 from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
@@ -33,8 +33,8 @@ from smokelift.setup.shot import Shot, ShotView
 AGREEMENT_SAMPLES = 4
 """Frames in which the views are compared: a wrong one does not decide their median."""
 
-MIN_AGREED_SHARE = 0.9
-"""Smallest share of the smoke's pixels that right views agree on: true views agree on all, cameras upside down on a
+MIN_AGREED_FRACTION = 0.9
+"""Smallest fraction of the smoke's pixels that right views agree on: true views agree on all, cameras upside down on a
 tenth to nine tenths (docs/experiments/further-views.md)."""
 
 SAME_RATE = 0.01
@@ -66,7 +66,7 @@ def open_views(
     for number in range(len(scene.views)):
         view, opened = _open_view(number, first.clip, scene)
         found += opened
-        if settings.selection.measure and scene.scattering != "absorption":
+        if settings.measure and scene.scattering != "absorption":
             view, gain = _evened(number + 1, first, view, scene, numbers, lit, settings)
             found += gain
         views.append(view)
@@ -75,12 +75,12 @@ def open_views(
 
 def disagreement(shot: Shot) -> list[Finding]:
     """A doubt if the views disagree about where the smoke is."""
-    shares = []
+    fractions = []
     for frame in shot.spread(AGREEMENT_SAMPLES):
         views = ViewSet.of(shot.observe(frame), shot.optics).views
-        shares.append(agreement([view.mask for view in views], [view.projection for view in views]))
-    agreed = float(np.median(shares))
-    return [] if agreed >= MIN_AGREED_SHARE else [Finding("disagreeing views", {"agreed": agreed}, doubt=True)]
+        fractions.append(agreement([view.mask for view in views], [view.projection for view in views]))
+    agreed = float(np.median(fractions))
+    return [] if agreed >= MIN_AGREED_FRACTION else [Finding("disagreeing views", {"agreed": agreed}, doubt=True)]
 
 
 def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Finding]]:
@@ -150,9 +150,9 @@ def _evened(
     ratio = np.ones(3)
     for _ in range(ROUNDS):
         found = tried(ratio.astype(np.float32))
-        own, other = np.maximum(found.colours, 1e-6)
+        own, other = np.maximum(found.gains, 1e-6)
         errors, ratio = [*errors, found.error], np.clip(ratio * other / own, 1 / MAX_GAIN, MAX_GAIN)
-    as_it_is, tolerance = errors[0], settings.selection.scattering_error
+    as_it_is, tolerance = errors[0], SCATTERING_TOLERANCE
     brightness = float(np.exp(np.mean(np.log(ratio))))
     if not lit and 1 / RATIO < brightness < RATIO:
         ratio = ratio / brightness

@@ -22,7 +22,7 @@ from smokelift.setup.resolution import DetailSpectrum, Grid, Shape, choose_grid,
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 
 PICTURE_HEIGHT = 2.0
-"""Height in metres of an uncalibrated picture where the smoke is, unless its distance is given: a person's size."""
+"""Height in meters of an uncalibrated picture where the smoke is, unless its distance is given: a person's size."""
 
 FILM = 36.0, 24.0
 """Width and height (mm) of 35 mm film."""
@@ -70,10 +70,10 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     _require_place(scene, known)
     focal = _focal(clip.size, clip.lens)
     camera = known or _level(clip.size, focal, settings.distance)
-    metres, multiple = 0.0, 1
+    meters, multiple = 0.0, 1
     if box is None:
         # multiples of four: pyramids halve them evenly
-        (floor, size, metres), multiple = _around(camera, samples, settings.distance), 4
+        (floor, size, meters), multiple = _around(camera, samples, settings.distance), 4
     else:
         floor, size = np.array([*box.centre[:2], box.min[2]]), np.array(box.size)
     still = camera.at(next(iter(samples.smoky), 0))
@@ -82,7 +82,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         limit = LIMITS[quality]
         if isinstance(box, Domain):
             return _same_shape(box, limit.voxels(_pixels(still, box)))
-        pixels = max(size) / metres if box is None else _pixels(still, _grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
+        pixels = max(size) / meters if box is None else _pixels(still, _grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
         return _grids(floor, size, limit.voxels(pixels), multiple)
 
     qualities: Mapping[Quality, Grid]
@@ -100,7 +100,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         around = Finding("box around the smoke", figures, about="box", source="estimated")
         if not samples.smoky:
             around = replace(around, kind="box over the picture", source="assumed")
-        found = _assumed(known, clip.lens, metres * camera.size[1]), around
+        found = _assumed(known, clip.lens, meters * camera.size[1]), around
     else:
         found = _grown(box, domain)
     return Geometry(camera, domain, qualities, (*found, resolution))
@@ -150,14 +150,14 @@ def _assumed(given: Camera | None, lens: float | None, height: float) -> Finding
 def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
     """A level camera that looks along +Y at the smoke above the world's origin; ``focal`` in pixels."""
     width, height = size
-    metres = _pixel_at(distance, height, focal)
-    up = metres * height / 2
-    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * metres], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
+    meters = _pixel_at(distance, height, focal)
+    up = meters * height / 2
+    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * meters], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
     return Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
 
 
 def _pixel_at(distance: float | None, height: int, focal: float) -> float:
-    """Metres that a pixel shows where the smoke is, in a picture ``height`` pixels high; ``distance`` (m) if given."""
+    """Meters that a pixel shows where the smoke is, in a picture ``height`` pixels high; ``distance`` (m) if given."""
     return PICTURE_HEIGHT / height if distance is None else distance / focal
 
 
@@ -181,15 +181,15 @@ def _ways(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
 def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Doubles, Doubles, float]:
     """The upright box around the smoke at a distance (m), or where a level camera's picture is `PICTURE_HEIGHT` high.
 
-    Returns the middle of its floor (3,) and its size (3,) in metres, and the metres that a pixel shows there.
+    Returns the middle of its floor (3,) and its size (3,) in meters, and the meters that a pixel shows there.
     """
-    metres = _pixel_at(distance, camera.size[1], camera.fy)
-    distance = camera.fy * metres
+    meters = _pixel_at(distance, camera.size[1], camera.fy)
+    distance = camera.fy * meters
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]
     left, right, top, bottom = _covered(samples, *camera.size)
     ways = _ways(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
-    ways *= metres * (camera.fy / (ways @ along))[:, None]
+    ways *= meters * (camera.fy / (ways @ along))[:, None]
     aside, height = ways @ lateral, ways[:, 2]
     across = max(np.ptp(aside), NARROWEST * np.ptp(height))
     up = max(np.ptp(height), NARROWEST * np.ptp(aside))
@@ -197,7 +197,7 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
     across *= 1 + across / (2 * distance)
     base = eye + distance * along + (aside.min() + aside.max()) / 2 * lateral
     base[2] = eye[2] + height.min()
-    return base, np.array([across, across, up]), metres
+    return base, np.array([across, across, up]), meters
 
 
 def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:

@@ -20,7 +20,7 @@ from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.environment import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
-from smokelift.setup.coarse import CoarseFrame, held_out
+from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
@@ -37,13 +37,13 @@ MAX_DESCENT_STEPS = 64
 """Steps of descent of a fit where models differ little: enough for every fit to end by itself. One that is cut off has
 the error of the steps that it lacks (docs/experiments/scattering.md)."""
 
-DOUBTFUL = 0.12
-"""Error of held-out pixels, as a share of the smoke's contrast, from which an assumed light before one colour is likely
-wrong: from there the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
+MAX_LIGHT_ERROR = 0.12
+"""Error of held-out pixels, as a fraction of the smoke's contrast, from which an assumed light before one color is
+likely wrong: from there the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
 (docs/experiments/unknown-light.md)."""
 
-MAX_COLOUR_SPREAD = 0.1
-"""Largest spread of a background of one colour, as a share of its brightness."""
+MAX_COLOR_SPREAD = 0.1
+"""Largest spread of a background of one color, as a fraction of its brightness."""
 
 MAX_QUIET_NOISE = 2 / 255
 """Largest noise that does not explain the error itself (docs/experiments/unknown-light.md)."""
@@ -76,8 +76,8 @@ def first_light(
         # without shadows no smoke is brighter than the light makes all of it
         brightest = brightest_smoke(estimate.clip, estimate.plates, estimate.samples.smoky[0], found)
         source = found * max(1.0, brightest / float(found.mean()))
-    share = np.array(medium.albedos) / (4 * np.pi)
-    red, green, blue = np.divide(source, share, out=np.zeros(3), where=share > 0).tolist()
+    scattered = np.array(medium.albedos) / (4 * np.pi)
+    red, green, blue = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0).tolist()
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
     assumed = Finding("assumed light", {"irradiance": light.irradiance}, source="assumed")
     return (light,), richest, [assumed, _brightness(found, source)]
@@ -111,15 +111,15 @@ def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
 def light_doubts(scattering: Finding, samples: SmokeSamples, noise: Noise, *, burns: bool) -> list[Finding]:
     """A doubt if an assumed light leaves much unexplained; ``burns`` if there is fire.
 
-    It is said only before one colour that is not black. What moves there is smoke, and its brightness shows its light,
+    It is said only before one color that is not black. What moves there is smoke, and its brightness shows its light,
     so the light itself is at fault.
     """
     error = scattering.figures.get(f"error_{scattering.value}", 0.0)
     assert isinstance(error, float)
-    if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > MAX_QUIET_NOISE:
+    if error < MAX_LIGHT_ERROR or not len(samples.behind) or noise.total.max() > MAX_QUIET_NOISE:
         return []
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
-    if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
+    if high < MIN_SOURCE_VALUE or high - low > MAX_COLOR_SPREAD * high:
         return []
     return [Finding("light of fire" if burns else "likely wrong light", {"error": error}, doubt=True)]
 
@@ -137,7 +137,7 @@ def find_scattering(
     ``frames`` (one at least) have the richest model that their light allows. ``finer`` returns one of them on twice the
     voxels, or None; it is asked if the models are nearly alike on these.
     """
-    fit, tolerance = settings.density, settings.selection.scattering_error
+    fit, tolerance = settings.density, SCATTERING_TOLERANCE
     richest, isotropic = frames[0].scene.scattering, frames[0].scene.medium.anisotropy == 0.0
     rivals: tuple[Scattering, ...] = ("single", "multiple") if richest == "single" and isotropic else (richest,)
     errors = {each: held_out(frames, each, each, fit).error for each in rivals}

@@ -1,8 +1,8 @@
-"""The smoke as a medium: the scene's, or the usual one in the colour that its pixels show; and its source radiance.
+"""The smoke as a medium: the scene's, or the usual one in the color that its pixels show; and its source radiance.
 
-A pixel shows T behind + (1 - T) source, where the source radiance is the light times the smoke's colour. So the source
+A pixel shows T behind + (1 - T) source, where the source radiance is the light times the smoke's color. So the source
 lies on the line from the background through the smoke, beyond the thickest smoke that is seen. Before black that line
-has one colour, else many. Smoke has a colour of its own if no source on the line has one that light may have: white, as
+has one color, else many. Smoke has a color of its own if no source on the line has one that light may have: white, as
 cameras balance it, or the background's, which stands in the same light. Figures: docs/experiments/unknown-light.md.
 """
 
@@ -26,28 +26,28 @@ OPTICAL_DEPTH_AT_ONE = 5.0
 since a picture shows density times extinction only."""
 
 SOURCE_EXCESS = 0.1
-"""Share by which the source exceeds the smoke's 99th percentile: its optical depth is then about 2.4, not infinite."""
+"""Fraction by which the source exceeds the smoke's 99th percentile, whose optical depth is then about 2.4."""
 
-COLOURED = 12.0
-"""Degrees between two colours, as vectors of linear light, from which white balance does not explain their difference.
-Grey world and its kin are wrong by 5 to 6 degrees on the mean and by 10 in the worst quarter of pictures (Gijsenij,
+MIN_COLOR_DEGREES = 12.0
+"""Degrees between two colors, as vectors of linear light, from which white balance does not explain their difference.
+Gray world and its kin are wrong by 5 to 6 degrees on the mean and by 10 in the worst quarter of pictures (Gijsenij,
 Gevers and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
 
 THICK_PERCENTILE = 90
 """Percentile of the change from which smoke is measured: the thickest is nearest to the source."""
 
 PIXELS = 50
-"""Smallest number of smoke pixels that show a colour: their thickest tenth are five."""
+"""Smallest number of smoke pixels that show a color: their thickest tenth are five."""
 
 MIN_SOURCE_VALUE = 0.01
-"""Smallest linear value of the brightest channel: 8 bits show no colour of a darker source."""
+"""Smallest linear value of the brightest channel: 8 bits show no color of a darker source."""
 
 WHITE: Vector = (1.0, 1.0, 1.0)
-"""Colour of grey smoke."""
+"""Color of gray smoke."""
 
 
 def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain) -> tuple[Medium, list[Finding]]:
-    """Complete the medium, with its flame's colour if fire burns; return what was found of it too."""
+    """Complete the medium, with its flame's color if fire burns; return what was found of it too."""
     medium, samples, fire = scene.medium, estimate.samples, estimate.fire
     flame_color = None if medium is None else medium.flame_color
     found: list[Finding] = []
@@ -55,24 +55,24 @@ def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: D
         medium = Medium(OPTICAL_DEPTH_AT_ONE / min(domain.size), flame_color=flame_color)
         figures = {"extinction": medium.extinction, "albedo": medium.albedo}
         found.append(Finding("assumed medium", figures, about="medium", source="assumed"))
-        color, coloured = smoke_colour(samples, _light_colour(scene.lights, camera, domain, medium))
+        color, colored = smoke_color(samples, _light_color(scene.lights, camera, domain, medium))
         medium = replace(medium, color=color)
-        found.append(coloured)
-    found += several_colours(samples)
+        found.append(colored)
+    found += several_colors(samples)
     if fire is not None:
         red, green, blue = color = fire.color
-        figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
-        found.append(Finding("fire", figures, about="fire", value=fire.share, source="measured"))
+        figures = {"fraction": fire.fraction, "red": red, "green": green, "blue": blue}
+        found.append(Finding("fire", figures, about="fire", value=fire.fraction, source="measured"))
         medium = replace(medium, flame_color=color)
     return medium, found
 
 
-def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, grey: Medium) -> Doubles:
-    """Colour (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
+def _light_color(lights: tuple[Light, ...], camera: Camera, domain: Domain, gray: Medium) -> Doubles:
+    """Color (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
     # only the sum of an environment's directions counts, so one stands for all
     few = tuple(replace(each, directions=1) if isinstance(each, EnvironmentLight) else each for each in lights)
     scene = CompleteScene(
-        camera=camera, domain=domain, medium=grey, lights=few, background=Background(), scattering="single"
+        camera=camera, domain=domain, medium=gray, lights=few, background=Background(), scattering="single"
     )
     source = scene_optics(scene).unshadowed_source()
     return source / source.max() if source.max() > 0 else np.ones(3)
@@ -83,24 +83,24 @@ def source_radiance(samples: SmokeSamples) -> Doubles:
 
     Thick smoke shows it: the brightest if smoke brightens its background, the darkest if it darkens it.
     """
-    if len(samples.colours) == 0:
+    if len(samples.colors) == 0:
         return np.ones(3)
     if not samples.brightens:
-        return np.asarray((1 - SOURCE_EXCESS) * np.percentile(samples.colours, 1, axis=0))
-    # on the line of colours: the channels' maxima may be of different smoke, and together a colour that none shows
-    colours, behind = samples.colours.astype(np.float64), samples.behind.astype(np.float64)
-    axis, start = _line_of_colours(colours, behind), behind.mean(0)
-    farthest = start + (np.percentile(colours @ axis, 99) - start @ axis) * axis
+        return np.asarray((1 - SOURCE_EXCESS) * np.percentile(samples.colors, 1, axis=0))
+    # on the line of colors: the channels' maxima may be of different smoke, and together a color that none shows
+    colors, behind = samples.colors.astype(np.float64), samples.behind.astype(np.float64)
+    axis, start = _line_of_colors(colors, behind), behind.mean(0)
+    farthest = start + (np.percentile(colors @ axis, 99) - start @ axis) * axis
     return np.asarray(np.maximum(farthest + SOURCE_EXCESS * np.linalg.norm(farthest) * axis, 0))
 
 
-def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding]:
-    """Return the smoke's own colour in a light (3,), and what decided it.
+def smoke_color(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding]:
+    """Return the smoke's own color in a light (3,), and what decided it.
 
-    An unknown light is ones. The colour's largest channel is 1; it is white unless the clip shows that it is not grey.
+    An unknown light is ones. The color's largest channel is 1; it is white unless the clip shows that it is not gray.
     """
-    figures = {"tolerance": COLOURED}
-    undetermined = Finding("smoke colour unseen", figures, about="smoke color", value=UNDETERMINED, source="assumed")
+    figures = {"tolerance": MIN_COLOR_DEGREES}
+    undetermined = Finding("smoke color unseen", figures, about="smoke color", value=UNDETERMINED, source="assumed")
     line = _thickest(samples)
     if line is None:
         return WHITE, undetermined
@@ -108,66 +108,68 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
     least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_SOURCE_VALUE else white
-    if least.min() < COLOURED:
+    if least.min() < MIN_COLOR_DEGREES:
         figures["degrees"] = float(least.min())
-        return WHITE, replace(undetermined, kind="smoke colour near the light's", figures=figures)
+        return WHITE, replace(undetermined, kind="smoke color near the light's", figures=figures)
     # the palest that explains the clip
     own = sources[white.argmin()] / np.maximum(light, 1e-6)
     red, green, blue = (float(round(v, 3)) for v in own / own.max())
     figures["degrees"] = float(white.min())
     color = red, green, blue
-    return color, Finding("smoke colour", figures, about="smoke color", value=color, source="measured")
+    return color, Finding("measured smoke color", figures, about="smoke color", value=color, source="measured")
 
 
-def several_colours(samples: SmokeSamples) -> list[Finding]:
-    """Return a doubt if smoke before black has more than one colour, at a time or one after the other.
+def several_colors(samples: SmokeSamples) -> list[Finding]:
+    """Return a doubt if smoke before black has more than one color, at a time or one after the other.
 
-    Smoke of one colour has that colour before black, however thick it is. So what is off the colour that explains most
-    of the light is another colour's. Clipped white shows none.
+    Smoke of one color has that color before black, however thick it is. So what is off the color that explains most
+    of the light is another color's. Clipped white shows none.
     """
-    usable = samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE
-    shown = samples.colours[usable].astype(np.float64)
+    usable = samples.colors.min(-1, initial=1.0) < CLIPPED_VALUE
+    shown = samples.colors[usable].astype(np.float64)
     if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
         return []
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
         return []
-    off = _off_one_colour(shown)
-    if off < COLOURED:
+    off = _off_one_color(shown)
+    if off < MIN_COLOR_DEGREES:
         return []
     ends = np.cumsum(samples.amounts, dtype=np.intp)[:-1]
     frames = [
-        part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colours, usable)), strict=True)
+        part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colors, usable)), strict=True)
     ]
-    apart = [_off_one_colour(frame.astype(np.float64)) for frame in frames if len(frame) >= PIXELS]
-    kind = "smoke that changes its colour" if apart and np.median(apart) < COLOURED else "smoke of several colours"
+    apart = [_off_one_color(frame.astype(np.float64)) for frame in frames if len(frame) >= PIXELS]
+    kind = (
+        "smoke that changes its color" if apart and np.median(apart) < MIN_COLOR_DEGREES else "smoke of several colors"
+    )
     return [Finding(kind, {"degrees": off}, doubt=True)]
 
 
-def _off_one_colour(colours: Doubles) -> float:
-    """Root mean square of the degrees by which light (n, 3) is off the one colour that explains most of it."""
-    along = np.linalg.eigvalsh(colours.T @ colours)
+def _off_one_color(colors: Doubles) -> float:
+    """Root mean square of the degrees by which light (n, 3) is off the one color that explains most of it."""
+    along = np.linalg.eigvalsh(colors.T @ colors)
     return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
 
 
-def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
+def _line_of_colors(colors: Doubles, behind: Doubles) -> Doubles:
     """Unit vector (3,) that explains most of how smoke (n, 3) changes its background."""
-    change = colours - behind
+    change = colors - behind
     axis = np.linalg.eigh(change.T @ change)[1][:, -1]
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
 
 
 def _thickest(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
-    """Background (3,) and colour (3,) of the thickest smoke that is not clipped; None if there is too little."""
-    clear = brightest_channel(samples.colours) < CLIPPED_VALUE
+    """Background (3,) and color (3,) of the thickest smoke that is not clipped; None if there is too little."""
+    clear = brightest_channel(samples.colors) < CLIPPED_VALUE
     if clear.sum() < max(PIXELS, 0.1 * len(clear)):
         return None
-    colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
-    change, axis = colours - behind, _line_of_colours(colours, behind)
-    # a small error of the line is all of a dark colour, so that comes from the thickest pixels themselves
+    colors, behind = (values[clear].astype(np.float64) for values in (samples.colors, samples.behind))
+    change, axis = colors - behind, _line_of_colors(colors, behind)
+    # a small error of the line is all of a dark color, so that comes from the thickest pixels themselves
     amount = change @ axis if samples.brightens else np.linalg.norm(change, axis=-1)
     thick = amount >= np.percentile(amount, THICK_PERCENTILE)
     start = np.maximum(behind[thick].mean(0), 0)
-    seen = start + amount[thick].mean() * axis if samples.brightens else colours[thick].mean(0)
+    seen = start + amount[thick].mean() * axis if samples.brightens else colors[thick].mean(0)
     return (start, np.maximum(seen, 0)) if seen.max() >= MIN_SOURCE_VALUE else None
 
 
@@ -179,7 +181,7 @@ def _sources(behind: Doubles, seen: Doubles) -> Doubles:
     return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), 256)[:, None] * change, 0))
 
 
-def _degrees(colours: Doubles, other: Doubles) -> Doubles:
-    """Degrees (n,) between colours (n, 3) and another (3,)."""
-    length = np.linalg.norm(colours, axis=-1) * np.linalg.norm(other)
-    return np.asarray(np.degrees(np.arccos(np.clip(colours @ other / np.maximum(length, 1e-12), -1, 1))))
+def _degrees(colors: Doubles, other: Doubles) -> Doubles:
+    """Degrees (n,) between colors (n, 3) and another (3,)."""
+    length = np.linalg.norm(colors, axis=-1) * np.linalg.norm(other)
+    return np.asarray(np.degrees(np.arccos(np.clip(colors @ other / np.maximum(length, 1e-12), -1, 1))))

@@ -29,6 +29,10 @@ SHADOWED_SOURCE = 0.5
 """Usual source radiance of smoke over that without shadows: .52 and .55 of two baked scenes, within the factor of two
 that an extraction needs."""
 
+MAX_VELOCITY_SIDE = 30
+"""Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
+velocities follow its errors (docs/experiments/velocity-solver.md)."""
+
 
 def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
     """Complete a scene from its clip.
@@ -78,7 +82,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         first = replace(first, source=np.asarray(lit, np.float32))
     of_clip = first_findings(estimate, _given(scene.background, estimate))
     findings = [*clip.findings(), *of_clip, *geometry.findings, *of_medium, *of_light]
-    coarse = coarse_frames((first,), samples.typical, complete) if settings.selection.measure else ()
+    coarse = coarse_frames((first,), samples.typical, complete) if settings.measure else ()
     if coarse and asked is not None:
         findings.append(Finding("given", about="scattering", value=asked, source="given"))
     elif coarse:
@@ -92,7 +96,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         findings = [found for found in findings if found.about != "source radiance"]
     others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)
     findings += of_views
-    if settings.selection.measure:
+    if settings.measure:
         coarsening, chosen = velocity_coarsening(domain, settings)
         findings.append(chosen)
         settings = replace(settings, velocity=replace(settings.velocity, coarsening=coarsening))
@@ -127,11 +131,10 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Findin
     about = "velocity grid coarsening"
     if (given := settings.velocity.coarsening) is not None:
         return given, Finding("given", about=about, value=given, source="given")
-    finest = settings.selection.velocity_side
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
-    while longest > finest and shortest >= 16:
+    while longest > MAX_VELOCITY_SIDE and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    figures = {"voxels": float(longest), "tolerance": finest}
+    figures = {"voxels": float(longest), "tolerance": MAX_VELOCITY_SIDE}
     return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
 
 
@@ -147,7 +150,7 @@ def _check(length: int, scene: Scene, settings: Settings) -> None:
         raise ValueError(f"The {known} where the smoke stands; leave the distance out.")
     moves = scene.camera is not None and scene.camera.moves
     if scene.views and (scene.camera is None or scene.domain is None):
-        raise ValueError("Further views need the input's camera and the box, in the same metres as theirs; give both.")
+        raise ValueError("Further views need the input's camera and the box, in the same meters as theirs; give both.")
     if scene.domain is not None:
         for camera in (scene.camera, *(view.camera for view in scene.views)):
             if camera is not None:

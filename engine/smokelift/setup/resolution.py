@@ -1,7 +1,7 @@
 """How many voxels the smoke's detail asks for, as far as it stands out from the clip's noise.
 
 The spectrum of what the smoke changes is compared with that of the noise beside it. It is a cosine transform of sRGB
-values, in which a clip's noise is even. A grid shows what is coarser than two of its voxels, and loses the share of the
+values, in which a clip's noise is even. A grid shows what is coarser than two of its voxels, and loses the part of the
 contrast that is finer. Figures: docs/experiments/clip-pixels.md.
 """
 
@@ -54,7 +54,7 @@ class DetailSpectrum:
     pixels: float
 
     def lost(self, longest: float, finest: float | None = None) -> float:
-        """Share of the clip's contrast (root of the energy) that a grid with ``longest`` voxels in a row loses.
+        """Fraction of the clip's contrast (root of the energy) that a grid with ``longest`` voxels in a row loses.
 
         With ``finest``, only what a grid of so many voxels shows counts as lost.
         """
@@ -88,7 +88,7 @@ def choose_grid(
         finest = max(allowed[-1].resolution)
         return next((grid for grid in allowed if spectrum.lost(max(grid.resolution), finest) <= tolerance), allowed[-1])
 
-    tolerance = settings.selection.lost_detail
+    tolerance = LOST_DETAIL[settings.quality]
     domain = coarsest(own, tolerance)
     longest = max(domain.resolution)
     figures: Figures = {

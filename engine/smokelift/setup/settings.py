@@ -22,15 +22,15 @@ QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine", "final")
 
 @dataclass(frozen=True)
 class GridLimit:
-    """Voxels that a quality allows along the domain's longest side: a share of the clip's pixels, within bounds."""
+    """Voxels that a quality allows along the domain's longest side: a fraction of the clip's pixels, within bounds."""
 
-    share: float
+    fraction: float
     least: int
     most: int
 
     def voxels(self, pixels: float) -> int:
         """Return how many are allowed for so many pixels: a multiple of four, as pyramids need."""
-        return 4 * math.ceil(min(pixels, max(self.least, min(self.share * pixels, self.most))) / 4)
+        return 4 * math.ceil(min(pixels, max(self.least, min(self.fraction * pixels, self.most))) / 4)
 
 
 LIMITS: Mapping[Quality, GridLimit] = {
@@ -39,44 +39,17 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "fine": GridLimit(1 / 2, 144, 256),
     "final": GridLimit(1, 0, MAX_SIDE_VOXELS),
 }
-"""Limits of each quality. A share loses much the same whatever the clip's size; the bounds keep the time of a frame
+"""Limits of each quality. A fraction loses much the same whatever the clip's size; the bounds keep the time of a frame
 from growing with that size (docs/experiments/clip-pixels.md)."""
 
 LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005, "final": 0.0025}
-"""Share of the smoke's contrast that a grid may lose beside the finest of its quality, halved from each to the next
+"""Fraction of the smoke's contrast that a grid may lose beside the finest of its quality, halved from each to the next
 (docs/experiments/clip-pixels.md)."""
 
 ITERATIONS: Mapping[Quality, tuple[int, int]] = {
     "draft": (4, 4), "balanced": (6, 14), "fine": (8, 14), "final": (8, 14)
 }  # fmt: skip
 """Largest numbers of multiplicative iterations and of steps of descent (docs/experiments/density-descent.md)."""
-
-
-@dataclass(frozen=True)
-class SelectionSettings:
-    """How much worse than the richest model a cheaper one may be (docs/selection.md).
-
-    Attributes
-    ----------
-    measure
-        Measure open choices but the resolution on the clip. Without it the richest model of scattering that the known
-        light allows is taken.
-    lost_detail
-        Share of the smoke's contrast that a grid may lose of what the finest of the quality shows; a preset has that
-        of `LOST_DETAIL`.
-    scattering_error
-        Error, as a share of what the smoke changes in the picture, that a cheaper model of scattering may add. Without
-        shadows that is reached at an optical depth of about 0.15, where the mass comes out 5 % too small
-        (docs/experiments/scattering.md).
-    velocity_side
-        Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
-        velocities follow its errors (docs/experiments/velocity-solver.md).
-    """
-
-    measure: bool = True
-    lost_detail: float = LOST_DETAIL["balanced"]
-    scattering_error: float = 0.02
-    velocity_side: int = 30
 
 
 @dataclass(frozen=True)
@@ -97,15 +70,16 @@ class Settings:
         How light is scattered: ``"multiple"`` times, ``"single"`` (self-shadowed), ``"unshadowed"``,
         ``"absorption"``, or ``"auto"``: what the scene says, else the cheapest model that finds as good a density as
         the richest.
-    selection
-        How open choices are made.
+    measure
+        Measure open choices but the resolution on the clip. Without it the richest model of scattering that the known
+        light allows is taken.
     transport
-        This share (0 to 1) of what a frame's fit starts from is the advected density of the frame before
+        Fraction of what a frame's fit starts from that is the advected density of the frame before
         (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
-        smear the depth (docs/experiments/temporal-prior.md). Made-up detail is carried on whatever the share, unless it
-        is 0. The paper's method takes all.
+        smear the depth (docs/experiments/temporal-prior.md). Made-up detail is carried on whatever the fraction, unless
+        it is 0. The paper's method takes all.
     distance
-        Level distance (metres) from the camera, straight ahead, to where the smoke stands: the lower end of it. Without
+        Level distance (meters) from the camera, straight ahead, to where the smoke stands: the lower end of it. Without
         a box it sets the scale of the scene. None takes marked inlets or the contact with the floor, else the middle of
         the box.
     detail
@@ -128,7 +102,7 @@ class Settings:
     quality: Quality = "balanced"
     resolution: tuple[int, int, int] | Literal["auto"] | None = None
     scattering: Scattering | Literal["auto"] = "auto"
-    selection: SelectionSettings = SelectionSettings()
+    measure: bool = True
     transport: float = 0.25
     distance: float | None = None
     detail: float = 1.0
@@ -137,17 +111,13 @@ class Settings:
     velocity: VelocitySettings = field(default_factory=VelocitySettings)
 
     def __post_init__(self) -> None:
-        for name, known in (
-            ("method", METHODS),
-            ("quality", QUALITIES),
-            ("scattering", ("auto", *SCATTERINGS)),
-        ):
+        for name, known in (("method", METHODS), ("quality", QUALITIES), ("scattering", ("auto", *SCATTERINGS))):
             if getattr(self, name) not in known:
                 raise SceneError(f"{name} must be one of {', '.join(known)}, not {getattr(self, name)!r}.")
         for name in ("transport", "detail"):
-            number(getattr(self, name), name, "a number from 0 to 1", lambda share: 0 <= share <= 1)
+            number(getattr(self, name), name, "a number from 0 to 1", lambda value: 0 <= value <= 1)
         if self.distance is not None:
-            positive(self.distance, "distance", "a number of metres above 0")
+            positive(self.distance, "distance", "a number of meters above 0")
         if self.method == "paper" and self.detail > 0:
             raise SceneError(f"The paper's method makes up no detail: detail must be 0 with it, not {self.detail}.")
         if not isinstance(self.seed, int) or self.seed < 0:
@@ -168,12 +138,10 @@ class Settings:
         if quality not in QUALITIES:
             raise SceneError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}.")
         if method == "paper":
-            selection = SelectionSettings(measure=False)
-            return cls(method=method, quality=quality, resolution=resolution, selection=selection, detail=0.0)
+            return cls(method=method, quality=quality, resolution=resolution, measure=False, detail=0.0)
         fit, descent = ITERATIONS[quality]
         density = DensitySettings(fit_iterations=fit, descent_iterations=descent)
-        selection = SelectionSettings(lost_detail=LOST_DETAIL[quality])
-        return cls(method=method, quality=quality, resolution=resolution, density=density, selection=selection)
+        return cls(method=method, quality=quality, resolution=resolution, density=density)
 
     def as_dict(self) -> dict[str, Any]:
         """The settings as plain nested values, the velocity solver with its name."""

@@ -22,7 +22,7 @@ from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 from smokelift.report import cost
-from smokelift.report.workload import Workload
+from smokelift.report.cost import Workload
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 

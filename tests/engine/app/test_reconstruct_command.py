@@ -95,7 +95,7 @@ def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
     assert sequence.scene.domain.resolution == (16, 16, 24)
 
 
-def test_one_picture_alone_is_enough_before_one_colour(plume, tmp_path, capsys) -> None:
+def test_one_picture_alone_is_enough_before_one_color(plume, tmp_path, capsys) -> None:
     picture = plume.write(tmp_path / "clip", plume.densities[:1]).clip.path.with_name("frame_0000.png")
     picture = picture.rename(tmp_path / "photograph.png")
     assert command("reconstruct", picture, "--out", tmp_path / "out", "--npz", *QUICK) == 0

@@ -19,7 +19,7 @@ def here(shot, plume, tmp_path, monkeypatch):
     (tmp_path / "others" / "holiday.jpg").touch()
     (tmp_path / "damaged" / "sequence.json").write_text("{")
     (tmp_path / "text.mp4").write_text("not a video " * 100)
-    (tmp_path / "bad.toml").write_text("[medium]\ncolour = 3\n")
+    (tmp_path / "bad.toml").write_text("[medium]\ncolors = 3\n")
     write_image(tmp_path / "black.png", np.zeros((4, 4, 3)))
     replace(plume.scene, clip=None).save(tmp_path / "clipless.toml")
     return tmp_path
@@ -32,7 +32,7 @@ def here(shot, plume, tmp_path, monkeypatch):
         (("none.mp4",), "none.mp4"),
         (("frame_####.png",), "frame_####.png"),
         (("text.mp4",), "text.mp4"),
-        (("bad.toml",), 'bad.toml, line 2: [medium] there is no key "colour"'),
+        (("bad.toml",), 'bad.toml, line 2: [medium] there is no key "colors"'),
         (("clipless.toml",), "[clip]"),
         (("SHOT", "--frames", "2:9"), "0 to 4"),
         (("SHOT", "--frames", "3:1"), "frames"),

@@ -13,12 +13,12 @@ from smokelift.report import cost
 from smokelift.report.cost import (
     NotEnoughMemoryError,
     Spent,
+    Workload,
     estimate_cost,
     memory_needed,
     require_memory,
     voxel_solves,
 )
-from smokelift.report.workload import Workload
 from smokelift.scene import Domain
 from smokelift.setup.settings import Settings
 

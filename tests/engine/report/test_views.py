@@ -73,7 +73,7 @@ PLACE = Finding(
         (Finding("black background", {"view": 2}), "View 2: Background not given: it is black."),
         (Finding("no smoke examined", {"frames": 1}), "No smoke found in 1 examined frame, so nothing"),
         (Finding("no smoke examined", {"frames": 4}), "No smoke found in 4 examined frames, so nothing"),
-        (Finding("background of one colour", {"color": (0.1, 0.25, 1.0)}), "of one color, 0.1, 0.25, 1 (linear)."),
+        (Finding("background of one color", {"color": (0.1, 0.25, 1.0)}), "of one color, 0.1, 0.25, 1 (linear)."),
         (GIVEN, "Resolution by hand: 60 x 60 x 90."),
         (
             CHOSEN,
@@ -95,7 +95,9 @@ def test_a_line_of_a_table_has_a_short_value_for_a_sidebar() -> None:
         "short": "0.21 m before the middle", "origin": "undetermined", "how": sentence(PLACE),
     }  # fmt: skip
     assert (fact(GIVEN)["value"], fact(GIVEN)["short"], fact(GIVEN)["how"]) == ("60 x 60 x 90", "60 x 60 x 90", "")
-    color = Finding("smoke colour", {"degrees": 20.0}, about="smoke color", value=(1.0, 0.5, 0.25), source="measured")
+    color = Finding(
+        "measured smoke color", {"degrees": 20.0}, about="smoke color", value=(1.0, 0.5, 0.25), source="measured"
+    )
     assert fact(color)["short"] == "1.00, 0.50, 0.25"
 
 

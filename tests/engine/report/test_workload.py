@@ -7,7 +7,7 @@ import pytest
 
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import Reconstruction, compose
-from smokelift.report.workload import MAX_SIDE_VOXELS, Workload
+from smokelift.report.cost import MAX_SIDE_VOXELS, Workload
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot

@@ -29,7 +29,7 @@ from smokelift.scene import (
 numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
 positive = st.floats(1e-6, 1e6)
 vectors = st.tuples(numbers, numbers, numbers)
-colours = st.tuples(*[st.floats(0, 1e6, allow_subnormal=False)] * 3)
+colors = st.tuples(*[st.floats(0, 1e6, allow_subnormal=False)] * 3)
 paths = st.text(st.characters(codec="utf-8", exclude_characters="/\\\0"), min_size=1, max_size=12).filter(
     lambda name: name not in (".", "..") and name == name.strip()
 )
@@ -62,8 +62,8 @@ def cameras(draw: st.DrawFn) -> Camera:
 
 
 lights = st.one_of(
-    st.builds(DirectionalLight, vectors.filter(lambda v: math.hypot(*v) > 1e-3), colours),
-    st.builds(PointLight, vectors, colours),
+    st.builds(DirectionalLight, vectors.filter(lambda v: math.hypot(*v) > 1e-3), colors),
+    st.builds(PointLight, vectors, colors),
     st.builds(EnvironmentLight, paths.map(lambda name: Path("/sky") / f"{name}.exr"), numbers, positive),
 )
 domains = st.builds(
@@ -75,7 +75,7 @@ domains = st.builds(
 strokes = st.none() | paths.map(lambda name: Path("/strokes") / f"{name}.png")
 backgrounds = (
     st.none()
-    | st.builds(Background, color=colours | st.none(), strokes=strokes)
+    | st.builds(Background, color=colors | st.none(), strokes=strokes)
     | st.builds(Background, frame=st.lists(st.integers(0, 10**6), min_size=1).map(tuple), strokes=strokes)
 )
 walls = st.lists(st.sampled_from(SIDES), max_size=6).map(tuple)

@@ -31,8 +31,8 @@ def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) ->
 
 
 @pytest.fixture
-def grey(tmp_path):
-    """A clip of four frames of a grey wall, and its background."""
+def gray(tmp_path):
+    """A clip of four frames of a gray wall, and its background."""
     picture = np.full((24, 32, 3), 0.2, np.float32)
     for n in range(4):
         write_image(tmp_path / f"wall_{n}.png", picture)
@@ -57,11 +57,11 @@ def before(floor: float, folder) -> Clip:
 
 
 @pytest.mark.parametrize(("unknown_rows", "said"), [(0, False), (20, False), (60, True)])
-def test_smoke_that_may_be_in_the_plate_is_said(grey, unknown_rows, said) -> None:
+def test_smoke_that_may_be_in_the_plate_is_said(gray, unknown_rows, said) -> None:
     unknown = np.zeros_like(COVERED)
     unknown[:unknown_rows] = True
-    found = doubts(grey, replace(SEEN, unknown=unknown), given=False)
-    assert found == [Finding("smoke in the background", {"share": 0.75}, doubt=True)] * said
+    found = doubts(gray, replace(SEEN, unknown=unknown), given=False)
+    assert found == [Finding("smoke in the background", {"fraction": 0.75}, doubt=True)] * said
 
 
 def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
@@ -80,12 +80,12 @@ def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
     assert "clearest frame" not in [remark.kind for remark in said]
 
 
-def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(grey) -> None:
+def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
     unknown = np.zeros_like(COVERED)
     unknown[:60] = True
     smoke, nothing = np.zeros((2, 24, 32), np.bool_)
     smoke[:12] = True
-    found = replace(grey, strokes=Strokes(smoke, nothing, ~smoke))
+    found = replace(gray, strokes=Strokes(smoke, nothing, ~smoke))
     assert backdrop_findings(found)[-1] == Finding("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
     assert doubts(found, replace(SEEN, unknown=unknown), given=False) == []
 
@@ -95,12 +95,12 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
     tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
     across = np.abs(np.arange(56) - 28)
     opacity = [np.where(across < 6, random.uniform(0.4, 0.9), 0) for _ in range(12)]
-    colour, factor = 0.6, 1.5
-    flatter = colour + (tiles - colour) / factor
+    color, factor = 0.6, 1.5
+    flatter = color + (tiles - color) / factor
     for n, each in enumerate(opacity):
-        shown = colour * each + tiles * (1 - each)
+        shown = color * each + tiles * (1 - each)
         thinner = 1 - factor * (1 - each)
-        same = np.where(across < 6, colour * thinner + flatter * (1 - thinner), tiles)
+        same = np.where(across < 6, color * thinner + flatter * (1 - thinner), tiles)
         np.testing.assert_allclose(shown, same)
         write_image(tmp_path / f"frame_{n:02d}.png", shown)
     (remark,) = backdrop_findings(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
@@ -117,7 +117,7 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -
             assert not kinds(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
 
 
-def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
+def test_what_never_changes_before_one_color_is_said(tmp_path) -> None:
     remarks = backdrop_findings(find_backdrop(before(0.3, tmp_path), None, None))
     assert [remark.kind for remark in remarks] == ["black background", "background with objects"]
 
@@ -136,22 +136,22 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
         assert kinds(find_backdrop(clip, None, None)) == []
 
 
-@pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
-def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> None:
+@pytest.mark.parametrize("color", [0.0, 0.2], ids=["black", "gray"])
+def test_one_frame_before_one_color_shows_its_background(tmp_path, color) -> None:
     rows, columns = np.mgrid[:120, :80]
     smoke = np.clip(1.5 - np.hypot(rows - 80, columns - 40) / 26, 0, 1)
-    shown = linear_to_srgb((colour * (1 - smoke) + 0.6 * smoke)[..., None].repeat(3, -1).astype(np.float32))
+    shown = linear_to_srgb((color * (1 - smoke) + 0.6 * smoke)[..., None].repeat(3, -1).astype(np.float32))
     write_image(
         tmp_path / "photograph.png", srgb_to_linear(shown + np.random.default_rng(0).normal(0, 0.004, (120, 80, 1)))
     )
     with Clip.open(tmp_path / "photograph.png") as clip:
         found = find_backdrop(clip, None, None)
-        given = find_backdrop(clip, None, Background(color=(colour,) * 3))
+        given = find_backdrop(clip, None, Background(color=(color,) * 3))
         masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
         assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
         assert (masks[0] != masks[1]).mean() < 0.01
         assert kinds(found) == ["background of one frame"]
-    assert backdrop_findings(found)[0].kind == ("background of one colour" if colour else "black background")
+    assert backdrop_findings(found)[0].kind == ("background of one color" if color else "black background")
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
@@ -179,15 +179,15 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
     ids=["bars", "ragged", "bank of fog", "from above", "a puff that passes"],
 )
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(grey, rows, missing, at_a_time, said, turned) -> None:
+def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(gray, rows, missing, at_a_time, said, turned) -> None:
     covered = np.zeros((50, 80), np.bool_)
     covered[slice(*rows)] = np.random.default_rng(0).random((rows[1] - rows[0], 80)) >= missing
     covered = covered.T if turned else covered
     seen = np.zeros((round(2 * at_a_time * covered.sum()), 3), np.float32)  # in two samples
     gains = dict.fromkeys(range(2), np.ones(3, np.float32))
     nowhere = np.zeros_like(covered)
-    samples = replace(SEEN, covered=covered, unknown=nowhere, colours=seen, behind=seen, gains=gains)
-    assert kinds(grey, samples) == ["bars"] * said
+    samples = replace(SEEN, covered=covered, unknown=nowhere, colors=seen, behind=seen, gains=gains)
+    assert kinds(gray, samples) == ["bars"] * said
 
 
 @pytest.mark.parametrize("bars", [True, False], ids=["bars", "bars cropped off"])
@@ -222,8 +222,8 @@ def test_a_mask_that_hides_all_smoke_is_said(tmp_path, plate, inverted, smoke) -
     assert said[1:] == (["no smoke examined", wanted] if inverted else [])
 
 
-def test_how_many_frames_were_examined_is_said(grey) -> None:
-    assert doubts(grey, sample_smoke(grey.clip, grey.plates), given=False) == [
+def test_how_many_frames_were_examined_is_said(gray) -> None:
+    assert doubts(gray, sample_smoke(gray.clip, gray.plates), given=False) == [
         Finding("no smoke examined", {"frames": 4}, doubt=True),
         Finding("no smoke before an estimated background", doubt=True),
     ]

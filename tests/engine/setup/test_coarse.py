@@ -76,16 +76,16 @@ def test_the_right_light_and_model_leave_the_least(blob, draft) -> None:
     right = held_out([blob], "single", "single", draft.density)
     wrong = held_out([blob], "unshadowed", "single", draft.density)
     assert right.error < 0.05 < wrong.error
-    np.testing.assert_allclose(right.colours, 1, atol=0.05)
+    np.testing.assert_allclose(right.gains, 1, atol=0.05)
 
 
-def test_a_light_of_another_colour_is_asked_to_change(blob, draft) -> None:
+def test_a_light_of_another_color_is_asked_to_change(blob, draft) -> None:
     (sun,) = blob.scene.lights
     red, green, blue = sun.irradiance
     tinted = replace(blob, scene=replace(blob.scene, lights=(replace(sun, irradiance=(red, green, 2 * blue)),)))
-    (colour,) = held_out([tinted], "single", "single", draft.density).colours
-    assert colour[2] / colour[0] == pytest.approx(0.5, rel=0.05)
+    (gain,) = held_out([tinted], "single", "single", draft.density).gains
+    assert gain[2] / gain[0] == pytest.approx(0.5, rel=0.05)
 
 
 def test_absorption_asks_for_no_light(blob, draft) -> None:
-    assert (held_out([blob], "absorption", "absorption", draft.density).colours == 1).all()
+    assert (held_out([blob], "absorption", "absorption", draft.density).gains == 1).all()

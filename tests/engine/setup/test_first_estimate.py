@@ -1,4 +1,4 @@
-"""Fire in a shot: it is distinguished from the smoke, and its colour is what the clip shows or the scene says."""
+"""Fire in a shot: it is distinguished from the smoke, and its color is what the clip shows or the scene says."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     assert not any(choice.about == "fire" for choice in without.findings)
     (found,) = [choice for choice in with_fire.findings if choice.about == "fire"]
     assert found.kind == "fire"
-    assert found.figures["share"] > 0 and found.figures["green"] == pytest.approx(0.4, abs=0.05)
+    assert found.figures["fraction"] > 0 and found.figures["green"] == pytest.approx(0.4, abs=0.05)
     assert without.fire is None and without.scene.medium.flame_color is None
     assert with_fire.observe_fire(2).image.max() > 0.5 and without.observe_fire(2) is None
     red, green, blue = with_fire.scene.medium.flame_color

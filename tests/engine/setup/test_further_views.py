@@ -45,11 +45,11 @@ def behind(shot: Shot, view: int, frame: int = 0) -> float:
 
 
 def test_a_further_views_background(two_views, draft, tmp_path) -> None:
-    """Its own, else the scene's colour, else estimated from its clip; a picture of the input's is not its."""
+    """Its own, else the scene's color, else estimated from its clip; a picture of the input's is not its."""
     (view,) = two_views.views
-    as_filmed = replace(draft, selection=replace(draft.selection, measure=False))  # what is wrong is no exposure
-    grey = replace(two_views, views=(replace(view, background=Background(color=(0.5, 0.5, 0.5))),))
-    assert behind(shot_of(grey, as_filmed), 1) == pytest.approx(0.5, abs=1e-3)
+    as_filmed = replace(draft, measure=False)  # what is wrong is no exposure
+    gray = replace(two_views, views=(replace(view, background=Background(color=(0.5, 0.5, 0.5))),))
+    assert behind(shot_of(gray, as_filmed), 1) == pytest.approx(0.5, abs=1e-3)
     write_image(tmp_path / "wall.png", np.full((56, 40, 3), 0.5, np.float32))
     wall = Background(image=tmp_path / "wall.png")
     pictured = shot_of(replace(two_views, background=wall), as_filmed)
@@ -116,10 +116,10 @@ FRAMES = 3
 
 @pytest.fixture(scope="module")
 def filmed(plume, tmp_path_factory):
-    """Returns scenes of a front and a side before grey, whose picture is multiplied by a gain a channel."""
+    """Returns scenes of a front and a side before gray, whose picture is multiplied by a gain a channel."""
     side = orbit(plume.scene.camera, plume.scene.domain, 90)
-    grey = replace(plume.scene, background=Background(color=(BEHIND,) * 3))
-    clear = [render(density, grey, side) for density in plume.densities[1 : 1 + FRAMES]]
+    gray = replace(plume.scene, background=Background(color=(BEHIND,) * 3))
+    clear = [render(density, gray, side) for density in plume.densities[1 : 1 + FRAMES]]
 
     def scene(gain: tuple[float, float, float]) -> Scene:
         folder = tmp_path_factory.mktemp("exposed")

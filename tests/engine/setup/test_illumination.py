@@ -79,9 +79,9 @@ def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft
         (0.13, (0.4, 0.4, 0.4), 5, False),
         (0.13, None, 1, False),
     ],
-    ids=["one colour", "well explained", "black", "noise", "a wall"],
+    ids=["one color", "well explained", "black", "noise", "a wall"],
 )
-def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(error, behind, noise, said) -> None:
+def test_a_light_that_explains_little_before_one_color_is_said_to_be_wrong(error, behind, noise, said) -> None:
     shown = np.linspace(0.1, 0.5, 300).reshape(100, 3) if behind is None else np.tile(behind, (100, 1))
     samples = SimpleNamespace(behind=shown, smoky=(0,))
     choice = Finding("scattering", {"error_absorption": error}, about="scattering", value="absorption")

@@ -165,7 +165,7 @@ def test_a_frame_that_shows_nothing_of_the_domain(tracked, draft) -> None:
     assert shot.views[0].working.camera.matrix == poses[1]
 
 
-def test_one_colour_behind_a_moving_camera_is_found(tracked, draft) -> None:
+def test_one_color_behind_a_moving_camera_is_found(tracked, draft) -> None:
     shot = shot_of(replace(tracked, background=None), draft)
     assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
     assert shot.found_background is None

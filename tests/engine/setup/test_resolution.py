@@ -78,14 +78,14 @@ def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
 
 
 def test_noise_is_no_detail() -> None:
-    """A blurred cloud before grey stays one when the clip is noisy: what is lost is that of the cloud."""
-    grey = np.full((256, 192, 3), 0.2, np.float32)
-    noise = np.random.default_rng(2).normal(0, 3 / 255, grey.shape)
-    clean = grey + ndimage.gaussian_filter(textured(1.2), 8.0)[..., None]
+    """A blurred cloud before gray stays one when the clip is noisy: what is lost is that of the cloud."""
+    gray = np.full((256, 192, 3), 0.2, np.float32)
+    noise = np.random.default_rng(2).normal(0, 3 / 255, gray.shape)
+    clean = gray + ndimage.gaussian_filter(textured(1.2), 8.0)[..., None]
     noisy = srgb_to_linear((linear_to_srgb(clean) + noise).astype(np.float32))
     clear = np.ones((256, 192), np.float32)
     lost = [
-        smoke_detail([(picture, Plate(grey, clear, lasting_noise(deviation)))], 256).lost(64)
+        smoke_detail([(picture, Plate(gray, clear, lasting_noise(deviation)))], 256).lost(64)
         for picture, deviation in ((clean, EIGHT_BIT_STEP), (noisy, np.float32(3 / 255)))
     ]
     assert lost[0] < 0.01

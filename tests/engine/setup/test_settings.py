@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from smokelift.setup.settings import LIMITS, METHODS, QUALITIES, Settings
+from smokelift.setup.settings import LIMITS, LOST_DETAIL, METHODS, QUALITIES, Settings
 
 
 def test_better_qualities_cost_more() -> None:
@@ -15,7 +15,7 @@ def test_better_qualities_cost_more() -> None:
     for less, more in itertools.pairwise(presets):
         for pixels in (300, 600, 4000):
             assert LIMITS[less.quality].voxels(pixels) < LIMITS[more.quality].voxels(pixels)
-        assert less.selection.lost_detail > more.selection.lost_detail
+        assert LOST_DETAIL[less.quality] > LOST_DETAIL[more.quality]
         assert less.density.fit_iterations <= more.density.fit_iterations
         assert less.density.descent_iterations <= more.density.descent_iterations
 
@@ -54,7 +54,7 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"quality": "ultra"}, "quality must be one of draft, balanced, fine"),
         ({"transport": 1.5}, "transport must be a number from 0 to 1"),
         ({"transport": float("nan")}, "transport must be a number from 0 to 1"),
-        ({"distance": float("inf")}, "distance must be a number of metres above 0"),
+        ({"distance": float("inf")}, "distance must be a number of meters above 0"),
         ({"detail": -0.1}, "detail must be a number from 0 to 1, not -0.1"),
         ({"detail": float("nan")}, "detail must be a number from 0 to 1, not nan"),
         ({"detail": float("inf")}, "detail must be a number from 0 to 1, not inf"),
@@ -66,8 +66,8 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"resolution": (64, 64, "64")}, "resolution must be three whole numbers of at least 8 voxels"),
         ({"transport": None}, "transport must be a number from 0 to 1, not None"),
         ({"detail": "1"}, 'detail must be a number from 0 to 1, not "1"'),
-        ({"distance": "0.1"}, 'distance must be a number of metres above 0, not "0.1"'),
-        ({"distance": 0}, "distance must be a number of metres above 0, not 0"),
+        ({"distance": "0.1"}, 'distance must be a number of meters above 0, not "0.1"'),
+        ({"distance": 0}, "distance must be a number of meters above 0, not 0"),
     ],
 )
 def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:

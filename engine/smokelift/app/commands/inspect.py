@@ -15,13 +15,12 @@ from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
-from smokelift.report.cost import Spent, estimate_cost, peak_memory
+from smokelift.report.cost import Spent, Workload, estimate_cost, peak_memory
 from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
 from smokelift.report.result import foreseen, made_up
 from smokelift.report.views import choices, fact, origin, sentence, value
-from smokelift.report.workload import Workload
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
@@ -106,7 +105,7 @@ def _qualities(shot: Shot, work: Workload, prepared: Spent) -> dict[str, dict[st
 def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path, ...]:
     """Write all that was found into a scene file, with the facts as comments; return the files.
 
-    An estimated background of one colour becomes a colour of the file. Any other is left to be found again, because a
+    An estimated background of one color becomes a color of the file. Any other is left to be found again, because a
     picture does not say which of its parts are unknown or how wrong they may be. It is written beside the file for
     those who want to mend it. A file that is there already is a ValueError.
     """
@@ -114,14 +113,14 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path
     plate = shot.found_background if given.estimated else None
     picture = path.with_name(f"{path.stem}_background.exr")
     said = [f"{line.about}: {value(line)} ({origin(line)})" for line in known if line.about != "cost"]
-    colour = None if plate is None else plate[0, 0]
-    one_colour = colour is not None and bool((plate == colour).all())
-    files = (path,) if plate is None or one_colour else (path, picture)
+    color = None if plate is None else plate[0, 0]
+    one_color = color is not None and bool((plate == color).all())
+    files = (path,) if plate is None or one_color else (path, picture)
     for file in files:
         if file.exists():
             raise ValueError(f"{file}: is there already; nothing was overwritten, give another name.")
-    if colour is not None and one_colour:
-        red, green, blue = map(float, colour)
+    if color is not None and one_color:
+        red, green, blue = map(float, color)
         scene = replace(scene, background=Background(color=(red, green, blue), strokes=given.strokes))
     elif plate is not None:
         write_image(picture, plate, half=False)

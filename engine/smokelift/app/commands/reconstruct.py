@@ -20,10 +20,9 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
-from smokelift.report.cost import frames_seconds, require_memory
+from smokelift.report.cost import Workload, frames_seconds, require_memory
 from smokelift.report.result import count_empty, made_up, shortcomings
 from smokelift.report.views import sentence
-from smokelift.report.workload import Workload
 from smokelift.scene import Domain
 from smokelift.setup.backdrop_findings import what_helps
 from smokelift.setup.shot import Shot
