@@ -63,12 +63,8 @@ def test_frames_free_of_smoke_and_strokes_are_read(tmp_path: Path) -> None:
         background = load(tmp_path, f'[background]\nframe = {text}\nstrokes = "strokes.png"\n').background
         assert background == Background(frame=frame, strokes=tmp_path / "strokes.png")
         assert not background.estimated
-
-
-def test_strokes_alone_leave_the_background_to_be_estimated(tmp_path: Path) -> None:
-    background = load(tmp_path, '[background]\nstrokes = "strokes.png"\n').background
-    assert background is not None
-    assert background.estimated
+    alone = load(tmp_path, '[background]\nstrokes = "strokes.png"\n').background
+    assert alone is not None and alone.estimated
 
 
 def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
@@ -83,19 +79,13 @@ def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
 def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
     scene = load(tmp_path, '[domain]\nclosed = ["z-"]\n')
     assert scene == Scene(closed=("z-",))
-    with pytest.raises(SceneError, match="lacks min"):
-        load(tmp_path, "[domain]\n")
 
 
 def test_a_box_without_a_resolution(tmp_path: Path) -> None:
     scene = load(tmp_path, re.sub(r"resolution = \[[^]]*\]", "", GOOD))
     assert scene.domain == Box((-1, -1, 0), (1, 1, 3))
-    scene.save(tmp_path / "again.toml")
-    assert Scene.load(tmp_path / "again.toml") == scene
     with pytest.raises(ValueError, match="a domain without a resolution; give"):
         completed(scene)
-    with pytest.raises(SceneError, match="max must be above min"):
-        load(tmp_path, "[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 0]\n")
 
 
 def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
@@ -108,19 +98,16 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("albedo = 0.5", "albedo = 1.4", "line 22: [medium] albedo"),
-        ("albedo = 0.5", 'albedo = "x"', "line 22: [medium] albedo"),
         ("albedo = 0.5", "color = [1, 2, 0]", "line 22: [medium] color"),
         ("albedo = 0.5", "color = [0, 0, 0]", "one of them above 0, not"),
         ("albedo = 0.5", "anisotropy = 1", "line 22: [medium] anisotropy"),
         ("albedo = 0.5", 'scattering = "double"', "line 22: [medium] scattering"),
-        ("albedo = 0.5", "scattering = [1]", "line 22: [medium] scattering"),
         ("albedo = 0.5", "extinction = 0", "line 22: [medium] extinction"),
         ("albedo = 0.5", "albeda = 0.5", 'line 22: [medium] there is no key "albeda"'),
         ("[medium]", "[medim]", 'line 21: there is no table "medim"'),
         ("albedo = 0.5", '"al\\nbedo" = 0.5', 'line 21: [medium] there is no key "al\\nbedo"'),
         ("fps = 24", "fps = 0", "line 4: [clip] fps"),
         ("[0, 10]", "[3, 2]", "line 5: [clip] frames"),
-        ("[0, 10]", "[0, 1.5]", "line 5: [clip] frames"),
         ("fps = 24", 'transfer = "log"', "line 4: [clip] transfer"),
         ('path = "smoke.mp4"', "", "line 2: [clip] lacks path"),
         ('"smoke.mp4"', "3", "line 3: [clip] path"),
@@ -128,7 +115,6 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
         ("fov_y_degrees = 30", "", "line 7: [camera] needs fov_y_degrees or fx"),
         ("fov_y_degrees = 30", "fov_y_degrees = 30\nfx = 2", "line 11: [camera] takes fov_y_degrees or fx"),
         ("fov_y_degrees = 30", "height = 3", 'line 10: [camera] there is no key "height" here'),
-        ("fov_y_degrees = 30", "fx = -3", "line 10: [camera] fx"),
         ("target = [0, 0, 1.5]\nfov", "target = [0, -7, 1.5]\nfov", "line 9: [camera] target"),
         ("target = [0, 0, 1.5]\nfov", "fov", "line 7: [camera] needs matrix, or position and target"),
         ("target = [0, 0, 1.5]\nfov", "target = [0, -7, 9]\nfov", "line 7: [camera] up"),
@@ -136,7 +122,6 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
         ("size = [256, 384]", "", "line 7: [camera] lacks size"),
         ("max = [1, 1, 3]", "max = [1, 1, 0]", "line 15: [domain] max"),
         ("max = [1, 1, 3]", "max = [1, 1, 3.1]", "line 16: [domain] resolution"),
-        ("max = [1, 1, 3]", "max = [1, 1]", "line 15: [domain] max"),
         ("  96,", "  0,", "line 16: [domain] resolution"),
         ("min = [-1, -1, 0]", "", "line 13: [domain] lacks min"),
         ("[0, 3, -4]", "[0, 0, 0]", "line 26: [[lights]] direction"),
@@ -156,10 +141,7 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
             'frame = 3\nimage = "a.png"',
             "line 35: [background] takes image or frame, not both",
         ),
-        ("color = [0.1, 0.2, 0.3]", "frame = -1", "line 35: [background] frame must be the number of a frame"),
         ("color = [0.1, 0.2, 0.3]", "frame = []", "line 35: [background] frame must be the number of a frame"),
-        ("color = [0.1, 0.2, 0.3]", "frame = [3, 4.5]", "line 35: [background] frame must be the number of a frame"),
-        ("color = [0.1, 0.2, 0.3]", "frame = true", "line 35: [background] frame must be the number of a frame"),
         ("color = [0.1, 0.2, 0.3]", "strokes = 1", "line 35: [background] strokes must be the path of a file"),
         (
             "target = [0, 0, 1.5]\nfov",
@@ -167,29 +149,24 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
             "line 8: [camera] takes matrices or position, not both",
         ),
         (AIMED, "matrices = []", "line 8: [camera] matrices"),
-        (AIMED, "matrices = [[1, 2], [3, 4]]", "line 8: [camera] matrices"),
         (
             AIMED,
             f"matrices = [{[list(row) for row in FRONT]}, {np.diag([2, 1, 1, 1]).tolist()}]",
             "line 8: [camera] every",
         ),
         ("height = 3", "height = -3", "line 42: [views.camera] height"),
-        ("side/frame", "", None),
         ("[views.clip]\npath", "[views.clap]\npath", 'line 44: [[views]] there is no key "clap" here'),
         ("[-1, -1, 0]\nmax = [1, 1, 3]", "[9, -1, 0]\nmax = [11, 1, 3]", "[camera] does not see the domain"),
         ("[domain]", "domain = 3\n[dom]", "domain"),
         ("min = [-1, -1, 0]", 'closed = ["z-", "floor"]\nmin = [-1, -1, 0]', "line 14: [domain] closed"),
-        ("min = [-1, -1, 0]", 'closed = "z-"', "line 13: [domain] lacks min"),
         ("min = [-1, -1, 0]", 'closed = "z-"\nmin = [-1, -1, 0]', "line 14: [domain] closed"),
         ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\nradius = 0\n[medium]", "line 23: [[inlet]] radius"),
         ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\n[medium]", "line 21: [[inlet]] lacks radius"),
-        ("[medium]", "[[inlet]]\ncentre = [0, 0]\nradius = 1\n[medium]", "line 22: [[inlet]] centre"),
         (
             "[medium]",
             "[[inlet]]\ncentre = [0, 0, 1]\nradius = 1\n[[inlet]]\ncentre = [0, 0, -2]\nradius = 1\n[medium]",
             "line 25: [[inlet]] is outside the domain",
         ),
-        ("albedo = 0.5", "albedo = ", "scene.toml: is not valid TOML:"),
         (
             "fps = 24",
             r'path = "C:\users\clip.mp4"',
@@ -199,9 +176,7 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
         ("albedo = 0.5", "extinction = 1e-40", "extinction must be a number above 0, 1e-09 at least"),
         ("albedo = 0.5", "extinction = 1e300", "extinction must be a number above 0, 1e+09 at most"),
         ("albedo = 0.5", f"albedo = {'9' * 400}", "albedo must be a number from 0 to 1, 1e+09 at most"),
-        ("albedo = 0.5", f"albedo = {'9' * 5000}", "scene.toml: is not valid TOML:"),
         ("albedo = 0.5", f"albedo = {'[' * 900}{']' * 900}", "nested too deeply"),
-        ("[1, 2, 3]", "[1, 2, 1e38]", "line 27: [[lights]] irradiance"),
         ("[0, -5, 5]", "[0, -5e6, 5]", "line 31: [[lights]] position"),
         ("fov_y_degrees = 30", "fov_y_degrees = 1e-5", "line 10: [camera] fov_y_degrees"),
         ("size = [256, 384]", "size = [256, 100000]", "line 11: [camera] size"),
@@ -209,19 +184,21 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
         ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\nradius = 1\n" * 300 + "[medium]", "[inlet] is given 300 times"),
     ],
 )
-def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str | None) -> None:
+def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in GOOD
     text = GOOD.replace(old, new, 1)
-    if message is None:
-        load(tmp_path, text)
-        return
     with pytest.raises(SceneError) as caught:
         load(tmp_path, text)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_pipe_or_a_device_is_not_waited_for(tmp_path: Path) -> None:
+def test_what_cannot_be_read_is_named_and_not_waited_for(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"nothing\.toml: cannot be read"):
+        Scene.load(tmp_path / "nothing.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="not a text file"):
+        Scene.load(tmp_path / "binary.toml")
     pipe = tmp_path / "pipe.toml"
     os.mkfifo(pipe)
     for path in (pipe, Path("/dev/zero"), tmp_path):
@@ -234,20 +211,17 @@ def test_a_pipe_or_a_device_is_not_waited_for(tmp_path: Path) -> None:
         Scene.load(large)
 
 
-def test_inline_tables_are_named_by_their_own_line(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"line 2: \[medium\] albedo"):
-        load(tmp_path, "# one\nmedium = { albedo = 3 }\n")
-    with pytest.raises(SceneError, match=r"line 1: \[medium\] albedo"):
-        load(tmp_path, "medium.albedo = 3\n")
-    with pytest.raises(SceneError, match=r"line 1: \[lights\] must be a list of tables"):
-        load(tmp_path, "[lights]\n")
-    with pytest.raises(SceneError, match=r"line 1: \[medium\] must be a table, not 3"):
-        load(tmp_path, "medium = 3\n")
-
-
-def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"nothing\.toml: cannot be read"):
-        Scene.load(tmp_path / "nothing.toml")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SceneError, match="not a text file"):
-        Scene.load(tmp_path / "binary.toml")
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("# one\nmedium = { albedo = 3 }\n", r"line 2: \[medium\] albedo"),
+        ("medium.albedo = 3\n", r"line 1: \[medium\] albedo"),
+        ("[lights]\n", r"line 1: \[lights\] must be a list of tables"),
+        ("medium = 3\n", r"line 1: \[medium\] must be a table, not 3"),
+        ("[domain]\n", "lacks min"),
+        ("[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 0]\n", "max must be above min"),
+    ],
+)
+def test_a_short_file_is_wrong_in_its_own_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        load(tmp_path, text)
