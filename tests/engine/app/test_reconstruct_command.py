@@ -84,17 +84,6 @@ def test_further_views_of_a_scene_file_are_named(two_views, tmp_path, capsys) ->
     assert sent in " ".join(capsys.readouterr().out.split())
 
 
-def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
-    out = tmp_path / "out"
-    clip = str(plume.scene.clip.path)
-    arguments = ("--npz", "--frames", "1:3", "--resolution", "16,16,24", "--progress", "json", *QUICK)
-    assert command("reconstruct", clip, "--out", out, *arguments) == 0
-    assert [event["event"] for event in events(capsys.readouterr().out)].count("note") >= 5
-    sequence = Sequence.open(out)
-    assert sequence.frames == (1, 2, 3)
-    assert sequence.scene.domain.resolution == (16, 16, 24)
-
-
 def test_one_picture_alone_is_enough_before_one_color(plume, tmp_path, capsys) -> None:
     picture = plume.write(tmp_path / "clip", plume.densities[:1]).clip.path.with_name("frame_0000.png")
     picture = picture.rename(tmp_path / "photograph.png")

@@ -75,21 +75,15 @@ def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
     assert "proxy" in refused(capsys, "export", finished, "--out", out, "--proxy", 0)
 
 
-def test_retime_writes_slow_motion(finished, tmp_path, capsys) -> None:
-    out = tmp_path / "slow"
-    frames = len([name for name in names(finished) if name.endswith(".npz")])
-    assert command("retime", finished, "--out", out, "--speed", 0.5, "--npz", "--progress", "json") == 0
-    said = events(capsys.readouterr().out)
-    assert said[-1]["frames"] == 2 * frames - 1
-    assert "no longer those of the clip" in refused(capsys, "evaluate", out)
-    assert said[0] == {"event": "start", "total": 2 * frames - 1, "done": 0}
-
-
-def test_loop_writes_a_loop(finished, tmp_path, capsys) -> None:
-    out = tmp_path / "loop"
-    assert command("loop", finished, "--out", out, "--overlap", 1, "--npz", "--progress", "json") == 0
-    said = events(capsys.readouterr().out)
-    assert said[-1]["frames"] == len([name for name in names(out) if name.endswith(".npz")])
+def test_retime_and_loop_write_every_frame(finished, tmp_path, capsys) -> None:
+    slow, loop = tmp_path / "slow", tmp_path / "loop"
+    assert command("retime", finished, "--out", slow, "--speed", 0.5, "--npz", "--progress", "json") == 0
+    start, *_, done = events(capsys.readouterr().out)
+    assert start == {"event": "start", "total": 9, "done": 0}
+    assert done["frames"] == len(list(slow.glob("*.npz"))) == 9
+    assert "no longer those of the clip" in refused(capsys, "evaluate", slow)
+    assert command("loop", finished, "--out", loop, "--overlap", 1, "--npz", "--progress", "json") == 0
+    assert events(capsys.readouterr().out)[-1]["frames"] == len(list(loop.glob("*.npz")))
 
 
 def test_wrong_paces_and_loops_are_refused(finished, tmp_path, capsys) -> None:
@@ -98,7 +92,8 @@ def test_wrong_paces_and_loops_are_refused(finished, tmp_path, capsys) -> None:
     assert "--speed 1e+06" in refused(capsys, "retime", finished, *out, "--speed", 1, 1e6)
     assert command("retime", finished, *out, "--speed", "slow") == 2
     assert "slow: expected a number from" in capsys.readouterr().err
-    assert "holds no sequence" in refused(capsys, "retime", tmp_path, *out, "--speed", 1)
+    for words in (("retime", tmp_path, *out, "--speed", 1), ("continue", tmp_path, *out, "--frames", 3)):
+        assert "holds no sequence" in refused(capsys, *words)
     assert "not 1 to 99" in refused(capsys, "loop", finished, *out, "--frames", "1:99")
     assert "overlap" in refused(capsys, "loop", finished, *out, "--overlap", 40)
     assert not (tmp_path / "out").exists()
@@ -158,18 +153,24 @@ def test_one_sentence_says_that_a_buoyancy_contradicts_the_clip(finished, tmp_pa
     assert "without buoyancy: one of -0.4 m/s2 was fitted, but the smoke of the clip rises" in sentence
 
 
-def test_wrong_continuations_are_refused(finished, tmp_path, capsys) -> None:
-    start = ("continue", finished, "--out", tmp_path / "out", "--npz")
-    assert "--frames 0" in refused(capsys, *start, "--frames", 0)
-    assert "--fade 4" in refused(capsys, *start, "--frames", 3, "--fade", 4)
-    assert "radius" in refused(capsys, *start, "--frames", 3, "--ball", 0, 0, 1, -1)
-    assert "no voxel" in refused(capsys, *start, "--frames", 3, "--box", 50, 50, 50, 60, 60, 60)
-    assert "--room 0.5" in refused(capsys, *start, "--frames", 3, "--room", 0.5)
-    assert "--dissipation -1" in refused(capsys, *start, "--frames", 3, "--dissipation", -1)
-    assert "--turbulence 1 0 0" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0, 0)
-    assert "--turbulence 1 1 0.5" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 1, 0.5)
-    assert "too small for voxels" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0.001, 0)
-    assert "cannot go on from frame 77" in refused(capsys, *start, "--frames", 3, "--start", 77)
-    assert "the sequence itself" in refused(capsys, "continue", finished, "--out", finished, "--frames", 3)
-    assert "holds no sequence" in refused(capsys, "continue", tmp_path, "--out", tmp_path / "out", "--frames", 3)
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--frames", 0), "--frames 0"),
+        (("--fade", 4), "--fade 4"),
+        (("--ball", 0, 0, 1, -1), "radius"),
+        (("--box", 50, 50, 50, 60, 60, 60), "no voxel"),
+        (("--room", 0.5), "--room 0.5"),
+        (("--dissipation", -1), "--dissipation -1"),
+        (("--turbulence", 1, 0, 0), "--turbulence 1 0 0"),
+        (("--turbulence", 1, 1, 0.5), "--turbulence 1 1 0.5"),
+        (("--turbulence", 1, 0.001, 0), "too small for voxels"),
+        (("--start", 77), "cannot go on from frame 77"),
+        (("--out", "SELF"), "the sequence itself"),
+    ],
+)
+def test_wrong_continuations_are_refused(finished, tmp_path, capsys, words, said) -> None:
+    words = [finished if word == "SELF" else word for word in words]
+    start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 3)
+    assert said in refused(capsys, *start, *words)
     assert not (tmp_path / "out").exists()

@@ -43,16 +43,21 @@ def test_a_full_disk_is_bad_output() -> None:
     assert [line[:52] for line in lines] == ["Standard output cannot be written: No space left on "]
 
 
-def test_a_path_that_is_no_text_is_refused() -> None:
-    status, lines = ended(*MISSING, b"--frames", b"0:1", b"\xff\xfe.toml")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((*MISSING, b"--frames", b"0:1", b"\xff\xfe.toml"), r"unrecognized arguments: \udcff\udcfe.toml"),
+        (
+            ("reconstruct", "a.mp4", "--out", b"\xff"),
+            "the path is no text in UTF-8: rename the file or the folder",
+        ),
+        (("reconstruct", "a.mp4", "--out", b""), "the path is empty: give the name of a file or a folder"),
+    ],
+)
+def test_a_path_that_is_no_text_is_refused(words, said) -> None:
+    status, lines = ended(*words)
     assert status == 2
-    assert lines[-1].endswith(r"unrecognized arguments: \udcff\udcfe.toml")
-    status, lines = ended("reconstruct", "a.mp4", "--out", b"\xff")
-    assert status == 2
-    assert lines[-1].endswith("argument --out: the path is no text in UTF-8: rename the file or the folder")
-    status, lines = ended("reconstruct", "a.mp4", "--out", b"")
-    assert status == 2
-    assert lines[-1].endswith("argument --out: the path is empty: give the name of a file or a folder")
+    assert lines[-1].endswith(said)
 
 
 @pytest.mark.parametrize(
