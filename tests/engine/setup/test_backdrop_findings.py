@@ -8,7 +8,7 @@ import pytest
 from smokelift.checks import Finding
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import blurred, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import blurred
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
@@ -23,6 +23,16 @@ COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True
 SEEN = SmokeSamples(1.0, COVERED, np.zeros_like(COVERED), *np.zeros((2, 0, 3), np.float32), (0,), {}, ())
 """Frames that show smoke, in the middle of the picture."""
+
+RANDOM = np.random.default_rng(0)
+TILES = np.kron(RANDOM.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
+ACROSS = np.abs(np.arange(56) - 28)
+"""Pixels from the middle column."""
+
+
+def before_tiles(smoke: np.ndarray, tiles: np.ndarray = TILES) -> np.ndarray:
+    """A picture of smoke before a wall of tiles."""
+    return tiles * (1 - smoke) + 0.6 * smoke
 
 
 def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) -> list[str]:
@@ -66,18 +76,13 @@ def test_smoke_that_may_be_in_the_plate_is_said(gray, unknown_rows, said) -> Non
 
 def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
     """Smoke that flickers in its place, with a puff that rises beside it, and none of them in one frame."""
-    random = np.random.default_rng(0)
-    tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
-    across = np.abs(np.arange(56) - 40)
     for n in range(12):
-        smoke = np.where(across < 6, random.uniform(0.4, 0.9), np.roll(puff(2 * n + 1), -16, axis=1)) * (n != 5)
-        write_image(tmp_path / f"frame_{n:02d}.png", tiles * (1 - smoke) + 0.6 * smoke)
-    with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(2, 11)) as clip:
-        said = first_findings(first_estimate(clip, None, None), given=False)
-    assert Finding("clearest frame", {"frame": 5}) in said
-    with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(6, 11)) as clip:
-        said = first_findings(first_estimate(clip, None, None), given=False)
-    assert "clearest frame" not in [remark.kind for remark in said]
+        smoke = np.where(np.roll(ACROSS, 12) < 6, RANDOM.uniform(0.4, 0.9), np.roll(puff(2 * n + 1), -16, axis=1))
+        write_image(tmp_path / f"frame_{n:02d}.png", before_tiles(smoke * (n != 5)))
+    for first, said in ((2, [5]), (6, [])):
+        with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(first, 11)) as clip:
+            found = first_findings(first_estimate(clip, None, None), given=False)
+        assert [each.figures["frame"] for each in found if each.kind == "clearest frame"] == said
 
 
 def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
@@ -91,20 +96,11 @@ def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
-    random = np.random.default_rng(0)
-    tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
-    across = np.abs(np.arange(56) - 28)
-    opacity = [np.where(across < 6, random.uniform(0.4, 0.9), 0) for _ in range(12)]
-    color, factor = 0.6, 1.5
-    flatter = color + (tiles - color) / factor
-    for n, each in enumerate(opacity):
-        shown = color * each + tiles * (1 - each)
-        thinner = 1 - factor * (1 - each)
-        same = np.where(across < 6, color * thinner + flatter * (1 - thinner), tiles)
-        np.testing.assert_allclose(shown, same)
-        write_image(tmp_path / f"frame_{n:02d}.png", shown)
-    (remark,) = backdrop_findings(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
-    assert remark.kind == "background partly seen"
+    for n in range(12):
+        smoke = np.where(ACROSS < 6, RANDOM.uniform(0.4, 0.9), 0)
+        write_image(tmp_path / f"frame_{n:02d}.png", before_tiles(smoke))
+    (found,) = backdrop_findings(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
+    assert found.kind == "background partly seen"
 
 
 @pytest.mark.parametrize(("quantiser", "said"), [(36, False), (46, True)])
@@ -123,12 +119,9 @@ def test_what_never_changes_before_one_color_is_said(tmp_path) -> None:
 
 
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
-    random = np.random.default_rng(0)
     for n in range(14):
-        if n in (0, 7):
-            wall = np.kron(random.uniform(0.05, 0.5, (9, 7)), np.ones((8, 8)))
         smoke = puff_at(60 - 4 * n)
-        write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
+        write_image(tmp_path / f"frame_{n:02d}.png", before_tiles(smoke, TILES if n < 7 else 0.5 - TILES))
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
         (doubt,) = doubts(find_backdrop(clip, None, None), SEEN, given=False)
     assert doubt == Finding("cut", {"before": 6, "after": 7, "first": 2, "last": 12}, doubt=True)
@@ -138,33 +131,23 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
 
 @pytest.mark.parametrize("color", [0.0, 0.2], ids=["black", "gray"])
 def test_one_frame_before_one_color_shows_its_background(tmp_path, color) -> None:
-    rows, columns = np.mgrid[:120, :80]
-    smoke = np.clip(1.5 - np.hypot(rows - 80, columns - 40) / 26, 0, 1)
-    shown = linear_to_srgb((color * (1 - smoke) + 0.6 * smoke)[..., None].repeat(3, -1).astype(np.float32))
-    write_image(
-        tmp_path / "photograph.png", srgb_to_linear(shown + np.random.default_rng(0).normal(0, 0.004, (120, 80, 1)))
-    )
+    smoke = puff_at(50)[..., None]
+    write_image(tmp_path / "photograph.png", np.full((72, 56, 3), color) * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "photograph.png") as clip:
         found = find_backdrop(clip, None, None)
         given = find_backdrop(clip, None, Background(color=(color,) * 3))
         masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
-        assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
-        assert (masks[0] != masks[1]).mean() < 0.01
-        assert kinds(found) == ["background of one frame"]
+    assert masks[0][smoke[..., 0] > 0.1].all() and (masks[0] != masks[1]).mean() < 0.01
+    assert kinds(found) == ["background of one frame"]
     assert backdrop_findings(found)[0].kind == ("background of one color" if color else "black background")
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
 def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) -> None:
-    wall = np.kron(np.random.default_rng(0).uniform(0.05, 0.5, (9, 7)), np.ones((8, 8)))
     for n in range(count):
-        smoke = puff_at(60 - 8 * n)
-        write_image(tmp_path / f"frame_{n}.png", wall * (1 - smoke) + 0.6 * smoke)
+        write_image(tmp_path / f"frame_{n}.png", before_tiles(puff_at(60 - 8 * n)))
     with Clip.open(tmp_path / "frame_#.png") as clip:
-        found = doubts(find_backdrop(clip, None, None), SEEN, given=False)
-    assert [doubt for doubt in found if doubt.kind == "background of few frames"] == (
-        [Finding("background of few frames", {"frames": count}, doubt=True)] * doubted
-    )
+        assert ("background of few frames" in kinds(find_backdrop(clip, None, None))) == doubted
 
 
 @pytest.mark.parametrize(
