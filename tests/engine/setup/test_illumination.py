@@ -15,7 +15,6 @@ from smokelift.scene import Background, DirectionalLight, EnvironmentLight, Medi
 from smokelift.setup import illumination
 from smokelift.setup.coarse import HeldOut
 from smokelift.setup.illumination import light_doubts
-from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
 
@@ -93,10 +92,6 @@ def test_a_light_that_explains_little_before_one_color_is_said_to_be_wrong(error
 def chosen(shot: Shot, about: str) -> Finding:
     (choice,) = (choice for choice in shot.findings if choice.about == about)
     return choice
-
-
-def with_scattering(settings: Settings, model: str) -> Settings:
-    return replace(settings, scattering=model)
 
 
 @pytest.fixture(scope="module")
@@ -195,7 +190,7 @@ def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
 @pytest.mark.parametrize("model", ["absorption", "unshadowed", "single", "multiple"])
 def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
     for scene in (plume.scene, thin):
-        shot = shot_of(scene, with_scattering(draft, model))
+        shot = shot_of(scene, replace(draft, scattering=model))
         choice = chosen(shot, "scattering")
         assert (shot.scene.scattering, choice.source, choice.figures) == (model, "given", {})
 
@@ -203,16 +198,13 @@ def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
 def test_shadows_need_a_light(silhouette, draft) -> None:
     for model in ("single", "multiple"):
         with pytest.raises(ValueError, match=rf'"{model}" needs a light'):
-            shot_of(silhouette, with_scattering(draft, model))
+            shot_of(silhouette, replace(draft, scattering=model))
 
 
 def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
     assert shot.scene.scattering == "single"
-    assert [choice.about for choice in shot.findings if choice.value is not None] == [
-        "resolution",
-        "velocity grid coarsening",
-    ]
+    assert "scattering" not in [choice.about for choice in shot.findings]
 
 
 # environments

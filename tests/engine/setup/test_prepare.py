@@ -34,6 +34,9 @@ from tests.engine.setup.shots import shot_of
 SIZE = (40, 56)
 """Pixels of the plume's pictures."""
 
+PLACE_ALONG_X = np.outer(np.eye(4)[0], np.eye(4)[3])
+"""What of a camera's matrix says how far along X it stands."""
+
 STEEP = Camera.look_at((0, 0, -3), (0, 1, 0), fov_y_degrees=40, size=SIZE)
 WIDE = Camera.look_at((0, -3, 0), (0, 0, 2), fov_y_degrees=120, size=SIZE)
 
@@ -41,6 +44,11 @@ WIDE = Camera.look_at((0, -3, 0), (0, 0, 2), fov_y_degrees=120, size=SIZE)
 def bare(scene: Scene) -> Scene:
     """Nothing but the clip."""
     return Scene(clip=scene.clip)
+
+
+def middle(scene: Scene) -> float:
+    """The distance of the middle of the box, straight ahead of the camera."""
+    return float((np.array(scene.domain.centre) - scene.camera.position) @ view_frame(scene.camera)[1])
 
 
 @pytest.fixture(scope="module")
@@ -77,12 +85,7 @@ def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
     assert [remark.kind for remark in estimated.findings if remark.value is None] == [
         "black background", "assumed camera", "box around the smoke", "assumed medium", "assumed light",
     ]  # fmt: skip
-
-
-def test_the_light_that_nothing_tells_is_called_undetermined(estimated) -> None:
-    """Before black, in an estimate that is said and kept."""
-    (source,) = [estimate for estimate in estimated.findings if estimate.about == "source radiance"]
-    assert source.value == UNDETERMINED
+    assert [each.value for each in estimated.findings if each.about == "source radiance"] == [UNDETERMINED]
 
 
 def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
@@ -147,22 +150,18 @@ def test_a_moving_camera_needs_a_pose_for_every_frame(tracked, draft) -> None:
         shot_of(replace(tracked, clip=replace(tracked.clip, frames=(1, 4))), draft)
 
 
-def test_each_frame_has_its_own_small_picture(tracked, draft) -> None:
-    shot = shot_of(tracked, draft)
-    assert shot.scene == completed(tracked)
-    assert shot.moves
-    for frame in range(5):
-        (seen,) = shot.observe(frame)
-        assert seen.camera.matrix == tracked.camera.matrices[frame]
-        assert seen.plate.image.shape[:2] == seen.image.shape[:2] == seen.camera.size[::-1]
-
-
-def test_a_frame_that_shows_nothing_of_the_domain(tracked, draft) -> None:
+def test_each_frame_has_its_own_small_picture_unless_it_shows_nothing_of_the_domain(tracked, draft) -> None:
     away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
     poses = (away, *tracked.camera.matrices[1:])
-    shot = shot_of(replace(tracked, camera=replace(tracked.camera, matrix=away, matrices=poses)), draft)
-    assert shot.observe(0) == ()
+    scene = replace(tracked, camera=replace(tracked.camera, matrix=away, matrices=poses))
+    shot = shot_of(scene, draft)
+    assert shot.scene == completed(scene) and shot.moves and not shot.alone
     assert shot.views[0].working.camera.matrix == poses[1]
+    assert shot.observe(0) == ()
+    for frame in range(1, 5):
+        (seen,) = shot.observe(frame)
+        assert seen.camera.matrix == poses[frame]
+        assert seen.plate.image.shape[:2] == seen.image.shape[:2] == seen.camera.size[::-1]
 
 
 def test_one_color_behind_a_moving_camera_is_found(tracked, draft) -> None:
@@ -173,18 +172,18 @@ def test_one_color_behind_a_moving_camera_is_found(tracked, draft) -> None:
 
 
 def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None:
-    stripes = np.zeros((56, 40, 3), np.float32)
     for n in range(5):
-        stripes[:] = 0.2 + 0.1 * np.sin(np.arange(40) + n)[:, None]
+        stripes = np.broadcast_to((0.2 + 0.1 * np.sin(np.arange(40) + n))[:, None], (56, 40, 3))
         write_image(tmp_path / f"wall_{n}.png", stripes)
-    scene = replace(tracked, clip=ClipSource(tmp_path / "wall_#.png", fps=24), background=None)
-    with pytest.raises(ValueError, match="give a clean plate with a picture for every frame"):
-        shot_of(scene, draft)
-    with pytest.raises(ValueError, match="give a clean plate with a picture for every frame"):
-        shot_of(replace(scene, background=Background(frame=0)), draft)
     write_image(tmp_path / "plate.png", stripes)
-    with pytest.raises(ValueError, match=r"plate\.png: has 1 of the frames 0 to 4 that are needed; give a clean plate"):
-        shot_of(replace(scene, background=Background(image=tmp_path / "plate.png")), draft)
+    clip = ClipSource(tmp_path / "wall_#.png", fps=24)
+    for background, said in (
+        (None, "give a clean plate with a picture for every frame"),
+        (Background(frame=0), "give a clean plate with a picture for every frame"),
+        (Background(image=tmp_path / "plate.png"), r"has 1 of the frames 0 to 4 that are needed; give a clean plate"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            shot_of(replace(tracked, clip=clip, background=background), draft)
 
 
 @pytest.mark.parametrize("given", [True, False])
@@ -236,48 +235,34 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
 
 def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
     first = shot_of(plume.scene, draft)
+    assert first.alone
     assert shot_of(plume.scene, first.settings).settings == first.settings
 
 
-def test_a_camera_is_alone_where_no_other_sees_the_smoke_and_it_stands_still(plume, tracked, two_views, draft) -> None:
-    shots = [shot_of(scene, draft) for scene in (plume.scene, two_views, tracked)]
-    assert [shot.alone for shot in shots] == [True, False, False]
-
-
-@pytest.mark.parametrize(
-    ("cue", "depth", "kind"),
-    [
-        ("box", 0.0, "axis depth by box"),
-        ("floor contact", -0.25, "axis depth by floor contact"),
-        ("inlets", 0.1, "axis depth by inlets"),
-        ("distance", 0.1, "axis depth by distance"),
-    ],
-)
-def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, depth: float, kind: str) -> None:
-    estimate = found_place(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
-    assert (estimate.kind, estimate.figures, estimate.spread) == (kind, {"depth": depth}, 0.123)
-    assert (estimate.value == "undetermined") == (estimate.source == "assumed") == (cue == "box")
-    assert (estimate.source == "given") == (cue == "distance")
+@pytest.mark.parametrize("cue", ["box", "floor contact", "inlets", "distance"])
+def test_the_cue_and_the_uncertainty_are_kept(cue: Cue) -> None:
+    found = found_place(AxisEstimate(SmokeAxis.upright(-0.25), cue, -0.25, 0.123))
+    assert (found.kind, found.figures, found.spread) == (f"axis depth by {cue}", {"depth": -0.25}, 0.123)
+    assert (found.value == "undetermined") == (found.source == "assumed") == (cue == "box")
+    assert (found.source == "given") == (cue == "distance")
 
 
 def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
-    blind = replace(plume.scene, inlets=())
-    found = shot_of(blind, draft)
+    found = shot_of(plume.scene, draft)
     assert found.place is not None and found.findings[-1] == found_place(found.place)
-    marked = shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), draft)
+    inlet = replace(plume.scene, inlets=(Inlet(plume.scene.domain.centre, 0.2),))
+    marked = shot_of(inlet, draft)
     assert marked.place is not None and marked.place.cue == "inlets"
-    along = view_frame(blind.camera)[1]
-    middle = (np.array(blind.domain.centre) - blind.camera.position) @ along
-    given = replace(draft, distance=float(middle) + 0.1)
-    known = shot_of(blind, given)
+    given = replace(draft, distance=middle(plume.scene) + 0.1)
+    known = shot_of(plume.scene, given)
     assert known.place is not None and known.place.cue == "distance"
     assert known.place.depth == pytest.approx(0.1, abs=0.05)
     assert known.findings[-1].source == "given"
-    blank = shot_of(blind, Settings.preset(draft.quality, method="paper"))
+    blank = shot_of(plume.scene, Settings.preset(draft.quality, method="paper"))
     assert blank.place is None
     assert "axis depth" not in [choice.about for choice in blank.findings]
     with pytest.raises(ValueError, match="The inlets say where the smoke stands; leave the distance out"):
-        shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), given)
+        shot_of(inlet, given)
 
 
 def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings) -> None:
@@ -288,27 +273,22 @@ def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings)
             for distance in (3.0, 6.0)
         )
         for shot, distance in ((near, 3.0), (far, 6.0)):
-            ahead = (np.array(shot.scene.domain.centre) - shot.scene.camera.position) @ view_frame(shot.scene.camera)[1]
-            assert ahead == pytest.approx(distance, rel=1e-3)
+            assert middle(shot.scene) == pytest.approx(distance, rel=1e-3)
             assert shot.place is not None and shot.place.depth == pytest.approx(0, abs=0.02 * distance)
         sizes = [np.subtract(shot.scene.domain.max, shot.scene.domain.min) for shot in (near, far)]
         np.testing.assert_allclose(sizes[1], 2 * sizes[0], rtol=0.05)
 
 
 def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(plume, draft: Settings) -> None:
-    blind = replace(plume.scene, inlets=())
-    count = len(plume.densities)
-    still = shot_of(blind, draft).place
-    assert still is not None
-    turning = replace(blind.camera, matrices=(blind.camera.matrix,) * count)
-    found = shot_of(replace(blind, camera=turning), draft).place
-    assert found is not None
+    matrices = np.repeat(np.array(plume.scene.camera.matrix)[None], len(plume.densities), axis=0)
+    turning, travelling = (
+        replace(plume.scene, camera=replace(plume.scene.camera, matrices=tuple(map(as_matrix, poses))))
+        for poses in (matrices, matrices + np.linspace(0, 0.1, len(matrices))[:, None, None] * PLACE_ALONG_X)
+    )
+    still, found = (shot_of(scene, draft).place for scene in (plume.scene, turning))
+    assert still is not None and found is not None
     assert found.cue == still.cue
     assert found.depth == pytest.approx(still.depth, abs=0.1 * still.deviation)
-    matrices = np.repeat(np.array(blind.camera.matrix)[None], count, axis=0)
-    matrices[:, 0, 3] += np.linspace(0, 0.1, count)
-    travelling = replace(blind.camera, matrix=as_matrix(matrices[0]), matrices=tuple(map(as_matrix, matrices)))
-    assert shot_of(replace(blind, camera=travelling), draft).place is None
-    middle = (np.array(blind.domain.centre) - blind.camera.position) @ view_frame(blind.camera)[1]
-    given = shot_of(replace(blind, camera=travelling), replace(draft, distance=float(middle) + 0.1)).place
+    assert shot_of(travelling, draft).place is None
+    given = shot_of(travelling, replace(draft, distance=middle(plume.scene) + 0.1)).place
     assert given is not None and given.depth == pytest.approx(0.1)

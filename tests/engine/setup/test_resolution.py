@@ -8,17 +8,15 @@ import pytest
 from scipy import ndimage
 
 from smokelift.checks import Finding
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, EIGHT_BIT_STEP, lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
-from smokelift.setup.shot import Shot
+from tests.engine.setup.shots import shot_of
 
 SIZE = (192, 256)
 
@@ -51,11 +49,6 @@ def filmed(plume, tmp_path) -> Callable[..., Scene]:
         )
 
     return film
-
-
-def shot_of(scene: Scene, settings: Settings) -> Shot:
-    with Clip.open(scene.clip) as clip:
-        return prepare_shot(clip, scene, settings)
 
 
 AUTO = Settings.preset("draft", resolution="auto")
@@ -95,9 +88,16 @@ def test_noise_is_no_detail() -> None:
 def test_a_given_resolution_wins(filmed) -> None:
     scene = filmed(12.0)
     assert shot_of(scene, Settings.preset("draft")).scene.domain == scene.domain
-    by_hand = shot_of(scene, Settings.preset("draft", resolution=(20, 20, 30)))
-    assert by_hand.scene.domain.resolution == (20, 20, 30)
-    assert Finding("given", about="resolution", value=(20, 20, 30), source="given") in by_hand.findings
+    for domain, resolution, top in (
+        (scene.domain, (20, 20, 30), 3.0),
+        (Box((-1, -1, 0), (1, 1, 3)), (20, 20, 30), 3.0),
+        (Box((-1, -1, 0), (1, 1, 3)), (20, 20, 40), 4.0),
+    ):
+        shot = shot_of(replace(scene, domain=domain), Settings.preset("draft", resolution=resolution))
+        assert Finding("given", about="resolution", value=resolution, source="given") in shot.findings
+        np.testing.assert_allclose(
+            [shot.scene.domain.min, shot.scene.domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
@@ -111,14 +111,6 @@ def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> No
     over = np.subtract(domain.max, box.max)
     assert np.all((over > -1e-6) & (over < domain.voxel_size)) and domain.min[2] == 0
     assert (np.abs(over).max() > 1e-6) == ("grown box" in [remark.kind for remark in shot.findings])
-
-
-def test_a_box_without_a_resolution_holds_whatever_is_given_by_hand(filmed) -> None:
-    scene = replace(filmed(0.0), domain=Box((-1, -1, 0), (1, 1, 3)))
-    for resolution, top in (((20, 20, 30), 3.0), ((20, 20, 40), 4.0)):
-        domain = shot_of(scene, Settings.preset(resolution=resolution)).scene.domain
-        assert domain.resolution == resolution
-        np.testing.assert_allclose([domain.min, domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9)
 
 
 @pytest.mark.parametrize("box", [True, False])
