@@ -11,13 +11,17 @@ import smokelift
 from smokelift import Camera, Clip, ClipSource, DirectionalLight, Domain, Scene, Sequence, Settings, Velocity
 from smokelift.checks import counted, numbers, radiance, shown
 from smokelift.density import Observation
+from smokelift.footage.frame_source import ClipError
+from smokelift.footage.images import ImageError
 from smokelift.output.images import write_image
+from smokelift.output.index import SequenceError
 from smokelift.pipeline import compose
-from smokelift.scene import Inlet, View
+from smokelift.scene import Inlet, SceneError, View
 
 CAMERA = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(6, 8))
 SCENE = Scene(camera=CAMERA, domain=Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (3, 3, 4)))
 SMOKE = np.ones((3, 3, 4), np.float32)
+NAN = np.full_like(SMOKE, np.nan)
 PICTURE = np.zeros((8, 6, 3), np.float32)
 WIND = Velocity.zero((3, 3, 4), 0.4)
 DENSITY = {"image": PICTURE, "scene": SCENE}
@@ -37,11 +41,13 @@ def clip(tmp_path: Path) -> Iterator[Clip]:
         yield opened
 
 
-def refused(words: str, function: Callable[..., Any], *arguments: Any, **named: Any) -> None:
+def refused(words: str, function: Callable[..., Any], *arguments: Any, **named: Any) -> type[Exception]:
+    """The kind of error that a call ends with, whose one line says the words."""
     with pytest.raises(ValueError) as caught:
         function(*arguments, **named)
     assert words in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+    return type(caught.value)
 
 
 RUN = {"scene": SCENE, "settings": Settings.preset("draft")}
@@ -87,12 +93,43 @@ OTHERS: list[tuple[str, Callable[[Any], Any], dict[str, Any]]] = [
     ("velocity must be a Velocity", smokelift.advect, {"field": SMOKE, "velocity": SMOKE, "dt": 1 / 24}),
     ("the field must be an array", smokelift.advect, {"field": "smoke.npy", "velocity": WIND, "dt": 1 / 24}),
     ("velocity must be a Velocity", smokelift.project, {"velocity": WIND.faces}),
+    ("albedo must be a number from 0 to 1", smokelift.Medium, {"albedo": 2}),
+    ("quality must be one of draft", Settings.preset, {"quality": "best"}),
+    ("detail must be a number from 0 to 1", Settings, {"detail": 3}),
+    ("path of a directory", Sequence.open, {"directory": None}),
+    # what to do about an array
+    ("set them to 0", smokelift.advect, {"field": NAN, "velocity": WIND, "dt": 0.1}),
+    ("holds densities that are not finite; set", smokelift.estimate_velocity, STEP | {"before": NAN}),
+    ("negative densities; set", smokelift.estimate_velocity, STEP | {"before": -SMOKE}),
+    ("resample it", smokelift.advect, {"field": SMOKE[1:], "velocity": WIND, "dt": 0.1}),
+    ("bring one to the other's size", smokelift.metrics.psnr, {"a": SMOKE, "b": SMOKE[1:]}),
+    ("replace those that are not", smokelift.metrics.psnr, {"a": NAN, "b": SMOKE}),
+    ("give one value at least", smokelift.metrics.psnr, {"a": [], "b": []}),
 ]
+
+OWN_KINDS = (SceneError, SequenceError)
+"""Errors of scenes and settings, and of sequences; of all else it is ValueError itself."""
+
+FILES: dict[type[ValueError], Callable[[Path], object]] = {
+    SceneError: lambda folder: Scene.load(folder / "none.toml"),
+    ClipError: lambda folder: Clip.open(folder / "none.mp4"),
+    ImageError: lambda folder: Clip.open(folder / "frame_0.png", mask=folder / "none.png"),
+    SequenceError: lambda folder: Sequence.open(folder),
+}
 
 
 @pytest.mark.parametrize(("words", "function", "named"), OTHERS)
 def test_what_is_no_such_thing_is_refused(words: str, function: Callable[..., Any], named: dict[str, Any]) -> None:
-    refused(words, function, **named)
+    kind = refused(words, function, **named)
+    owned = (Scene, smokelift.Medium, Settings, Settings.preset, Sequence.open)
+    assert kind in OWN_KINDS if function in owned or "closed" in named else kind is ValueError
+
+
+@pytest.mark.parametrize(("kind", "call"), FILES.items())
+def test_files_have_the_kind_of_what_they_hold(clip: Clip, tmp_path: Path, kind, call) -> None:
+    with pytest.raises(kind) as caught:
+        call(tmp_path)
+    assert type(caught.value) is kind
 
 
 @pytest.mark.parametrize("opens", [Clip.open, Scene.load, SCENE.save, Sequence.open, ClipSource])
