@@ -12,7 +12,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
 from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, sample_smoke, unknown_part
 
-BLACK = 0.001
+MAX_BLACK = 0.001
 """Linear radiance below which a background is black: less than a third of the first step of 8 bit video."""
 
 MAJORITY = 0.5
@@ -28,7 +28,7 @@ of their rows (docs/clips.md). Most of it has to be covered in a frame too, sinc
 MIN_SAME_FRAMES = 4
 """Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
 
-COARSE_QUANTISER = 42.0
+MIN_COARSE_QUANTIZER = 42.0
 """Quantiser from which faint smoke is taken for background, if that has more than one color. Before a brick wall crf
 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/background.md)."""
 
@@ -51,7 +51,7 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
 
 def backdrop_findings(found: Backdrop, bars: bool = False) -> list[Finding]:
     """Return how a background was found, and what stands before it if it has one color, not that of ``bars``."""
-    said = _behind_smoke(found, bars)
+    said = _background_findings(found, bars)
     if found.motion is not None:
         figures: dict[str, float] = {"pixels": found.motion.reach(*found.clip.size)}
         if found.motion.reference is None:
@@ -64,7 +64,7 @@ def backdrop_findings(found: Backdrop, bars: bool = False) -> list[Finding]:
     return said
 
 
-def _behind_smoke(found: Backdrop, bars: bool) -> list[Finding]:
+def _background_findings(found: Backdrop, bars: bool) -> list[Finding]:
     """What is behind the smoke; nothing if it is given."""
     clip, plates = found.clip, found.plates
     background = partial(Finding, about="background", source="estimated")
@@ -87,7 +87,7 @@ def _behind_smoke(found: Backdrop, bars: bool) -> list[Finding]:
         return [background("background assumed", figures, source="assumed")]
     other = float((image != color).any(-1).mean())
     objects = [Finding("background with objects", {"fraction": other})] if other else []
-    if max(red, green, blue) < BLACK:
+    if max(red, green, blue) < MAX_BLACK:
         return [background("black background"), *objects]
     return [background("background of one color", figures), *objects]
 
@@ -110,7 +110,7 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]
         said.append(doubt("background never seen"))
     if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
         said.append(doubt("background of few frames", {"frames": found.frames}))
-    if found.quantiser is not None and found.quantiser >= COARSE_QUANTISER:
+    if found.quantiser is not None and found.quantiser >= MIN_COARSE_QUANTIZER:
         said.append(doubt("strong compression", {"quantiser": found.quantiser}))
     unknown = samples.unknown
     if found.strokes is not None:  # what is painted as smoke is none of the background

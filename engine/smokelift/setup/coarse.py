@@ -32,13 +32,13 @@ COARSE_SIDE = 32
 """Largest number of voxels along the longest side: a few per cent of the work of 96, and every large shadow is there
 (docs/experiments/scattering.md)."""
 
-SHORTEST = 4
+MIN_SIDE_VOXELS = 4
 """Smallest number of voxels along the shortest side: two are not at its ends."""
 
-PIXELS = 2.0
+MIN_VOXEL_PIXELS = 2.0
 """Smallest number of the clip's pixels along a voxel: each half of the chequerboard shows every voxel."""
 
-FINER = 3
+CELLS_PER_PIXEL = 3
 """Cells of the extraction along a coarse pixel: about as many as a fit at full resolution has."""
 
 SCATTERING_TOLERANCE = 0.02
@@ -69,7 +69,7 @@ class CoarseView:
         """Pixels (rows, columns) that show smoke."""
         return matte(self.picture, self.plate).mask
 
-    def over(self, gain: NDArray[np.float32]) -> CoarseView:
+    def divided(self, gain: NDArray[np.float32]) -> CoarseView:
         """The view with its pictures and background divided by a gain (3,)."""
         plate = self.plate.through(lambda part: part / gain if part.ndim == 3 else part)
         return CoarseView(self.camera, plate, self.picture / gain, self.fitted / gain, self.held_out / gain)
@@ -113,13 +113,13 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
     Each coarse voxel holds a whole number of fine ones if possible; else the box loses a little of its size.
     """
     longest = max(domain.resolution)
-    most = min(most_voxels, int(longest * pixels / PIXELS))
+    most = min(most_voxels, int(longest * pixels / MIN_VOXEL_PIXELS))
     common = math.gcd(*domain.resolution)
     for times in (n for n in range(1, common + 1) if common % n == 0):
         x, y, z = (n // times for n in domain.resolution)
-        if most / 2 <= max(x, y, z) <= most and min(x, y, z) >= SHORTEST:
+        if most / 2 <= max(x, y, z) <= most and min(x, y, z) >= MIN_SIDE_VOXELS:
             return replace(domain, resolution=(x, y, z))
-    return domain.with_at_most(max(most, SHORTEST))
+    return domain.with_at_most(max(most, MIN_SIDE_VOXELS))
 
 
 def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
@@ -130,7 +130,7 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     plate = view.plates.at(number).through(working.cut, working.pixels)
     pictures = (working.of(view.clip, number), *halves)
     columns, rows = working.camera.size
-    element = view.element(number, working.resized(FINER * columns, FINER * rows))
+    element = view.element(number, working.resized(CELLS_PER_PIXEL * columns, CELLS_PER_PIXEL * rows))
     if element is None:
         return CoarseView(working.camera, plate, *pictures)
     # before one color the plate's detail is not taken for smoke, whatever the model

@@ -37,13 +37,13 @@ MIN_AGREED_FRACTION = 0.9
 """Smallest fraction of the smoke's pixels that right views agree on: true views agree on all, cameras upside down on a
 tenth to nine tenths (docs/experiments/further-views.md)."""
 
-SAME_RATE = 0.01
+MAX_RATE_DIFFERENCE = 0.01
 """Relative difference of two frame rates that are the same: 30 and 29.97 are, 25 and 24 are not."""
 
-ROUNDS = 3
+GAIN_ROUNDS = 3
 """Fits from which a gain is found: a fourth changes it by .3 % at most (docs/experiments/further-views.md)."""
 
-RATIO = 1.35
+MIN_OWN_RATIO = 1.35
 """Smallest ratio of brightness that is the cameras' own, where light is assumed to come from everywhere. Smoke lit from
 one side is brighter there: cameras exposed alike differ by up to 1.30 (docs/experiments/further-views.md)."""
 
@@ -64,10 +64,10 @@ def open_views(
     views: list[ShotView] = []
     found: list[Finding] = []
     for number in range(len(scene.views)):
-        view, opened = _open_view(number, first.clip, scene)
-        found += opened
+        view, noticed = _open_view(number, first.clip, scene)
+        found += noticed
         if settings.measure and scene.scattering != "absorption":
-            view, gain = _evened(number + 1, first, view, scene, numbers, lit, settings)
+            view, gain = _match_exposure(number + 1, first, view, scene, numbers, lit, settings)
             found += gain
         views.append(view)
     return tuple(views), found
@@ -86,16 +86,16 @@ def disagreement(shot: Shot) -> list[Finding]:
 def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Finding]]:
     """A further view of a scene, from 0, with its background; and what was found of it."""
     view = scene.views[number]
-    opened = _opened(view.clip, clip, scene)
-    if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
+    view_clip = _open_clip(view.clip, clip, scene)
+    if abs(view_clip.fps - clip.fps) > MAX_RATE_DIFFERENCE * clip.fps:
         raise ValueError(
-            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
-            "convert one, or give the frame rate of the clip whose file says it wrongly."
+            f"{view_clip.path}: has {view_clip.fps:g} frames a second, the input {clip.fps:g}; all views need the same, "
+            "so convert one, or give the frame rate of the clip whose file says it wrongly."
         )
-    camera, background = fitting(view.camera, opened), view.background
+    camera, background = fitting(view.camera, view_clip), view.background
     if background is None and scene.background.color is not None:
         background = replace(scene.background, strokes=None)
-    found = find_backdrop(opened, camera, background)
+    found = find_backdrop(view_clip, camera, background)
     try:
         exposed, smoky = evened(found.clip, found.plates), sample_smoke(found.clip, found.plates).smoky
         plates, source = with_source(found, exposed, smoky)
@@ -104,13 +104,13 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
-    first, last = opened.numbers[0], opened.numbers[-1]
-    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": first, "last": last}
-    said = (*opened.findings(), Finding("further view", which), *backdrop_findings(found))
+    first, last = view_clip.numbers[0], view_clip.numbers[-1]
+    which: Figures = {"name": view_clip.path.name, "degrees": float(angle), "first": first, "last": last}
+    said = (*view_clip.findings(), Finding("further view", which), *backdrop_findings(found))
     return shown, [replace(each, figures={**each.figures, "view": number + 1}) for each in said]
 
 
-def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
+def _open_clip(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
     """The part of a view's clip that shows what the input does."""
     first = clip.numbers[0]
     if source.frames is not None:
@@ -128,7 +128,7 @@ def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
     return Clip.open(source, fps=fps, frames=(first, last))
 
 
-def _evened(
+def _match_exposure(
     number: int,
     front: ShotView,
     view: ShotView,
@@ -142,22 +142,22 @@ def _evened(
     if not frames:
         return view, []
 
-    def tried(gain: Gain) -> HeldOut:
-        evened = [replace(frame, views=(frame.views[0], frame.views[1].over(gain))) for frame in frames]
+    def compare(gain: Gain) -> HeldOut:
+        evened = [replace(frame, views=(frame.views[0], frame.views[1].divided(gain))) for frame in frames]
         return held_out(evened, scene.scattering, scene.scattering, settings.density)
 
     errors: list[float] = []
     ratio = np.ones(3)
-    for _ in range(ROUNDS):
-        found = tried(ratio.astype(np.float32))
+    for _ in range(GAIN_ROUNDS):
+        found = compare(ratio.astype(np.float32))
         own, other = np.maximum(found.gains, 1e-6)
         errors, ratio = [*errors, found.error], np.clip(ratio * other / own, 1 / MAX_GAIN, MAX_GAIN)
     as_it_is, tolerance = errors[0], SCATTERING_TOLERANCE
     brightness = float(np.exp(np.mean(np.log(ratio))))
-    if not lit and 1 / RATIO < brightness < RATIO:
+    if not lit and 1 / MIN_OWN_RATIO < brightness < MIN_OWN_RATIO:
         ratio = ratio / brightness
     gain = ratio.astype(np.float32)
-    error = tried(gain).error
+    error = compare(gain).error
     if error >= as_it_is - tolerance:
         return view, []
     red, green, blue = map(float, gain)

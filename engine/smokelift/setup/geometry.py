@@ -24,17 +24,17 @@ from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 PICTURE_HEIGHT = 2.0
 """Height in meters of an uncalibrated picture where the smoke is, unless its distance is given: a person's size."""
 
-FILM = 36.0, 24.0
+FILM_SIZE = 36.0, 24.0
 """Width and height (mm) of 35 mm film."""
 
-LENS = 50.0
+LENS_FOCAL_LENGTH = 50.0
 """Focal length (mm) where the clip's file says none: Blender's default lens."""
 
 BOX_MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side: two voxels of the coarsest grid, for smoke
 that is fainter than the mask shows."""
 
-NARROWEST = 0.25
+MIN_ASPECT = 0.25
 """Smallest width over height of an estimated box, and the reverse: no side of the coarsest grid is below 8 voxels."""
 
 MIN_SIDE_VOXELS = 32
@@ -67,13 +67,13 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     """
     clip, samples, box = estimate.clip, estimate.samples, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
-    _require_place(scene, known)
-    focal = _focal(clip.size, clip.lens)
-    camera = known or _level(clip.size, focal, settings.distance)
+    _require_camera_and_box(scene, known)
+    focal = _focal_length(clip.size, clip.lens)
+    camera = known or _level_camera(clip.size, focal, settings.distance)
     meters, multiple = 0.0, 1
     if box is None:
         # multiples of four: pyramids halve them evenly
-        (floor, size, meters), multiple = _around(camera, samples, settings.distance), 4
+        (floor, size, meters), multiple = _box_around_smoke(camera, samples, settings.distance), 4
     else:
         floor, size = np.array([*box.centre[:2], box.min[2]]), np.array(box.size)
     still = camera.at(next(iter(samples.smoky), 0))
@@ -81,47 +81,55 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     def grids(quality: Quality) -> tuple[Domain, ...]:
         limit = LIMITS[quality]
         if isinstance(box, Domain):
-            return _same_shape(box, limit.voxels(_pixels(still, box)))
-        pixels = max(size) / meters if box is None else _pixels(still, _grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
-        return _grids(floor, size, limit.voxels(pixels), multiple)
+            return _proportional_grids(box, limit.voxels(_pixels_along(still, box)))
+        pixels = (
+            max(size) / meters if box is None else _pixels_along(still, _box_grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
+        )
+        return _box_grids(floor, size, limit.voxels(pixels), multiple)
 
     qualities: Mapping[Quality, Grid]
     found: tuple[Finding, ...]
     asked = box.resolution if isinstance(box, Domain) and settings.resolution is None else settings.resolution
     if isinstance(asked, tuple):
         voxel = float((size / asked).max())
-        domain = replace(box, resolution=asked) if isinstance(box, Domain) else _standing_on(floor, voxel, asked)
+        domain = replace(box, resolution=asked) if isinstance(box, Domain) else _domain_above(floor, voxel, asked)
         resolution = Finding("given", about="resolution", value=asked, source="given")
         qualities = dict.fromkeys(QUALITIES, Grid(asked, None))
     else:
-        domain, resolution, qualities = choose_grid(grids, lambda whole: _detail(estimate, camera, whole), settings)
+        domain, resolution, qualities = choose_grid(
+            grids, lambda whole: _smoke_detail(estimate, camera, whole), settings
+        )
     if box is None:
         figures: Figures = {"size": domain.size, "resolution": domain.resolution}
         around = Finding("box around the smoke", figures, about="box", source="estimated")
         if not samples.smoky:
             around = replace(around, kind="box over the picture", source="assumed")
-        found = _assumed(known, clip.lens, meters * camera.size[1]), around
+        found = _scale_finding(known, clip.lens, meters * camera.size[1]), around
     else:
-        found = _grown(box, domain)
+        found = _growth_finding(box, domain)
     return Geometry(camera, domain, qualities, (*found, resolution))
 
 
-def _require_place(scene: Scene, known: Camera | None) -> None:
+def _require_camera_and_box(scene: Scene, known: Camera | None) -> None:
     """Refuse a scene whose camera and box do not go together."""
     if scene.domain is not None and known is None:
         raise ValueError("The scene gives a box but no camera; give the camera that filmed it.")
     if scene.domain is None and scene.inlets:
         raise ValueError("The scene marks an inlet but gives no box; give camera and box to say where it is.")
-    if scene.domain is None and known is not None and not _boxes(known):
+    if scene.domain is None and known is not None and not _sees_ahead(known):
         raise ValueError(
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
 
 
-def _focal(size: tuple[int, int], lens: float | None) -> float:
-    """Focal length in pixels: that of the file's lens (mm), or of `LENS`."""
-    return LENS / FILM[0] * max(size) if lens is None else lens / math.hypot(*FILM) * math.hypot(*size)
+def _focal_length(size: tuple[int, int], lens: float | None) -> float:
+    """Focal length in pixels: that of the file's lens (mm), or of `LENS_FOCAL_LENGTH`."""
+    return (
+        LENS_FOCAL_LENGTH / FILM_SIZE[0] * max(size)
+        if lens is None
+        else lens / math.hypot(*FILM_SIZE) * math.hypot(*size)
+    )
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -134,7 +142,7 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _assumed(given: Camera | None, lens: float | None, height: float) -> Finding:
+def _scale_finding(given: Camera | None, lens: float | None, height: float) -> Finding:
     """What is assumed of a camera, or of the scale alone if the camera is given.
 
     ``lens`` (mm) is the file's, ``height`` (m) that of the picture where the smoke is.
@@ -144,63 +152,63 @@ def _assumed(given: Camera | None, lens: float | None, height: float) -> Finding
     camera = partial(Finding, about="camera", source="assumed")
     if lens is not None:
         return camera("assumed camera with the file's lens", {"height": height, "lens": lens})
-    return camera("assumed camera", {"height": height, "lens": LENS, "film": FILM[0]})
+    return camera("assumed camera", {"height": height, "lens": LENS_FOCAL_LENGTH, "film": FILM_SIZE[0]})
 
 
-def _level(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
+def _level_camera(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
     """A level camera that looks along +Y at the smoke above the world's origin; ``focal`` in pixels."""
     width, height = size
-    meters = _pixel_at(distance, height, focal)
+    meters = _pixel_size(distance, height, focal)
     up = meters * height / 2
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * meters], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
     return Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
 
 
-def _pixel_at(distance: float | None, height: int, focal: float) -> float:
+def _pixel_size(distance: float | None, height: int, focal: float) -> float:
     """Meters that a pixel shows where the smoke is, in a picture ``height`` pixels high; ``distance`` (m) if given."""
     return PICTURE_HEIGHT / height if distance is None else distance / focal
 
 
-def _boxes(camera: Camera) -> bool:
+def _sees_ahead(camera: Camera) -> bool:
     """Whether a box can be put around the smoke: a still camera whose whole picture shows what is ahead."""
     if camera.type != "perspective" or camera.moves:
         return False
     _, along, up = view_frame(camera)
     width, height = camera.size
-    ahead = _ways(camera, np.array([0, 0, width, width]), np.array([0, height, 0, height])) @ along
+    ahead = _directions(camera, np.array([0, 0, width, width]), np.array([0, height, 0, height])) @ along
     return bool(up[2] == 1 and np.all(ahead > 0))
 
 
-def _ways(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
+def _directions(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
     """Directions (n, 3) in the world through some pixels; each is ``fy`` long along the camera's axis."""
     turn = np.array(camera.matrix, np.float64)[:3, :3]
     pixels = [(x - camera.cx) * camera.fy / camera.fx, camera.cy - y, np.full(x.shape, -camera.fy)]
     return np.asarray(np.stack(pixels, -1) @ turn.T)
 
 
-def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Doubles, Doubles, float]:
+def _box_around_smoke(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Doubles, Doubles, float]:
     """The upright box around the smoke at a distance (m), or where a level camera's picture is `PICTURE_HEIGHT` high.
 
     Returns the middle of its floor (3,) and its size (3,) in meters, and the meters that a pixel shows there.
     """
-    meters = _pixel_at(distance, camera.size[1], camera.fy)
+    meters = _pixel_size(distance, camera.size[1], camera.fy)
     distance = camera.fy * meters
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]
-    left, right, top, bottom = _covered(samples, *camera.size)
-    ways = _ways(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
-    ways *= meters * (camera.fy / (ways @ along))[:, None]
-    aside, height = ways @ lateral, ways[:, 2]
-    across = max(np.ptp(aside), NARROWEST * np.ptp(height))
-    up = max(np.ptp(height), NARROWEST * np.ptp(aside))
+    left, right, top, bottom = _smoke_bounds(samples, *camera.size)
+    directions = _directions(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
+    directions *= meters * (camera.fy / (directions @ along))[:, None]
+    sideways, height = directions @ lateral, directions[:, 2]
+    across = max(np.ptp(sideways), MIN_ASPECT * np.ptp(height))
+    up = max(np.ptp(height), MIN_ASPECT * np.ptp(sideways))
     # the far side of the box has to fill the picture too
     across *= 1 + across / (2 * distance)
-    base = eye + distance * along + (aside.min() + aside.max()) / 2 * lateral
+    base = eye + distance * along + (sideways.min() + sideways.max()) / 2 * lateral
     base[2] = eye[2] + height.min()
     return base, np.array([across, across, up]), meters
 
 
-def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
+def _box_grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
     """The box of a size (m) about the middle of its floor, with every allowed number of voxels, the fewest first.
 
     Each side has a multiple of ``multiple`` cubes. Where these do not fill the box, it grows upward and to all sides.
@@ -209,18 +217,18 @@ def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[
     for longest in range(MIN_SIDE_VOXELS, max(allowed, MIN_SIDE_VOXELS) + 1, 4):
         voxel = float(size.max() / longest)
         x, y, z = (max(8, multiple * math.ceil(side / voxel / multiple - 1e-6)) for side in size)
-        grids.append(_standing_on(floor, voxel, (x, y, z)))
+        grids.append(_domain_above(floor, voxel, (x, y, z)))
     return tuple(grids)
 
 
-def _grown(given: Box, domain: Domain) -> tuple[Finding, ...]:
+def _growth_finding(given: Box, domain: Domain) -> tuple[Finding, ...]:
     """That a given box had to grow to whole voxels, if it had to."""
     if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
         return ()
     return (Finding("grown box", {"size": domain.size}, about="box", source="given"),)
 
 
-def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
+def _domain_above(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     """The box of voxels with this edge (m) about the middle of its floor (3,)."""
     size = np.array(resolution) * voxel
     low = floor - size * (0.5, 0.5, 0)
@@ -230,7 +238,7 @@ def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     )
 
 
-def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
+def _smoke_bounds(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
     """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
     # a hundredth of the smoke's pixels at each side may be noise or the last wisps; without smoke any box will do
     rows, columns = np.nonzero(samples.covered if samples.covered.any() else ~samples.covered)
@@ -240,7 +248,7 @@ def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, flo
     return max(left - margin, 0), min(right + margin, width), max(top - margin, 0), min(bottom + margin, height)
 
 
-def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
+def _proportional_grids(domain: Domain, most: int) -> tuple[Domain, ...]:
     """The box with every number of cubic voxels that fills it exactly, the fewest first; ``most`` along a side."""
     common = math.gcd(*domain.resolution)
     x, y, z = (n // common for n in domain.resolution)
@@ -252,16 +260,16 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
     )
 
 
-def _detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
+def _smoke_detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:
     """The smoke's detail in the frames with the most of it, at the clip's own pixels; None without smoke."""
     smoky, frames = estimate.samples.smoky, []
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
             frames.append((part(estimate.clip.frame(number)), estimate.plates.at(number).through(part)))
-    return smoke_detail(frames, _pixels(camera.at(smoky[0]), box)) if smoky else None
+    return smoke_detail(frames, _pixels_along(camera.at(smoky[0]), box)) if smoky else None
 
 
-def _pixels(camera: Camera, box: Domain) -> float:
+def _pixels_along(camera: Camera, box: Domain) -> float:
     """Pixels of a still camera's picture along the longest side of a box."""
     return voxel_width(camera, box) * max(box.resolution)

@@ -68,8 +68,8 @@ def first_light(
         )
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
-        return tuple(_countable(each, geometry, medium) for each in lights), richest, []
-    found = _shown_source(estimate)
+        return tuple(_with_directions(each, geometry, medium) for each in lights), richest, []
+    found = _measured_source(estimate)
     if found is None:
         source = source_radiance(estimate.samples)
     else:
@@ -80,17 +80,17 @@ def first_light(
     red, green, blue = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0).tolist()
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
     assumed = Finding("assumed light", {"irradiance": light.irradiance}, source="assumed")
-    return (light,), richest, [assumed, _brightness(found, source)]
+    return (light,), richest, [assumed, _source_finding(found, source)]
 
 
-def _shown_source(estimate: FirstEstimate) -> Picture | None:
+def _measured_source(estimate: FirstEstimate) -> Picture | None:
     """The source radiance (3,) of the smoke; None where what is behind it hardly shows it."""
     if estimate.source is None or not tells_source(estimate.plates.at(estimate.samples.smoky[0]).image):
         return None
     return estimate.source
 
 
-def _brightness(shown: Picture | None, taken: Doubles) -> Finding:
+def _source_finding(shown: Picture | None, taken: Doubles) -> Finding:
     """The source radiance (3,) of the smoke that is shown, and the one that is taken; undetermined if none is shown."""
     about = "source radiance"
     figures: dict[str, Figure] = {"taken": tuple(taken.tolist())}
@@ -101,7 +101,7 @@ def _brightness(shown: Picture | None, taken: Doubles) -> Finding:
     return Finding(about, figures, about=about, value=(red, green, blue), source="measured")
 
 
-def _countable(light: Light, geometry: Geometry, medium: Medium) -> Light:
+def _with_directions(light: Light, geometry: Geometry, medium: Medium) -> Light:
     """The light; an environment with the number of directions that it needs."""
     if not isinstance(light, EnvironmentLight) or light.directions is not None:
         return light
@@ -139,15 +139,15 @@ def find_scattering(
     """
     fit, tolerance = settings.density, SCATTERING_TOLERANCE
     richest, isotropic = frames[0].scene.scattering, frames[0].scene.medium.anisotropy == 0.0
-    rivals: tuple[Scattering, ...] = ("single", "multiple") if richest == "single" and isotropic else (richest,)
-    errors = {each: held_out(frames, each, each, fit).error for each in rivals}
-    if len(rivals) > 1:
+    candidates: tuple[Scattering, ...] = ("single", "multiple") if richest == "single" and isotropic else (richest,)
+    errors = {each: held_out(frames, each, each, fit).error for each in candidates}
+    if len(candidates) > 1:
         alike = errors["multiple"] >= MAX_ERROR_RATIO * errors["single"]
         # the errors may be the coarse grid's: either model seems to fit, or neither
         if alike and (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
             frames = [larger]
             fit = replace(fit, descent_iterations=max(MAX_DESCENT_STEPS, fit.descent_iterations))
-            errors = {each: held_out(frames, each, each, fit).error for each in rivals}
+            errors = {each: held_out(frames, each, each, fit).error for each in candidates}
         if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:
             richest = "multiple"
     chosen = richest

@@ -36,7 +36,7 @@ Gevers and van de Weijer, "Computational color constancy: survey and experiments
 THICK_PERCENTILE = 90
 """Percentile of the change from which smoke is measured: the thickest is nearest to the source."""
 
-PIXELS = 50
+MIN_COLOR_PIXELS = 50
 """Smallest number of smoke pixels that show a color: their thickest tenth are five."""
 
 MIN_SOURCE_VALUE = 0.01
@@ -101,7 +101,7 @@ def smoke_color(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding]
     """
     figures = {"tolerance": MIN_COLOR_DEGREES}
     undetermined = Finding("smoke color unseen", figures, about="smoke color", value=UNDETERMINED, source="assumed")
-    line = _thickest(samples)
+    line = _thickest_smoke(samples)
     if line is None:
         return WHITE, undetermined
     behind, seen = line
@@ -127,25 +127,25 @@ def several_colors(samples: SmokeSamples) -> list[Finding]:
     """
     usable = samples.colors.min(-1, initial=1.0) < CLIPPED_VALUE
     shown = samples.colors[usable].astype(np.float64)
-    if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
+    if len(shown) < MIN_COLOR_PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
         return []
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
         return []
-    off = _off_one_color(shown)
+    off = _degrees_off_one_color(shown)
     if off < MIN_COLOR_DEGREES:
         return []
     ends = np.cumsum(samples.amounts, dtype=np.intp)[:-1]
     frames = [
         part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colors, usable)), strict=True)
     ]
-    apart = [_off_one_color(frame.astype(np.float64)) for frame in frames if len(frame) >= PIXELS]
+    apart = [_degrees_off_one_color(frame.astype(np.float64)) for frame in frames if len(frame) >= MIN_COLOR_PIXELS]
     kind = (
         "smoke that changes its color" if apart and np.median(apart) < MIN_COLOR_DEGREES else "smoke of several colors"
     )
     return [Finding(kind, {"degrees": off}, doubt=True)]
 
 
-def _off_one_color(colors: Doubles) -> float:
+def _degrees_off_one_color(colors: Doubles) -> float:
     """Root mean square of the degrees by which light (n, 3) is off the one color that explains most of it."""
     along = np.linalg.eigvalsh(colors.T @ colors)
     return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
@@ -158,10 +158,10 @@ def _line_of_colors(colors: Doubles, behind: Doubles) -> Doubles:
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
 
 
-def _thickest(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
+def _thickest_smoke(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
     """Background (3,) and color (3,) of the thickest smoke that is not clipped; None if there is too little."""
     clear = brightest_channel(samples.colors) < CLIPPED_VALUE
-    if clear.sum() < max(PIXELS, 0.1 * len(clear)):
+    if clear.sum() < max(MIN_COLOR_PIXELS, 0.1 * len(clear)):
         return None
     colors, behind = (values[clear].astype(np.float64) for values in (samples.colors, samples.behind))
     change, axis = colors - behind, _line_of_colors(colors, behind)

@@ -80,7 +80,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         lit = scene_optics(complete).unshadowed_source()
         lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
         first = replace(first, source=np.asarray(lit, np.float32))
-    of_clip = first_findings(estimate, _given(scene.background, estimate))
+    of_clip = first_findings(estimate, _background_given(scene.background, estimate))
     findings = [*clip.findings(), *of_clip, *geometry.findings, *of_medium, *of_light]
     coarse = coarse_frames((first,), samples.typical, complete) if settings.measure else ()
     if coarse and asked is not None:
@@ -138,7 +138,7 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Findin
     return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
 
 
-def _given(background: Background | None, estimate: FirstEstimate) -> bool:
+def _background_given(background: Background | None, estimate: FirstEstimate) -> bool:
     """Whether a scene says what is behind the smoke; strokes do where an alpha channel leaves nothing to estimate."""
     return background is not None and (not background.estimated or estimate.found.source == "alpha")
 

@@ -52,7 +52,7 @@ def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
     np.testing.assert_allclose(seen.fitted, 0.2, atol=1e-5)
     np.testing.assert_allclose(seen.held_out, 0.5, atol=1e-5)
     assert 0.3 < seen.picture.mean() < 0.4
-    dimmed = seen.over(np.full(3, 2, np.float32))
+    dimmed = seen.divided(np.full(3, 2, np.float32))
     np.testing.assert_allclose(dimmed.held_out, 0.25, atol=1e-5)
     away = scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
     assert coarse_frame([view, replace(view, camera=away)], 0, scene) is None
