@@ -6,6 +6,7 @@ import argparse
 import math
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -179,17 +180,19 @@ def require_folder(path: Path | None) -> None:
 def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
     if text == "auto":
         return "auto"
-    try:
-        x, y, z = (int(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected three whole numbers X,Y,Z, or auto") from None
+    x, y, z = _whole_numbers(text, ",", 3, "three whole numbers X,Y,Z, or auto")
     return x, y, z
 
 
 def frame_range(text: str) -> tuple[int, int]:
     """Return the first and the last frame from a word A:B."""
-    try:
-        first, last = (int(part) for part in text.split(":"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B") from None
+    first, last = _whole_numbers(text, ":", 2, "the first and last frame A:B")
     return first, last
+
+
+def _whole_numbers(text: str, between: str, count: int, expected: str) -> list[int]:
+    with suppress(ValueError):
+        numbers = [int(part) for part in text.split(between)]
+        if len(numbers) == count:
+            return numbers
+    raise argparse.ArgumentTypeError(f"{text!r}: expected {expected}")

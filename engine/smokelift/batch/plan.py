@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 import heapq
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from html import escape
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, is_finished, read_index
@@ -91,15 +90,13 @@ def write_report(path: Path, title: str, records: Mapping[BatchShot, Record]) ->
 
 
 def _cells(shot: BatchShot, record: Record) -> str:
-    index, picture, notes = read_index(shot), "", "".join(f"<p>{escape(note)}</p>" for note in record.notes)
-    with suppress(OSError):
-        data = base64.b64encode(shot.file("png").read_bytes()).decode("ascii")
-        picture = f'<img alt="clip and reconstruction" src="data:image/png;base64,{data}">'
+    index, notes = read_index(shot), "".join(f"<p>{escape(note)}</p>" for note in record.notes)
+    picture = shot.file("png")
     total = f" of {record.forecast['frames']}" if record.forecast is not None and not index.complete else ""
     psnr = [of["psnr"] for of in index.frames.values() if of.get("psnr") is not None]
     details = f"<details><summary>{counted(len(record.notes), 'note')}</summary>{notes}</details>" if notes else ""
     cells = (
-        picture,
+        f'<img alt="clip and reconstruction" src="{quote(picture.name)}">' if picture.exists() else "",
         f"<b>{escape(shot.name)}</b><br>{escape(shot.input.name)}<br>{escape(' '.join(shot.options))}",
         f'<span class="{record.status}">{record.status}</span>',
         f"{len(index.frames)}{total}",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from smokelift.checks import Figure, Figures, Finding, Source
 from smokelift.footage.exposure import shows_exposure, small
-from smokelift.footage.plate import Plate
 from smokelift.report.cost import Cost
 from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.geometry import PICTURE_HEIGHT
@@ -29,11 +30,20 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> list[Finding]:
     has_medium = "medium" not in found
     color = "gray" if medium.is_gray else ", ".join(f"{v:.2f}" for v in medium.color)
     spent = {"seconds": cost.seconds, "memory": cost.memory / 2**30, "disk": cost.disk / 1e6}
+    lines = [known("background", "as given")]
+    seen, mask = shot.clip.seen(0, *shot.clip.size), shot.clip.mask
+    if seen is not None and mask is not None and mask.files:
+        lines.append(Finding("mask", {"hidden": 1 - float(seen.mean())}, about="mask", source="given"))
+    steady = Finding("exposure unseen", about="exposure", source="assumed")
+    if shows_exposure(small(plate.image)):
+        steady = replace(steady, kind="steady exposure", source="measured")
+    codes, lasting = (255 * float(noise.max()) for noise in (plate.noise.total, plate.noise.lasting))
+    level = "clean" if codes <= CLEAN_NOISE else "noisy: thin smoke is lost in it" if codes >= HEAVY_NOISE else "usual"
+    noise: Figures = {"level": level, "codes": codes, "lasting": lasting}
     return [
-        known("background", "as given"),
-        *_mask(shot),
-        found.get("exposure") or _exposure(plate),
-        _noise(plate),
+        *lines,
+        found.get("exposure", steady),
+        Finding("noise", noise, about="noise", source="measured"),
         known("camera", f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}"),
         Finding("scale", scale, about="scale", source="given" if has_scale else "assumed"),
         known("box", "as given"),
@@ -48,26 +58,6 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> list[Finding]:
     ]
 
 
-def _mask(shot: Shot) -> list[Finding]:
-    """How much a mask hides, if there is one."""
-    seen = shot.clip.seen(0, *shot.clip.size)
-    if seen is None or shot.clip.mask is None or not shot.clip.mask.files:
-        return []
-    return [Finding("mask", {"hidden": 1 - float(seen.mean())}, about="mask", source="given")]
-
-
-def _exposure(plate: Plate) -> Finding:
-    if shows_exposure(small(plate.image)):
-        return Finding("steady exposure", about="exposure", source="measured")
-    return Finding("exposure unseen", about="exposure", source="assumed")
-
-
-def _noise(plate: Plate) -> Finding:
-    codes, lasting = (255 * float(noise.max()) for noise in (plate.noise.total, plate.noise.lasting))
-    level = "clean" if codes <= CLEAN_NOISE else "noisy: thin smoke is lost in it" if codes >= HEAVY_NOISE else "usual"
-    return Finding("noise", {"level": level, "codes": codes, "lasting": lasting}, about="noise", source="measured")
-
-
 def _light(scene: CompleteScene, given: Scene, brightness: Finding | None) -> list[Finding]:
     """How strong the light is, and what one picture does not show of it."""
     if scene.scattering == "absorption":
@@ -78,7 +68,7 @@ def _light(scene: CompleteScene, given: Scene, brightness: Finding | None) -> li
         brightness,
         _line("sun's direction", "no sun", "assumed"),
         _line("sun's color", "that of all light", "assumed"),
-        _line("ambient share", "all light is from everywhere", "assumed"),
+        _line("ambient fraction", "all light is from everywhere", "assumed"),
     ]
 
 

@@ -129,15 +129,14 @@ def _line(
 def _matte_picture(seen: Matte) -> Tile:
     """The deviation from the background, the more orange the surer it is smoke."""
     strength = np.clip(seen.deviation / STRONG, 0, 1)[..., None]
-    white = np.full(3, 255)
-    return np.asarray(np.rint(strength * (white + seen.share[..., None] * (SMOKE - white))), np.uint8)
+    return np.asarray(np.rint(strength * (255 + seen.share[..., None] * (np.array(SMOKE) - 255))), np.uint8)
 
 
 def _unknown_picture(plate: Plate, unknown: NDArray[np.bool_]) -> Tile:
     """The background, with its unknown part in one color."""
-    codes = eight_bit(plate.image).astype(np.float64)
-    codes[unknown] = 0.4 * codes[unknown] + 0.6 * np.array(HIDDEN)
-    return np.asarray(np.rint(codes), np.uint8)
+    codes = eight_bit(plate.image)
+    codes[unknown] = np.rint(0.4 * codes[unknown] + 0.6 * np.array(HIDDEN))
+    return codes
 
 
 def _histogram(picture: NDArray[np.float32], plate: Plate, seen: Matte) -> Tile:

@@ -67,7 +67,7 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     known = {fact["what"]: fact for fact in done["facts"]}
     for what in ("exposure", "camera", "scale", "extinction", "albedo", "source radiance"):
         assert known[what]["origin"] == "undetermined"
-    for what in ("sun's direction", "sun's color", "ambient share"):
+    for what in ("sun's direction", "sun's color", "ambient fraction"):
         assert known[what]["origin"] == "undetermined"
     if kind == ".html":
         assert "sun&#x27;s direction" in page.read_text(encoding="utf-8")
@@ -95,7 +95,7 @@ def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) 
     clip, scene = plume.scene.clip.path, tmp_path / "scene.toml"
     words = ("--frames", "0:2", "--detail", "0", *QUICK)
     assert command("inspect", clip, "--write", scene, *words) == 0
-    assert "# ambient share: all light is from everywhere (undetermined)" in scene.read_text(encoding="utf-8")
+    assert "# ambient fraction: all light is from everywhere (undetermined)" in scene.read_text(encoding="utf-8")
     for name, source in (("own", clip), ("written", scene)):
         assert command("reconstruct", source, "--out", tmp_path / name, "--npz", *words) == 0
     own, written = (Sequence.open(tmp_path / name) for name in ("own", "written"))
