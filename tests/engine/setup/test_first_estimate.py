@@ -16,6 +16,8 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     scene = replace(plume.write(tmp_path, plume.densities, dim), lights=())
     with Clip.open(scene.clip) as clip:
         without, with_fire = (prepare_shot(each, scene, draft) for each in (clip, clip.changed(burning)))
+        given = replace(scene, medium=replace(scene.medium, flame_color=(1.0, 0.5, 0.2)))
+        assert prepare_shot(clip.changed(burning), given, draft).scene.medium.flame_color == (1.0, 0.5, 0.2)
     assert not any(choice.about == "fire" for choice in without.findings)
     (found,) = [choice for choice in with_fire.findings if choice.about == "fire"]
     assert found.kind == "fire"
@@ -50,15 +52,3 @@ def test_what_may_be_fire_is_said_and_is_fire_where_its_color_is_given(plume, dr
     assert certain.scene.medium.flame_color == (1.0, 0.4, 0.1)
     assert certain.scene.medium.extinction == alone.scene.medium.extinction, "the rest of the medium is not given"
     assert none.fire is None and "possible fire" not in [remark.kind for remark in none.findings]
-
-
-def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
-    dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
-    given = replace(dim, medium=replace(dim.medium, flame_color=(1.0, 0.5, 0.2)))
-    scene = plume.write(tmp_path, plume.densities, given)
-    with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip.changed(burning), scene, draft)
-    assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
-    (found,) = [choice for choice in shot.findings if choice.about == "fire"]
-    assert found.kind == "fire"
-    assert [found.figures[name] for name in ("red", "green", "blue")] == [1.0, 0.5, 0.2]

@@ -153,13 +153,9 @@ def test_another_exposure_is_found_and_undone(filmed, draft, gain) -> None:
     np.testing.assert_allclose(brightest, untouched, rtol=0.1)
 
 
-def test_a_camera_that_is_exposed_alike_is_left_alone(filmed, draft) -> None:
-    assert gains(shot_of(filmed((1.0, 1.0, 1.0)), draft)) == []
-
-
-def test_unknown_light_explains_more(filmed, draft) -> None:
-    """A ratio that counts in known light may be the light's where that is taken to come from everywhere."""
-    scene = filmed((1.28,) * 3)
-    (found,) = gains(shot_of(scene, draft))
-    assert found.value[0] == pytest.approx(1.28, rel=0.06)
-    assert gains(shot_of(replace(scene, lights=()), draft)) == []
+@pytest.mark.parametrize(("gain", "lit", "found"), [(1.0, True, False), (1.28, True, True), (1.28, False, False)])
+def test_a_gain_has_to_be_clear_and_more_so_in_unknown_light(filmed, draft, gain, lit, found) -> None:
+    """There it may be the light's, which is taken to come from everywhere."""
+    scene = filmed((gain,) * 3)
+    said = gains(shot_of(scene if lit else replace(scene, lights=()), draft))
+    assert [choice.value[0] for choice in said] == ([pytest.approx(gain, rel=0.06)] if found else [])

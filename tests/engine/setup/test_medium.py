@@ -47,13 +47,13 @@ def test_grey_smoke_stays_grey_before_anything(source, behind, thickest):
     assert (color, choice.value) == ((1, 1, 1), UNDETERMINED)
 
 
-def test_what_white_balance_explains_is_the_lights():
-    assert smoke_color(samples(np.array((1.0, 0.9, 0.8)), BLACK), WHITE)[1].value == UNDETERMINED
-    assert smoke_color(samples(DUST, BLACK), WHITE)[1].value != UNDETERMINED
-
-
-def test_smoke_of_the_color_of_its_surroundings_is_undetermined():
-    assert smoke_color(samples(0.8 * DUST, 0.4 * DUST), WHITE)[1].value == UNDETERMINED
+@pytest.mark.parametrize(
+    ("source", "behind", "undetermined"),
+    [((1.0, 0.9, 0.8), BLACK, True), (DUST, BLACK, False), (0.8 * DUST, 0.4 * DUST, True)],
+    ids=["white balance", "dust", "in its surroundings' color"],
+)
+def test_what_light_explains_is_the_lights(source, behind, undetermined):
+    assert (smoke_color(samples(np.array(source), behind), WHITE)[1].value == UNDETERMINED) == undetermined
 
 
 def test_a_dark_side_is_not_colored():
@@ -109,19 +109,16 @@ def two_kinds(one, other, behind=BLACK):
 
 
 def test_smoke_of_more_than_one_color_is_said():
-    (said,) = several_colors(two_kinds(RED, np.array((0.2, 0.3, 1.0))))
-    assert said.kind == "smoke of several colors"
-
-
-def test_a_color_that_changes_over_time_asks_for_other_frames():
-    """Of one color in each frame, and of another in the next: no crop and no mask helps there."""
+    """One whose color changes from a frame to the next asks for other frames: no crop and no mask helps there."""
     seen = two_kinds(RED, np.array((0.2, 0.3, 1.0)))
     half = len(seen.colors) // 2
-    (said,) = several_colors(replace(seen, amounts=(half, half)))
-    assert said.kind == "smoke that changes its color"
     mixed = np.random.default_rng(3).permutation(len(seen.colors))
-    (said,) = several_colors(replace(seen, colors=seen.colors[mixed], amounts=(half, half)))
-    assert said.kind == "smoke of several colors"
+    for samples_of, kind in (
+        (seen, "smoke of several colors"),
+        (replace(seen, amounts=(half, half)), "smoke that changes its color"),
+        (replace(seen, colors=seen.colors[mixed], amounts=(half, half)), "smoke of several colors"),
+    ):
+        assert [found.kind for found in several_colors(samples_of)] == [kind]
 
 
 @pytest.mark.parametrize(
