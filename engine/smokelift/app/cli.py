@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 
 from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
-from smokelift.app.options import whole_number
+from smokelift.app.options import add_device, whole_number
 from smokelift.app.progress import OutputError, reporter
 from smokelift.checks import printable
 from smokelift.footage.images import READABLE
@@ -145,24 +145,15 @@ def command_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     common = _Parser(add_help=False)
-    common.add_argument(
-        "--device",
-        choices=("auto", "cpu", "gpu"),
-        default="auto",
-        help="device that renders; auto (default): the processor; gpu: one that Taichi can use",
-    )
+    add_device(common)
     common.add_argument(
         "--progress",
         choices=("text", "json"),
         default="text",
-        help="how progress is shown; text (default): a bar; json: one JSON object a line",
+        help="text (default): a bar; json: an object per line",
     )
     common.add_argument(
-        "--threads",
-        type=whole_number(0, MAX_THREADS),
-        default=0,
-        metavar="N",
-        help="use N processor threads at most; 0 (default): all",
+        "--threads", type=whole_number(0, MAX_THREADS), default=0, metavar="N", help="threads at most; 0 (default): all"
     )
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, parents=[common], help=module.HELP)

@@ -31,14 +31,21 @@ def named_path(text: str) -> Path:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def add_device(parser: argparse.ArgumentParser) -> None:
+    """Add the device that renders."""
+    parser.add_argument(
+        "--device",
+        choices=("auto", "cpu", "gpu"),
+        default="auto",
+        help="device that renders; auto (default): the processor; gpu: one that Taichi can use",
+    )
+
+
 def add_clip_options(parser: argparse.ArgumentParser) -> None:
     """Add the clip or scene file, and what of the clip is used."""
     parser.add_argument("input", type=named_path, help="scene.toml, a video, or pictures as frame_####.png")
     parser.add_argument(
-        "--frames",
-        type=frame_range,
-        metavar="A:B",
-        help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
+        "--frames", type=frame_range, metavar="A:B", help="frames of the clip, from 0 (default: the scene's, else all)"
     )
     parser.add_argument(
         "--mask",
@@ -63,13 +70,13 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=METHODS,
         default="default",
-        help="paper: the published method, for comparison (needs the extra [gpu])",
+        help="paper: the published one (needs the extra [gpu])",
     )
     parser.add_argument(
         "--resolution",
         type=_resolution,
         metavar="X,Y,Z",
-        help="voxels along X, Y, Z; auto: measured on the clip (default: the scene's, else auto)",
+        help="voxels; auto: measured (default: the scene's, else auto)",
     )
     parser.add_argument(
         "--scattering",
@@ -96,7 +103,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="which of the plausible smokes to make, a whole number from 0 (default)",
+        help="which of the plausible smokes, from 0 (default)",
     )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 
 from smokelift.app.commands import reconstruct
-from smokelift.app.options import named_path, whole_number
+from smokelift.app.options import add_device, named_path, whole_number
 from smokelift.app.progress import Reporter
 from smokelift.batch.local import run_here
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
@@ -49,7 +49,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Run the shots that are not finished; ValueError if the list is wrong, or, at the end, if a shot failed."""
     of_a_shot = argparse.ArgumentParser(exit_on_error=False)
-    of_a_shot.add_argument("--device", choices=("auto", "cpu", "gpu"))
+    add_device(of_a_shot)
     reconstruct.add_options(of_a_shot)
     records = {shot: read_record(shot) for shot in read_shots(options.list, of_a_shot)}
     unknown = [(shot, 0) for shot, record in records.items() if record.forecast is None]

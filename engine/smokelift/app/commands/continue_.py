@@ -46,14 +46,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fade", type=int, default=0, metavar="N", help="let the smoke fade to nothing in the last N frames"
     )
-    parser.add_argument(
-        "--wind",
-        type=finite_number,
-        nargs=3,
-        default=(0.0, 0.0, 0.0),
-        metavar=("X", "Y", "Z"),
-        help="velocity in m/s that all air gains",
-    )
+    wind = "velocity in m/s that all air gains"
+    parser.add_argument("--wind", type=finite_number, nargs=3, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=wind)
     _add_repeatable(
         parser,
         "--turbulence",

@@ -32,10 +32,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--json", type=named_path, metavar="FILE", help="write the figures into this file, not on standard output"
     )
     parser.add_argument(
-        "--picture",
-        type=named_path,
-        metavar="FILE.png",
-        help="draw the smoke from all around; with --truth, below the truth",
+        "--picture", type=named_path, metavar="FILE.png", help="draw the smoke from all around; below --truth if given"
     )
 
 

@@ -40,10 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="write a page with pictures of what was found, .png or .html; may be given again",
     )
     parser.add_argument(
-        "--write",
-        type=named_path,
-        metavar="scene.toml",
-        help="write every estimate into a scene file that you can edit",
+        "--write", type=named_path, metavar="scene.toml", help="write every estimate into a scene file, to be edited"
     )
 
 

@@ -24,7 +24,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--overlap",
         type=int,
         metavar="N",
-        help="frames in which the end becomes the start (default: a third of the part, 24 at most)",
+        help="frames in which the end becomes the start (default: a third, up to 24)",
     )
 
 

@@ -36,10 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=named_path, required=True, help="directory for the sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
     parser.add_argument(
-        "--thumbnail",
-        type=named_path,
-        metavar="FILE.png",
-        help="keep a picture of the newest frame beside the clip in this file",
+        "--thumbnail", type=named_path, metavar="FILE.png", help="picture of the newest frame beside the clip's"
     )
     parser.add_argument(
         "--start-number",
@@ -70,11 +67,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         say.start(shot.length, finished, frames_seconds(resolution, work) * (1 - finished / shot.length))
         report = _report(shot, options.thumbnail, say, new)
         sequence = reconstruction.write(
-            options.out,
-            npz=options.npz,
-            resume=options.resume,
-            start_number=options.start_number,
-            on_frame=report,
+            options.out, npz=options.npz, resume=options.resume, start_number=options.start_number, on_frame=report
         )
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):

@@ -23,10 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
     parser.add_argument(
-        "--frame",
-        type=int,
-        metavar="N",
-        help="number of the only frame to render (default: the first for an image, all for a video)",
+        "--frame", type=int, metavar="N", help="the only frame (default: the first for an image, all for a video)"
     )
     parser.add_argument(
         "--camera",
