@@ -56,22 +56,38 @@ def from_tables(data: Table, build: Callable[..., Described], name: str, base: P
     return _Reader(name, (base or Path()).absolute(), {}).scene(data, build)
 
 
+TABLES: Mapping[str, Any] = {
+    "clip": ClipSource,
+    "camera": Camera,
+    "domain": Domain,
+    "inlet": Inlet,
+    "medium": Medium,
+    "lights": Light,
+    "background": Background,
+    "views": View,
+}
+"""What the tables of a scene file describe."""
+
+LISTS = ("inlet", "lights", "views")
+"""Tables that may be given again."""
+
+BESIDE: Mapping[Any, tuple[str, ...]] = {Domain: ("closed",), Box: ("resolution", "closed"), Medium: ("scattering",)}
+"""Keys of a table that are no fields of what it describes."""
+
+
 class _Reader(TomlFile):
     """Makes the parts of a scene from the tables of one file and puts file and line into every message."""
 
     def scene(self, data: Table, build: Callable[..., Described]) -> Described:
-        readers: dict[str, Callable[[Place, Any], Any]] = {
-            "clip": self._table(self._part(ClipSource)),
-            "camera": self._table(self._camera),
-            "domain": self._table(self._domain),
-            "inlet": self._tables(self._part(Inlet)),
-            "medium": self._table(self._part(Medium, "scattering")),
-            "lights": self._tables(self._light),
-            "background": self._table(self._part(Background)),
-            "views": self._tables(self._view),
-        }
-        self.require_known((), data, tuple(readers))
-        parts = {name: readers[name]((name,), value) for name, value in data.items()}
+        self.require_known((), data, tuple(TABLES))
+        parts: dict[str, Any] = {}
+        for name, value in data.items():
+            if name not in LISTS:
+                parts[name] = self._table((name,), value, TABLES[name])
+            elif isinstance(value, list):
+                parts[name] = tuple(self._table((name, n), each, TABLES[name]) for n, each in enumerate(value))
+            else:
+                raise self.error((name,), f"must be a list of tables, written [[{name}]]")
         for table, key in (("domain", "closed"), ("medium", "scattering")):
             if key in data.get(table, {}):
                 parts[key] = data[table][key]
@@ -83,72 +99,41 @@ class _Reader(TomlFile):
             place = tuple(int(part) if part.isdigit() else part for part in error.table.split("."))
             raise self.error(place, str(error), error.key) from error
 
-    def _table(self, build: Callable[[Place, Table], Any]) -> Callable[[Place, Any], Any]:
-        """Return a reader of one table that turns a SceneError without a place into one with it."""
+    def _table(self, place: Place, data: Any, kind: Any) -> Any:
+        """Return what a table describes; a SceneError without a place becomes one with it."""
+        if not isinstance(data, dict):
+            raise self.error(place, f"must be a table, not {shown(data)}")
+        try:
+            return self._camera(place, data) if kind is Camera else self._part(place, data, kind)
+        except SceneError as error:
+            if error.table:
+                raise
+            raise self.error(place, str(error), error.key) from error
 
-        def read(place: Place, data: Any) -> Any:
-            if not isinstance(data, dict):
-                raise self.error(place, f"must be a table, not {shown(data)}")
-            try:
-                return build(place, data)
-            except SceneError as error:
-                if error.table:
-                    raise
-                raise self.error(place, str(error), error.key) from error
+    def _part(self, place: Place, data: Table, kind: Any) -> Any:
+        """Return a dataclass whose fields are the keys of its table.
 
-        return read
-
-    def _tables(self, build: Callable[[Place, Table], Any]) -> Callable[[Place, Any], tuple[Any, ...]]:
-        def read(place: Place, data: Any) -> tuple[Any, ...]:
-            if not isinstance(data, list):
-                raise self.error(place, f"must be a list of tables, written [[{place[0]}]]")
-            return tuple(self._table(build)((*place, index), item) for index, item in enumerate(data))
-
-        return read
-
-    def _part(self, kind: type[Any], *beside: str) -> Callable[[Place, Table], Any]:
-        """Return a reader of a dataclass whose fields are the keys of its table, with some further keys beside them.
-
-        A field without a default has to be given; a path is relative to the file. A table that holds nothing but
-        further keys leaves the part open.
+        A field without a default has to be given; a path is relative to the file. A table that holds nothing but keys
+        `BESIDE` leaves the part open.
         """
-
-        def read(place: Place, data: Table) -> Any:
-            self.require_known(place, data, (*(each.name for each in fields(kind)), *beside))
-            values = {key: value for key, value in data.items() if key not in beside}
-            if data and not values:
-                return None
-            _require(values, *(each.name for each in fields(kind) if each.default is MISSING))
-            for key, hint in get_type_hints(kind).items():
-                if Path in (hint, *get_args(hint)) and isinstance(values.get(key), str):
-                    values[key] = self.base / file_path(values[key], key)
-            return kind(**values)
-
-        return read
-
-    def _domain(self, place: Place, data: Table) -> Box | None:
-        """Return a domain, or a box where the table holds no resolution."""
-        read = self._part(Domain, "closed") if "resolution" in data else self._part(Box, "resolution", "closed")
-        box: Box | None = read(place, data)
-        return box
-
-    def _light(self, place: Place, data: Table) -> Light:
-        _require(data, "type")
-        name = data["type"]
-        if not isinstance(name, str) or name not in LIGHT_TYPES:
-            raise unexpected(name, "type", f"one of {one_of(LIGHT_TYPES)}")
-        light: Light = self._part(LIGHT_TYPES[name])(place, {key: data[key] for key in data if key != "type"})
-        return light
-
-    def _view(self, place: Place, data: Table) -> View:
-        readers: dict[str, Callable[[Place, Table], Any]] = {
-            "camera": self._camera,
-            "clip": self._part(ClipSource),
-            "background": self._part(Background),
-        }
-        self.require_known(place, data, tuple(readers))
-        _require(data, "camera", "clip")
-        return View(**{key: self._table(readers[key])((*place, key), value) for key, value in data.items()})
+        if kind is Light:
+            kind, data = _light_type(data), {key: value for key, value in data.items() if key != "type"}
+        if kind is Domain and "resolution" not in data:
+            kind = Box
+        beside = BESIDE.get(kind, ())
+        self.require_known(place, data, (*(each.name for each in fields(kind)), *beside))
+        values = {key: value for key, value in data.items() if key not in beside}
+        if data and not values:
+            return None
+        _require(values, *(each.name for each in fields(kind) if each.default is MISSING))
+        for key, hint in get_type_hints(kind).items():
+            kinds = (hint, *get_args(hint))
+            if Path in kinds and isinstance(values.get(key), str):
+                values[key] = self.base / file_path(values[key], key)
+            for table in (Camera, ClipSource, Background):
+                if table in kinds and key in values:
+                    values[key] = self._table((*place, key), values[key], table)
+        return kind(**values)
 
     def _camera(self, place: Place, data: Table) -> Camera:
         kind = data.get("type", "perspective")
@@ -162,6 +147,14 @@ class _Reader(TomlFile):
         centre = data.get("cx", width / 2), data.get("cy", height / 2)
         moving = matrices if "matrices" in data else ()
         return Camera(kind, matrices[0], (width, height), fx, fy, *centre, moving)
+
+
+def _light_type(data: Table) -> Any:
+    _require(data, "type")
+    name = data["type"]
+    if not isinstance(name, str) or name not in LIGHT_TYPES:
+        raise unexpected(name, "type", f"one of {one_of(LIGHT_TYPES)}")
+    return LIGHT_TYPES[name]
 
 
 def _require(data: Table, *keys: str) -> None:
