@@ -155,10 +155,10 @@ def command_parser() -> argparse.ArgumentParser:
     common.add_argument(
         "--threads", type=whole_number(0, MAX_THREADS), default=0, metavar="N", help="threads at most; 0 (default): all"
     )
-    for name, module in COMMANDS.items():
-        command = commands.add_parser(name, parents=[common], help=module.HELP)
-        module.add_options(command)
-        command.set_defaults(run=module.run)
+    for name, command in COMMANDS.items():
+        of_command = commands.add_parser(name, parents=[common], help=command.help)
+        command.add_options(of_command)
+        of_command.set_defaults(run=command.run)
     return parser
 
 

@@ -16,7 +16,7 @@ from addon.core.image_sequence import ImageSequence, image_sequence_from
 from addon.core.retiming import retiming
 from addon.core.take import toml_text
 from extension_products import NAMED, PLATFORMS, Product
-from smokelift.app.commands import continue_, loop, retime
+from smokelift.app.commands import directed
 from smokelift.checks import Source
 from smokelift.direct import new_sequence, playback
 from smokelift.footage.backdrop import MOVING_CAMERA
@@ -73,8 +73,8 @@ def test_resolutions() -> None:
 def test_directions() -> None:
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
-    for name, module in {"continue": continue_, "retime": retime, "loop": loop}.items():
-        module.add_options(commands.add_parser(name))
+    for name, command in directed.COMMANDS.items():
+        command.add_options(commands.add_parser(name))
     values = {"--frames": {"continue": "9", "loop": "1:9"}, "--wind": "1 2 -3", "--fan": "1 2 3 1 -4 5 6"}
     values |= {"--turbulence": "1 2 3", "--closed": "x- z+"}
     for direction, options in contract.DIRECTIONS.items():
@@ -83,7 +83,7 @@ def test_directions() -> None:
             words = (value if isinstance(value, str) else value[direction]).split()
             needed = ["--frames", "9"] if direction == "continue" else ["--speed", "2"] if direction == "retime" else []
             parser.parse_args([direction, "take", "--out", "new", *needed, option, *words])
-    assert (contract.SLOWEST, contract.FASTEST) == retime.SPEEDS
+    assert (contract.SLOWEST, contract.FASTEST) == directed.SPEEDS
     assert contract.SHORTEST == new_sequence.SHORTEST
 
 

@@ -6,7 +6,7 @@ import shutil
 import pytest
 from command_line import command, events, names, refused
 
-from smokelift.app.commands import continue_
+from smokelift.app.commands import directed
 from smokelift.direct import CONTRADICTED
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
@@ -120,9 +120,9 @@ def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys, monkeypatc
     last = Sequence.open(out).frames[-1]
     simulated = [Sequence.open(out).figures(number) for number in range(last - 2, last)]
     capsys.readouterr()
-    monkeypatch.setattr(continue_, "require_new", lambda _options: None)
+    monkeypatch.setattr(directed, "require_new", lambda _options: None)
     copied = {"origin": "clip", "seconds_density": 0.0, "seconds_velocity": 0.0}
-    monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(last, copied)]))
+    monkeypatch.setattr(directed, "continue_sequence", lambda *_, **__: iter([(last, copied)]))
     assert command(*words) == 0
     start, _, done = events(capsys.readouterr().out)
     assert (start["done"], start["total"]) == (last - 1, last)
@@ -146,7 +146,7 @@ def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, 
 
 def test_one_sentence_says_that_a_buoyancy_contradicts_the_clip(finished, tmp_path, capsys, monkeypatch) -> None:
     figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
-    monkeypatch.setattr(continue_, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
+    monkeypatch.setattr(directed, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
     start = ("continue", finished, "--out", tmp_path / "out", "--frames", 2, "--npz", "--progress", "json")
     assert command(*start) == 0
     (sentence,) = [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]

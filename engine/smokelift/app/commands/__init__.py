@@ -1,40 +1,20 @@
-"""The commands of the command line, a module each.
-
-A module has ``HELP``, ``add_options`` for the command's parser, and ``run``, which gets the options and says what
-happens.
-"""
+"""The commands of the command line: a module each, or one for some that are alike, with ``COMMANDS`` by their names."""
 
 from smokelift.app.commands import (
     batch,
-    check,
-    continue_,
+    directed,
     doctor,
     evaluate,
     export,
     extract,
     inspect,
-    loop,
-    preview,
-    proxy,
     reconstruct,
     render,
-    retime,
+    sequences,
 )
 
 COMMANDS = {
-    "reconstruct": reconstruct,
-    "extract": extract,
-    "batch": batch,
-    "inspect": inspect,
-    "render": render,
-    "preview": preview,
-    "evaluate": evaluate,
-    "check": check,
-    "continue": continue_,
-    "retime": retime,
-    "loop": loop,
-    "export": export,
-    "proxy": proxy,
-    "doctor": doctor,
+    name: command
+    for module in (reconstruct, extract, batch, inspect, render, sequences, evaluate, directed, export, doctor)
+    for name, command in module.COMMANDS.items()
 }
-"""Modules by their commands' names."""

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 
 from smokelift.app.commands import reconstruct
-from smokelift.app.options import add_device, named_path, whole_number
+from smokelift.app.options import Command, add_device, named_path, whole_number
 from smokelift.app.progress import Reporter
 from smokelift.batch.local import run_here
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
@@ -26,8 +26,6 @@ MEMORY_FRACTION = 0.9
 
 MAX_WORKERS = 99_999
 """Largest number of shots at a time: more than any cluster takes."""
-
-HELP = "reconstruct a list of shots, as many at a time as memory allows"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -157,3 +155,6 @@ def _time(seconds: float) -> str:
 
 def _gib(size: float) -> str:
     return f"{size / 2**30:.1f} GiB"
+
+
+COMMANDS = {"batch": Command("reconstruct a list of shots, as many at a time as memory allows", add_options, run)}

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 
-from smokelift.app.options import named_path, require_folder
+from smokelift.app.options import Command, named_path, require_folder
 from smokelift.app.progress import Reporter
 from smokelift.evaluation.evaluate import evaluate
 from smokelift.output.files import atomic_path
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
-
-HELP = "compare the smoke from all around with its front or with known volumes, and with other cameras"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -57,3 +55,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             aside.write_text(text + "\n", encoding="utf-8")
         text = f"{options.json} written."
     say.finish(text, found.figures)
+
+
+COMMANDS = {"evaluate": Command("compare the smoke with its front, known volumes and other cameras", add_options, run)}

@@ -6,7 +6,7 @@ import argparse
 import time
 from typing import get_args
 
-from smokelift.app.options import named_path
+from smokelift.app.options import Command, named_path
 from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import counted
 from smokelift.output.export import (
@@ -19,8 +19,6 @@ from smokelift.output.export import (
 )
 from smokelift.output.host import HostName
 from smokelift.output.sequence import Sequence
-
-HELP = "write small OpenVDB files, a proxy and a USD file"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -76,3 +74,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             "seconds": round(time.monotonic() - began, 1),
         },
     )
+
+
+COMMANDS = {"export": Command("write small OpenVDB files, a proxy and a USD file", add_options, run)}

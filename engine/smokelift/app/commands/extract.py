@@ -8,15 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.app.options import add_clip_options, named_path, require_folder, scene_of
+from smokelift.app.options import Command, add_clip_options, named_path, require_folder, scene_of
 from smokelift.app.progress import Reporter, say_made
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
 from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.pipeline.extraction import ELEMENT_KINDS, Extraction, extract
-
-HELP = "separate the smoke of a clip from what is behind it, as pictures with alpha"
 
 SQUARES = 24
 """Squares of the checker along the longer side of a preview."""
@@ -96,3 +94,6 @@ def _write_preview(path: Path, extraction: Extraction) -> None:
         write_image(path, next(pairs(range(middle, middle + 1))))
     else:
         write_video(path, pairs(range(len(extraction))), extraction.clip.fps)
+
+
+COMMANDS = {"extract": Command("separate smoke from what is behind it, as pictures with alpha", add_options, run)}

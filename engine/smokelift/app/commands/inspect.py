@@ -9,7 +9,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
+from smokelift.app.options import Command, add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
@@ -24,8 +24,6 @@ from smokelift.report.views import choices, fact, origin, sentence, value
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
-
-HELP = "say what a run would assume and choose, and what it would cost, without running it"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -125,3 +123,6 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path
         said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it as background.")
     scene.save(path, said)
     return files
+
+
+COMMANDS = {"inspect": Command("say what a run would assume, choose and cost, without running it", add_options, run)}

@@ -10,7 +10,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of, whole_number
+from smokelift.app.options import (
+    Command,
+    add_run_options,
+    named_path,
+    require_folder,
+    scene_of,
+    settings_of,
+    whole_number,
+)
 from smokelift.app.progress import Reporter, median_psnr, seconds_before
 from smokelift.checks import Figures, Finding
 from smokelift.footage.clip import Clip
@@ -26,8 +34,6 @@ from smokelift.report.views import sentence
 from smokelift.scene import Domain
 from smokelift.setup.backdrop_findings import what_helps
 from smokelift.setup.shot import Shot
-
-HELP = "turn a clip or scene file into a VDB sequence"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -127,3 +133,6 @@ def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:
     both = np.concatenate([seen.image, found], 0 if columns > rows else 1)
     with atomic_path(path) as aside:
         Image.fromarray(eight_bit(both)).save(aside, format="PNG")
+
+
+COMMANDS = {"reconstruct": Command("turn a clip or scene file into a VDB sequence", add_options, run)}

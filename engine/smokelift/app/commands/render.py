@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from smokelift.app.options import named_path, require_folder
+from smokelift.app.options import Command, named_path, require_folder
 from smokelift.app.progress import Reporter
 from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.output.sequence import Sequence
@@ -15,8 +15,6 @@ from smokelift.scene import Camera, CompleteScene, Scene, orbit
 
 SIDE_YAW = 90.0
 """Degrees about the vertical from the scene's camera to the side view."""
-
-HELP = "make an image or video of a sequence"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -78,3 +76,6 @@ def _camera(name: str, scene: CompleteScene) -> Camera:
             f"--camera {name}: expected front, side, two angles YAW,PITCH in degrees, or a camera.toml."
         ) from None
     return orbit(scene.camera, scene.domain, yaw, pitch)
+
+
+COMMANDS = {"render": Command("make an image or video of a sequence", add_options, run)}

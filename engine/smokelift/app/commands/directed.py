@@ -1,4 +1,4 @@
-"""``smokelift continue``: a sequence goes on after its clip, or differently from one of its frames."""
+"""``smokelift continue``, ``retime`` and ``loop``: what is made of a sequence after its clip."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from smokelift.app.options import add_directed_options, finite_number, named_path, require_new
+from smokelift.app.options import (
+    Command,
+    add_directed_options,
+    finite_number,
+    frame_range,
+    named_path,
+    require_new,
+)
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
 from smokelift.direct import (
@@ -21,7 +28,13 @@ from smokelift.direct import (
     Mesh,
     Turbulence,
     continue_sequence,
+    default_overlap,
+    loop_length,
+    loop_sequence,
     open_source,
+    playback,
+    retime_sequence,
+    steady_part,
 )
 from smokelift.direct.new_sequence import Written
 from smokelift.output.files import INDEX
@@ -33,11 +46,12 @@ from smokelift.scene import SIDES
 NOTICED = 1e-3
 """Share of a frame's smoke that dissolves before its box's end, above which it is said."""
 
-HELP = "make what the smoke does after its clip, or in wind and around obstacles"
+SPEEDS = 0.01, 100.0
+"""Slowest and fastest speed: beyond them nothing moves, or nothing is left."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
+def add_continue_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``continue``."""
     add_directed_options(parser)
     parser.add_argument("--frames", type=int, required=True, metavar="N", help="number of frames to add")
     parser.add_argument(
@@ -115,7 +129,7 @@ def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[
     )
 
 
-def run(options: argparse.Namespace, say: Reporter) -> None:
+def continue_(options: argparse.Namespace, say: Reporter) -> None:
     """Continue the sequence, and say every frame."""
     continuation = _continuation(options)
     sequence = open_source(options.directory)
@@ -200,3 +214,64 @@ def _ball(option: str, values: list[float]) -> Ball:
     if radius <= 0:
         raise ValueError(f"{option}: the radius must be above 0 m, not {radius:g}.")
     return Ball((x, y, z), radius)
+
+
+def add_retime_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``retime``."""
+    add_directed_options(parser)
+    parser.add_argument(
+        "--speed",
+        type=finite_number,
+        nargs="+",
+        required=True,
+        metavar="S",
+        help="speed: 0.5 for half; several speeds are spread evenly over the clip, with ramps in between",
+    )
+
+
+def retime(options: argparse.Namespace, say: Reporter) -> None:
+    """Retime the sequence, and say every frame."""
+    for speed in options.speed:
+        if not SPEEDS[0] <= speed <= SPEEDS[1]:
+            raise ValueError(f"--speed {speed:g}: expected a number from {SPEEDS[0]:g} to {SPEEDS[1]:g}.")
+    sequence = open_source(options.directory)
+    require_new(options)
+    speeds = tuple(options.speed)
+    total = len(playback(len(sequence.frames), speeds)[0])
+    written = retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume)
+    say_sequence(say, written, kind="written", directory=options.out, total=total)
+
+
+def add_loop_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``loop``."""
+    add_directed_options(parser)
+    parser.add_argument(
+        "--frames",
+        type=frame_range,
+        metavar="A:B",
+        help="first and last frame of the part, counted from 1 (default: where the smoke is steady)",
+    )
+    parser.add_argument(
+        "--overlap",
+        type=int,
+        metavar="N",
+        help="frames in which the end becomes the start (default: a third, up to 24)",
+    )
+
+
+def loop(options: argparse.Namespace, say: Reporter) -> None:
+    """Loop the sequence, and say every frame."""
+    sequence = open_source(options.directory)
+    first, last = options.frames or steady_part(sequence, options.overlap)
+    overlap = default_overlap(last - first + 1) if options.overlap is None else options.overlap
+    total = loop_length(sequence, first, last, overlap)
+    require_new(options)
+    written = loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)
+    say_sequence(say, written, kind="looped", directory=options.out, total=total, first=first, last=last)
+
+
+COMMANDS = {
+    "continue": Command("make what the smoke does after its clip, or in wind", add_continue_options, continue_),
+    "retime": Command("make slow motion, fast motion and ramps of a sequence", add_retime_options, retime),
+    "loop": Command("make a part of a sequence repeat without a seam", add_loop_options, loop),
+}
