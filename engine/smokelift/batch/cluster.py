@@ -99,10 +99,7 @@ def _submitted(client: Any, shots: dict[BatchShot, int], task: Task, batch: str)
 
 def work(shot: BatchShot, task: Task, batch: str) -> Record:
     """Work on a shot, on a worker; Reschedule if that ends before the shot does."""
-    try:
-        record = task(shot, distributed.get_worker().plugins[batch].event)
-    except OSError as error:  # to the batch that would look like a lost connection
-        return replace(read_record(shot), status="stuck", sentence=str(error))
+    record = task(shot, distributed.get_worker().plugins[batch].event)
     if record.status == "cancelled":
         raise distributed.Reschedule
     return record

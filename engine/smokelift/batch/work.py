@@ -102,15 +102,19 @@ def is_finished(shot: BatchShot, record: Record) -> bool:
 def inspect_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
     """Ask the engine what a shot will take, unless that is known; a record without a forecast says why not."""
     record = read_record(shot)
-    if record.forecast is None:
+    if record.forecast is not None:
+        return record
+    # `inspect` writes nothing
+    options = [word for word in shot.options if not word.startswith(("--npz", "--start-number"))]
+    try:
         shot.folder.mkdir(parents=True, exist_ok=True)
-        # `inspect` writes nothing
-        options = [word for word in shot.options if not word.startswith(("--npz", "--start-number"))]
         ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine)
         if ended.status != "done":
             return ended
         record = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
         record.write(shot)
+    except OSError as error:  # the storage itself
+        return replace(record, status="stuck", sentence=str(error), forecast=None)
     return record
 
 

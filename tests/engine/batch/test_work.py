@@ -116,6 +116,14 @@ def test_a_shot_is_forecast_once(make_shot, fake) -> None:
     assert finish_shot(shot, threading.Event(), engine=fake).forecast == record.forecast
 
 
+def test_a_storage_that_fails_before_a_forecast_is_said(make_shot, fake) -> None:
+    shot = make_shot()
+    shot.folder.write_text("a file where the folder should be")
+    record = inspect_shot(shot, threading.Event(), fake)
+    assert (record.status, record.forecast) == ("stuck", None)
+    assert str(shot.folder) in record.sentence
+
+
 def test_a_log_that_cannot_be_written_stops_nothing(make_shot) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("there is no full device here")
