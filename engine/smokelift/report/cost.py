@@ -151,7 +151,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Spent:
+class Preparation:
     """What preparing a shot took: seconds that passed, and processor seconds of all cores together.
 
     ``memory`` is in bytes at the peak, None if unknown. For a large clip on a small grid it is as much as the run's.
@@ -167,7 +167,7 @@ class Spent:
         return min(self.seconds, self.processor)
 
 
-def estimate_cost(resolution: Resolution, work: Workload, prepared: Spent) -> Cost:
+def estimate_cost(resolution: Resolution, work: Workload, prepared: Preparation) -> Cost:
     """Estimate the cost of a run from its grid, its smoke and what preparing it took, in a part of a second."""
     return Cost(
         seconds=prepared.work + frames_seconds(resolution, work),

@@ -13,7 +13,7 @@ from smokelift.report import cost
 from smokelift.report.cost import (
     MAX_SIDE_VOXELS,
     NotEnoughMemoryError,
-    Spent,
+    Preparation,
     Workload,
     estimate_cost,
     memory_needed,
@@ -40,7 +40,7 @@ MEASURED = [
 """Voxels, pixels, fraction that may hold smoke, peak (MiB) and processor time of a frame (in the time of a solve for a
 million voxels) of runs, docs/experiments/memory-and-time.md."""
 
-PREPARED = Spent(3.0, 3.0)
+PREPARED = Preparation(3.0, 3.0)
 CUBE = (128, 128, 128)
 
 
@@ -129,9 +129,9 @@ def test_more_frames_views_and_smoke_cost_more(seconds) -> None:
 def test_what_preparing_took_is_taken_again(seconds) -> None:
     """A clip may take long to prepare; how long it waits for a busy machine tells nothing of the run."""
     quick = seconds()
-    assert seconds(prepared=Spent(50.0, 50.0)) - quick == pytest.approx(47)
-    assert seconds(prepared=Spent(15.0, 3.0)) == quick
-    assert seconds(prepared=Spent(3.0, 5.0)) == quick, "two cores work at a time"
+    assert seconds(prepared=Preparation(50.0, 50.0)) - quick == pytest.approx(47)
+    assert seconds(prepared=Preparation(15.0, 3.0)) == quick
+    assert seconds(prepared=Preparation(3.0, 5.0)) == quick, "two cores work at a time"
     small, large = (estimate_cost(CUBE, WORK, replace(PREPARED, memory=peak)).memory for peak in (2**20, 2**40))
     assert (small, large) == (memory_needed(CUBE, WORK), 2**40)
 

@@ -15,7 +15,7 @@ from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
-from smokelift.report.cost import Spent, Workload, estimate_cost, peak_memory
+from smokelift.report.cost import Preparation, Workload, estimate_cost, peak_memory
 from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         for finding in findings:
             say.note(finding)
         work = Workload.of(shot, settings)
-        prepared = Spent(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
+        prepared = Preparation(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
         cost = estimate_cost(domain.resolution, work, prepared)
         known = facts(shot, scene, cost)
         files = list(options.page)
@@ -89,7 +89,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     )
 
 
-def _qualities(shot: Shot, work: Workload, prepared: Spent) -> dict[str, dict[str, Any]]:
+def _qualities(shot: Shot, work: Workload, prepared: Preparation) -> dict[str, dict[str, Any]]:
     """Grid and cost of each quality, as JSON holds them."""
     return {
         quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
