@@ -146,7 +146,9 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             again: Any = given_plates(behind, camera, quiet)
             plates = replace(again, noise=plates.noise)
         found = Backdrop("alpha" if grey else "given", quiet, plates, behind, motion=motion)
-    shown = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
+    shown = found.plates
+    if found.source == "picture" and isinstance(shown, Plate):
+        shown = uncovered(shown, found.clip)
     found = replace(found, clip=cleared(found.clip, shown), plates=shown)
     if background is None or background.strokes is None or grey is not None:
         return found

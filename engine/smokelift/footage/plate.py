@@ -226,28 +226,28 @@ def shown_behind(clip: Clip, plates: Plates, visible: Callable[[int, Picture], P
     return clip.changed(change)
 
 
-def uncovered(plates: Plates, clip: Clip) -> Plates:
-    """Return estimated backgrounds that show what the clip itself shows where a mask hides all frames.
+def uncovered(plate: Plate, clip: Clip) -> Plate:
+    """Return a background that shows what the clip itself shows where a mask hides all frames.
 
     That is no smoke, so it may stand behind the result.
     """
-    if clip.mask is None or not isinstance(plates, Plate):
-        return plates
+    if clip.mask is None:
+        return plate
     numbers = clip.spread(UNCOVERED)
-    hidden = np.ones(plates.confidence.shape, np.bool_)
+    hidden = np.ones(plate.confidence.shape, np.bool_)
     for number in numbers:
         seen = clip.seen(number, *clip.size)
         hidden = hidden if seen is None else hidden & ~seen
     if not hidden.any():
-        return plates
-    filmed, gains_of = clip.as_filmed(), exposures(plates)
+        return plate
+    filmed, gains_of = clip.as_filmed(), exposures(plate)
     shown = []
     for number in numbers:
         gains = gains_of(number, small(clip.as_seen(number, clip.frame(number))))
         shown.append(filmed.frame(number)[hidden] / gains)
-    image = plates.image.copy()
+    image = plate.image.copy()
     image[hidden] = np.median(shown, axis=0)
-    return replace(plates, image=image)
+    return replace(plate, image=image)
 
 
 def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:

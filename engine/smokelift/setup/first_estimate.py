@@ -153,10 +153,17 @@ def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plat
     There is none before what does not show T: black, one color, or a picture that is as good as one; and without
     ``smoky`` frames, those with the most smoke first.
     """
-    if not smoky or backdrop_colour(found.plates.at(smoky[0]).image) is not None:
+    if not smoky or backdrop_colour(visible_plate(found.plates, clip, smoky[0])) is not None:
         return found.plates, None
     plates, source = plates_and_source(clip, found.shot_of(clip), found.plates, smoky)
-    return (plates, source) if shows_transmittance(plates.at(smoky[0]).image, source) else (found.plates, None)
+    shown = visible_plate(plates, clip, smoky[0])
+    return (plates, source) if shows_transmittance(shown, source) else (found.plates, None)
+
+
+def visible_plate(plates: Plates, clip: Clip, frame: int) -> Picture:
+    """Return the plate (rows, columns, 3) of a frame; where a mask hides it, and no smoke is, the mean of the rest."""
+    plate, seen = plates.at(frame).image, clip.seen(frame, *clip.size)
+    return plate if seen is None else np.where(seen[..., None], plate, plate[seen].mean(0))
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:

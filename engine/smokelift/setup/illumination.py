@@ -21,7 +21,7 @@ from smokelift.footage.noise import Noise
 from smokelift.render.environment import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
-from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples, visible_plate
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.settings import Settings
@@ -85,7 +85,9 @@ def first_light(
 
 def _measured_source(estimate: FirstEstimate) -> Picture | None:
     """The source radiance (3,) of the smoke; None where what is behind it hardly shows it."""
-    if estimate.source is None or not tells_source(estimate.plates.at(estimate.samples.smoky[0]).image):
+    if estimate.source is None:
+        return None
+    if not tells_source(visible_plate(estimate.plates, estimate.clip, estimate.samples.smoky[0])):
         return None
     return estimate.source
 

@@ -11,7 +11,7 @@ from smokelift.checks import Finding
 from smokelift.density import AxisEstimate, Observation
 from smokelift.extraction import Element, extract_element
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plate, Plates
+from smokelift.footage.plate import Plate, Plates, uncovered
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
@@ -119,12 +119,18 @@ class Shot:
         """The input."""
         return self.views[0].clip
 
-    @property
+    @cached_property
     def found_background(self) -> Image | None:
-        """Full picture (rows, columns, 3) behind the smoke; None where the scene has it, or one for every frame."""
+        """Full picture (rows, columns, 3) behind the smoke; None where the scene has it, or one for every frame.
+
+        Where a mask hides all frames it is the clip's own, before one color, too.
+        """
         plates, background = self.views[0].plates, self.scene.background
-        given = background.image is not None or background.color is not None
-        return plates.image if isinstance(plates, Plate) and (not given or background.strokes is not None) else None
+        painted = background.strokes is not None
+        if not isinstance(plates, Plate) or (background.image is not None and not painted):
+            return None
+        shown = plates if self.moves else uncovered(plates, self.clip)
+        return None if background.color is not None and not painted and shown is plates else shown.image
 
     @property
     def inlets(self) -> tuple[Inlet, ...]:

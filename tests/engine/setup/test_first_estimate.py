@@ -1,4 +1,4 @@
-"""Fire in a shot: it is distinguished from the smoke, and its color is what the clip shows or the scene says."""
+"""What a clip shows: fire apart from smoke, and whether what is behind the smoke shows how much of it passes."""
 
 from dataclasses import replace
 
@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.scene import DirectionalLight, Medium
+from smokelift.output.images import write_image
+from smokelift.scene import Background, DirectionalLight, Medium
+from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.prepare import prepare_shot
 from tests.engine.setup.shots import burning
 
@@ -52,3 +54,19 @@ def test_what_may_be_fire_is_said_and_is_fire_where_its_color_is_given(plume, dr
     assert certain.scene.medium.flame_color == (1.0, 0.4, 0.1)
     assert certain.scene.medium.extinction == alone.scene.medium.extinction, "the rest of the medium is not given"
     assert none.fire is None and "possible fire" not in [remark.kind for remark in none.findings]
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_what_a_mask_hides_says_nothing_of_how_much_passes(plume, tmp_path, masked) -> None:
+    """Stripes beside smoke before one color: without a mask the plate is a picture, with it as good as one color."""
+    scene = plume.write(tmp_path, plume.densities)
+    plate = np.zeros((56, 40, 3), np.float32)
+    plate[:, :8], plate[::4, :8] = 0.4, 0.1
+    write_image(tmp_path / "plate.png", plate)
+    mask = np.ones((56, 40, 3))
+    mask[:, :8] = 0
+    write_image(tmp_path / "mask.png", mask)
+    with Clip.open(scene.clip.path, fps=24, mask=tmp_path / "mask.png" if masked else None) as clip:
+        clip = clip if masked else clip.changed(lambda _, picture: np.maximum(picture, plate))
+        found = first_estimate(clip, None, Background(image=tmp_path / "plate.png"))
+    assert (found.source is None) == masked

@@ -12,6 +12,7 @@ from smokelift.checks import UNDETERMINED, Finding
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
 from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
+from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.scene import (
     Background,
@@ -169,6 +170,23 @@ def test_one_color_behind_a_moving_camera_is_found(tracked, draft) -> None:
     assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
     assert shot.found_background is None
     assert "black background" in [remark.kind for remark in shot.findings]
+
+
+@pytest.mark.parametrize("color", [None, (0.0, 0.0, 0.0)])
+def test_the_clip_is_behind_the_smoke_where_a_mask_hides_it(plume, draft, tmp_path, color) -> None:
+    """A wall beside smoke before black, whether that is given or found."""
+    scene, wall = plume.write(tmp_path, plume.densities), (0.2, 0.3, 0.25)
+    for file in tmp_path.glob("frame_*.png"):
+        picture = read_image(file)
+        picture[:, :6] = wall
+        write_image(file, picture)
+    mask = np.ones((56, 40, 3))
+    mask[:, :7] = 0
+    write_image(tmp_path / "mask.png", mask)
+    background = None if color is None else Background(color=color)
+    shot = shot_of(replace(scene, clip=replace(scene.clip, mask=tmp_path / "mask.png"), background=background), draft)
+    assert shot.found_background[:, :6] == pytest.approx(np.broadcast_to(wall, (56, 6, 3)), abs=0.01)
+    assert shot.found_background[:, 8:].max() < 0.01
 
 
 def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None:
