@@ -266,7 +266,8 @@ class Job:
                 number = self._before + int(message["frame"])
                 self._write_log(f"frame {number}: {self.done} of {self.total}")
             case "done":
-                self.sentence, self.details = sentence(message, self._before), message
+                self.sentence = sentence(message, self._before, [kind for kind, _ in self.doubts])
+                self.details = message
                 self._write_log(self.sentence)
             case "error":
                 self._error = str(message["text"])

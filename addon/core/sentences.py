@@ -1,6 +1,6 @@
 """What the engine says, in the panel's words where its own are those of a command line; and amounts in words."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 SENTENCES = {
@@ -49,11 +49,14 @@ is at most 2, 4 and 8 % of the range."""
 POOR = "poor"
 """The word for a PSNR below these."""
 
+UNRATED = ("smoke in the background", "background never seen")
+"""Doubts with which smoke may match its clip well and still be wrong: a part of it is in the background."""
+
 OF_RESULT = ("dissolving smoke",)
 """Sentences whose frames are counted from the first of the result, from 1."""
 
 
-def sentence(message: Mapping[str, Any], before: int = 0) -> str:
+def sentence(message: Mapping[str, Any], before: int = 0, doubts: Collection[str] = ()) -> str:
     """A message of the engine, as the panel shows it.
 
     Parameters
@@ -62,6 +65,8 @@ def sentence(message: Mapping[str, Any], before: int = 0) -> str:
         With the engine's ``text``; with its ``kind`` and ``figures`` if it has those.
     before
         Number of the clip's frames before the first of the result.
+    doubts
+        Kinds of what was said before of why the result may be wrong.
     """
     kind = message.get("kind", "")
     words, add = SENTENCES.get(kind), before if kind in OF_RESULT else 1
@@ -74,7 +79,9 @@ def sentence(message: Mapping[str, Any], before: int = 0) -> str:
     if "seconds" in figures:
         figures["seconds"] = spent(figures["seconds"])
     if "psnr" in figures:
-        figures["psnr"] = f"{match(figures['psnr'])} ({figures['psnr']:.1f} dB)"
+        level = f"{figures['psnr']:.1f} dB"
+        unrated = any(kind in doubts for kind in UNRATED)
+        figures["psnr"] = f"{level}, not rated: see the warning" if unrated else f"{match(figures['psnr'])} ({level})"
     return words.format(**figures)
 
 

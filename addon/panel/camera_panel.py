@@ -12,7 +12,7 @@ from ..scene.box import box_of, framed_box, has_inlet, new_box
 from ..scene.floor import Floor
 from ..scene.shot_setup import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
-from .clip_panel import draw_mask
+from .clip_panel import draw_mask, draw_picture
 from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, closed_sides, refuse
 from .layout import draw_automatic, draw_closed
 
@@ -240,14 +240,14 @@ def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     row.prop(settings, "plate_mode")
     row.operator("smokelift.plate_from_frame", text="", icon="IMAGE_BACKGROUND")
     if settings.plate_mode == "FILE":
-        layout.prop(settings, "plate", text=" ")
+        draw_picture(layout, settings, "plate", "")
     elif settings.plate_mode == "FRAMES":
         row = layout.row(align=True)
         row.prop(settings, "plate_frames", text=" ")
         row.operator("smokelift.clear_plate_frames", text="", icon="X")
     elif settings.plate_mode == "COLOR":
         layout.prop(settings, "plate_color", text=" ")
-    draw_mask(layout, context, settings)
+    draw_mask(layout, settings)
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
         layout.prop(settings, "box")

@@ -1,5 +1,7 @@
 """The clip in the tab: its frames, its background, its mask and its lens."""
 
+import os
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -15,7 +17,7 @@ from bpy.props import (
 
 from ..result import shot_check, smoke_takes
 from ..scene import shot_setup
-from ..scene.blender import PATH_OPTIONS, ShotError, frame_rate
+from ..scene.blender import ShotError, absolute, frame_rate, relative
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
@@ -89,8 +91,6 @@ class ClipSettings:
             "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, "
             "with one image for each frame of the clip"
         ),
-        subtype="FILE_PATH",
-        options=PATH_OPTIONS,
         update=check_changed,
     )
     plate_frames: StringProperty(
@@ -118,8 +118,6 @@ class ClipSettings:
             "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
             "mask_####.png, with one for each frame of the clip"
         ),
-        subtype="FILE_PATH",
-        options=PATH_OPTIONS,
         update=check_changed,
     )
     fps: FloatProperty(
@@ -254,6 +252,30 @@ class SMOKELIFT_OT_plate_from_frame(ActsOnSmoke, RequiresClip, bpy.types.Operato
         settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
 
 
+class SMOKELIFT_OT_choose_picture(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+    """Choose a picture or a video; those of the clip's folder come first"""
+
+    bl_idname = "smokelift.choose_picture"
+    bl_label = "Choose Picture"
+    bl_options = {"REGISTER", "UNDO"}
+
+    setting: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        settings = active_smoke(context.scene).smokelift
+        chosen = getattr(settings, self.setting)
+        self.filepath = str(absolute(chosen)) if chosen else f"{clip_path(settings.clip).parent}{os.sep}"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        setattr(smoke.smokelift, self.setting, relative(absolute(self.filepath)))
+
+
 class SMOKELIFT_OT_clear_plate_frames(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Take none of these frames as the clean plate"""
 
@@ -349,16 +371,23 @@ def _draw_gaps(layout: bpy.types.UILayout, context: bpy.types.Context, settings:
         draw_text(column, context, "A neighboring picture stands in for each.", "BLANK1")
 
 
-def draw_mask(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+def draw_mask(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """The mask that is drawn, and which side of it is smoke; without one, the field for a file."""
     drawn = settings.drawn_mask is not None
     row = layout.row(align=True)
     row.prop(settings, "drawn_mask")
     row.operator("smokelift.new_mask", text="" if drawn else "New", icon="GREASEPENCIL" if drawn else "ADD")
     if drawn:
-        draw_text(layout, context, "Smoke may be inside its lines; outside, if its layer is inverted.", "INFO")
+        layout.label(text="Smoke may be inside its lines", icon="INFO")
     else:
-        layout.prop(settings, "mask", text=" ", placeholder=iface_("white is smoke"))
+        draw_picture(layout, settings, "mask", iface_("white is smoke"))
+
+
+def draw_picture(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str, placeholder: str) -> None:
+    """The path of a picture, and the button that chooses it: Blender's own would list all files."""
+    row = layout.row(align=True)
+    row.prop(settings, name, text=" ", placeholder=placeholder)
+    row.operator("smokelift.choose_picture", text="", icon="FILEBROWSER").setting = name
 
 
 _CLASSES = (
@@ -367,6 +396,7 @@ _CLASSES = (
     SMOKELIFT_OT_match_clip,
     SMOKELIFT_OT_undistort,
     SMOKELIFT_OT_plate_from_frame,
+    SMOKELIFT_OT_choose_picture,
     SMOKELIFT_OT_clear_plate_frames,
     SMOKELIFT_OT_new_mask,
     SMOKELIFT_OT_track_clip,

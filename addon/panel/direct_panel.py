@@ -23,6 +23,9 @@ from .common import (
 )
 from .layout import draw_automatic, draw_closed, draw_progress, draw_ticked
 
+LINES = 11
+"""Lines of the longest direction: the others are as high, or the panel's buttons would move under the pointer."""
+
 EFFECTORS = "Effectors"
 """Name of a collection that the tab makes."""
 
@@ -201,7 +204,8 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row = layout.row()
     row.use_property_split = False
     row.prop(settings, "direction", expand=True)
-    _DIRECTIONS[settings.direction](layout, settings)
+    for _ in range(LINES - _DIRECTIONS[settings.direction](layout, settings)):
+        layout.label(text="")
     label = settings.bl_rna.properties["direction"].enum_items[settings.direction].name
     row = layout.row()
     row.scale_y = 1.5
@@ -209,10 +213,11 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.operator("smokelift.direct", text=text, translate=False, icon="PLAY")
     for job in context.window_manager.smokelift.jobs:
         if job.outcome == "running" and job.smoke_uid == smoke.session_uid:
-            draw_progress(layout, job)
+            draw_progress(layout, job, "smokelift.cancel").take = job.take
 
 
-def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
+    """The settings of a direction; returns the number of their lines."""
     layout.prop(settings, "frames")
     layout.prop(settings, "fade")
     draw_ticked(layout, settings, "use_start", "start")
@@ -225,9 +230,10 @@ def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     row = layout.row()
     row.active = settings.effectors is not None
     row.prop(settings, "fan_speed")
+    return LINES
 
 
-def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
     layout.prop(settings, "speed")
     layout.prop(settings, "use_ramp")
     column = layout.column()
@@ -239,11 +245,13 @@ def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) 
         row = layout.row()
         row.active = settings.live
         row.prop(settings.id_data.smokelift, "between")
+    return 6 if CAN_INTERPOLATE else 5
 
 
-def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
     draw_ticked(layout, settings, "use_part", "part_first", "part_last")
     draw_automatic(layout, settings, "overlap")
+    return 2
 
 
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}

@@ -4,7 +4,6 @@ The engine writes it as OpenEXR, premultiplied and linear. The strokes that help
 painted in the Image Editor, whose sidebar has their colors.
 """
 
-import shutil
 from pathlib import Path
 
 import bpy
@@ -33,9 +32,6 @@ COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0
 
 PICTURES = "element_####.exr"
 """Names of the pictures, numbered as the frames of the clip's file."""
-
-SHOWN = "element.exr"
-"""The picture of a single frame that is shown."""
 
 
 class SMOKELIFT_OT_paint_strokes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
@@ -127,7 +123,14 @@ class SMOKELIFT_PT_strokes(bpy.types.Panel):
 
 
 def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
-    """The engine's arguments for the element of all used frames; its scene file lies among Blender's own."""
+    """The engine's arguments for the element of all used frames; its scene file lies among Blender's own.
+
+    ShotError if the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ShotError(f"{folder} cannot be written to ({error.strerror}): choose another folder.") from error
     take = Take(Path(bpy.app.tempdir) / "smokelift_element")
     take.write(footage_tables(smoke), [])
     return ["extract", str(take.scene_file), "--out", str(folder / PICTURES)]
@@ -140,26 +143,20 @@ class SMOKELIFT_OT_extract(WritesFiles, RequiresClip, bpy.types.Operator):
     bl_label = "Extract"
 
     def request(self, smoke: bpy.types.Object) -> Request:
-        folder, number = _frame_folder(), number_in_file(smoke.smokelift.clip, shown_frame(smoke))
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
-        return [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"], _show_frame
+        folder, frame = smoke_takes.output_folder(smoke) / "element", shown_frame(smoke)
+        number = number_in_file(smoke.smokelift.clip, frame)
+        picture = folder / PICTURES.replace("####", f"{number:04d}")
 
+        def show(_smoke: bpy.types.Object, job: Job) -> None:
+            if job.outcome != "done":
+                return
+            writing_job.sentence = rpt_("Frame {:d} of the clip is in {:s}.").format(frame, str(picture))
+            image = bpy.data.images.load(str(picture), check_existing=True)
+            image.reload()
+            if not bpy.app.background:
+                show_image(image)
 
-def _frame_folder() -> Path:
-    """Where the picture of a single frame is written."""
-    return Path(bpy.app.tempdir) / "smokelift_element"
-
-
-def _show_frame(_smoke: bpy.types.Object, job: Job) -> None:
-    """Show the one picture; always under the same name, so that Blender keeps one of them."""
-    if job.outcome != "done":
-        return
-    (picture,) = _frame_folder().glob(PICTURES.replace("####", "*"))
-    image = bpy.data.images.load(str(picture.replace(_frame_folder() / SHOWN)), check_existing=True)
-    image.reload()
-    if not bpy.app.background:
-        show_image(image)
+        return [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"], show
 
 
 class SMOKELIFT_OT_render_element(WritesFiles, RequiresClip, bpy.types.Operator):
@@ -177,10 +174,6 @@ class SMOKELIFT_OT_render_element(WritesFiles, RequiresClip, bpy.types.Operator)
 
     def request(self, smoke: bpy.types.Object) -> Request:
         folder = Path(self.directory)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ShotError(f"{folder} cannot be written to ({error.strerror}): choose another folder.") from error
 
         def say(_smoke: bpy.types.Object, job: Job) -> None:
             if job.outcome == "done":

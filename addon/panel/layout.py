@@ -38,14 +38,16 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
     column.row(align=True).prop(settings, "closed")
 
 
-def draw_progress(layout: bpy.types.UILayout, work: Any) -> None:
-    """How far a run or a job has come."""
+def draw_progress(layout: bpy.types.UILayout, work: Any, operator: str) -> bpy.types.OperatorProperties:
+    """How far a run or a job has come, and beside it the cross that cancels it, whose properties are returned."""
+    row = layout.row(align=True)
     text = iface_("{:d} of {:d}").format(work.done, work.total) if work.total else iface_("Reading the clip")
     if getattr(work, "cancel", None) is True:
         text = iface_("Stopping")
     elif work.total and (work.seconds_left or -1.0) >= 0.0:
         text = iface_("{:s}, {:s} left").format(text, duration(work.seconds_left))
-    layout.progress(factor=work.done / work.total if work.total else 0.0, text=text, translate=False)
+    row.progress(factor=work.done / work.total if work.total else 0.0, text=text, translate=False)
+    return row.operator(operator, text="", icon="X")
 
 
 def draw_doubt(layout: bpy.types.UILayout, context: bpy.types.Context, kind: str, words: str) -> None:
@@ -81,8 +83,7 @@ def draw_work(
     """The button that has files written; their progress while that is at work, and what it said at its end."""
     own = operator == writing_job.operator
     if own and writing_job.writing:
-        draw_progress(layout, writing_job.job)
-        layout.operator("smokelift.stop_writing", text="Cancel", icon="CANCEL")
+        draw_progress(layout, writing_job.job, "smokelift.stop_writing")
     else:
         layout.operator(operator, icon=icon)
     if own and writing_job.smoke == smoke.session_uid and writing_job.sentence:

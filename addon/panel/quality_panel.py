@@ -97,7 +97,8 @@ class SMOKELIFT_OT_stop_check(ActsOnSmoke, bpy.types.Operator):
 def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """A button for each quality with what it takes and loses; the first drawing of the tab starts the estimate.
 
-    While a change is estimated, the figures of before stay, grayed.
+    While a change is estimated, the figures of before stay, grayed. The line below is one of the same height always,
+    so that nothing moves under the pointer; `draw_check` has the rest.
     """
     state, settings = context.window_manager.smokelift, smoke.smokelift
     checked = shot_check.is_checked(state, smoke)
@@ -124,23 +125,33 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
                 cell.alert = cost.memory > state.memory_free
                 cell.label(text=word, translate=False)
     if not checked:
-        layout.operator("smokelift.check", icon="VIEWZOOM")
         shot_check.check_soon(context)
-    elif state.check_error:
-        draw_failure(layout, context, state.check_error)
+    if not checked or state.check_error:
+        layout.operator("smokelift.check", icon="VIEWZOOM")
     elif not done:
         seconds = shot_check.check_job.seconds
         text = iface_("Reading the clip: {:s}").format(duration(seconds)) if seconds else iface_("Reading the clip")
         row = layout.row(align=True)
         row.label(text=text, translate=False, icon="TIME")
         row.operator("smokelift.stop_check", text="", icon="X")
-    elif (own := costs.get(settings.quality)) is not None:
-        text = iface_("{} x {} x {} voxels").format(*own.resolution)
+    else:
+        own = costs.get(settings.quality)
+        text = iface_("{} x {} x {} voxels").format(*own.resolution) if own is not None else ""
         layout.label(text=text, translate=False, icon="MESH_GRID")
-        if own.memory > state.memory_free:
+
+
+def draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """What the check of this smoke warns of, or why it failed."""
+    state = context.window_manager.smokelift
+    if not shot_check.is_checked(state, smoke):
+        return
+    if state.check_error:
+        draw_failure(layout, context, state.check_error)
+    elif state.check_done:
+        own = state.costs.get(smoke.smokelift.quality) if state.costs_smoke == smoke.session_uid else None
+        if own is not None and own.memory > state.memory_free:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
             draw_text(layout, context, text.format(state.memory_free), "ERROR")
-    if done:
         for doubt in state.doubts:
             draw_doubt(layout, context, doubt.kind, doubt.sentence)
 

@@ -5,14 +5,14 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..core.sentences import disk_size
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
-from ..scene.blender import ShotError, redraw
+from ..scene.blender import ShotError, absolute, redraw
 from ..scene.smoke import active_smoke
 from .common import ActsOnSmoke, RequiresClip, RequiresResult, refuse, sub_panels
 from .layout import draw_text
@@ -66,6 +66,24 @@ class SMOKELIFT_OT_show_beside(ActsOnSmoke, RequiresResult, bpy.types.Operator):
         take = Take(Path(self.take))
         if volume.show_beside(smoke, take) is None:
             raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
+
+
+class SMOKELIFT_OT_choose_results(ActsOnSmoke, RequiresResult, bpy.types.Operator):
+    """Choose the folder that the smoke's results were moved to"""
+
+    bl_idname = "smokelift.choose_results"
+    bl_label = "Choose Moved Folder"
+    bl_options = {"REGISTER", "UNDO"}
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        smoke_takes.move_results(smoke, absolute(self.directory))
 
 
 class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
@@ -144,7 +162,7 @@ def _size(takes: list[Take]) -> str:
 
 def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     shown = volume.shown_take(smoke)
-    found = smoke_takes.own_takes(smoke)
+    found = [take for take in smoke_takes.own_takes(smoke) if take.read().frames]
     column = layout.column(align=True)
     for take in found:
         row = column.row(align=True)
@@ -172,6 +190,7 @@ _CLASSES = (
     SMOKELIFT_OT_show_take,
     SMOKELIFT_OT_switch_take,
     SMOKELIFT_OT_show_beside,
+    SMOKELIFT_OT_choose_results,
     SMOKELIFT_OT_name_take,
     SMOKELIFT_OT_remove_take,
     SMOKELIFT_OT_remove_takes,

@@ -1,6 +1,7 @@
 """Runs in the tab: the buttons that make smoke and stop that, and the queue."""
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -15,7 +16,7 @@ from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import active_smoke, find_smoke
 from .common import ActsOnSmoke, RequiresClip, refuse
 from .layout import draw_doubt, draw_failure, draw_progress, draw_text
-from .quality_panel import SEEDS
+from .quality_panel import SEEDS, draw_check
 
 
 class SMOKELIFT_OT_run(ActsOnSmoke, RequiresClip, bpy.types.Operator):
@@ -98,64 +99,92 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
 
 
 def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """The buttons, whose places do not change; below them the warnings, the runs, and what is known of the result."""
     jobs = context.window_manager.smokelift.jobs
     own = [row for row in jobs if row.smoke_uid == smoke.session_uid]
+    idle, index = all(row.outcome in ENDED for row in own), volume.shown_index(smoke)
+    begun = smoke_takes.unfinished(smoke) if idle else None
+    text = "Start Again" if begun is not None and begun.read().frames else "Make Smoke"
     column = layout.column()
     column.scale_y = 1.5
-    if all(row.outcome in ENDED for row in own):
-        begun = smoke_takes.unfinished(smoke)
-        if begun is not None and begun.read().frames:
-            last = volume.frames_before_take(smoke, begun) + begun.read().frames
-            text = iface_("Resume after Frame {:d}").format(last)
-            column.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
-            column.operator("smokelift.run", text="Start Again", icon="PLAY")
-        else:
-            column.operator("smokelift.run", text="Make Smoke", icon="PLAY")
-    else:
-        column.operator("smokelift.run", text="Make Another After This", icon="PLAY")
+    column.operator("smokelift.run", text=text if idle else "Make Another After This", icon="PLAY")
+    column = layout.column()
+    column.enabled = index is not None
+    column.operator("smokelift.set_up", icon="CAMERA_DATA")
+    row = column.row()
+    row.enabled = index is not None and index["complete"]
+    row.operator("smokelift.vary", icon="MOD_NOISE")
+    draw_check(layout, context, smoke)
     for row in jobs:
         _draw_job(layout, context, smoke, row)
-    if volume.shown_take(smoke) is not None:
-        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
-        seen = volume.shown_range(smoke)
-        if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
-            text = iface_("The smoke is seen in frames {:d} to {:d}.")
-            draw_text(layout, context, text.format(*seen), "INFO")
-        known = volume.provenance_note(smoke)
-        if known:
-            draw_text(layout, context, known, "INFO")
-        index = volume.shown_take(smoke).read().index
-        if index and index["complete"]:
-            layout.operator("smokelift.vary", icon="MOD_NOISE")
-            if lacks_proxy(smoke, index):
-                column = layout.column(align=True)
-                draw_text(column, context, "This smoke is large: a proxy keeps the viewport fast.", "INFO")
-                column.operator("smokelift.make_proxy", icon="MOD_REMESH")
+    if begun is not None:
+        _draw_begun(layout, context, smoke, begun, any(row.take == str(begun.directory) for row in own))
+    if index is not None:
+        _draw_shown(layout, context, smoke, index)
+    elif (take := volume.shown_take(smoke)) is not None:
+        text = iface_("The files of the smoke in {:s} are missing: make it again, or choose their folder.")
+        draw_text(layout, context, text.format(str(take.directory)), "ERROR")
+        layout.operator("smokelift.choose_results", icon="FILE_FOLDER")
+
+
+def _draw_begun(
+    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, take: Take, known: bool
+) -> None:
+    """A run that can go on; one that this session does not know was interrupted by the end of another."""
+    frames = take.read().frames
+    if not known:
+        text = iface_("{:s} was interrupted.") if frames else iface_("{:s} was interrupted before its first frame.")
+        draw_text(layout, context, text.format(take.read().title), "ERROR")
+    if frames:
+        text = iface_("Resume after Frame {:d}").format(volume.frames_before_take(smoke, take) + frames)
+        layout.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
+
+
+def _draw_shown(
+    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, index: dict[str, Any]
+) -> None:
+    """When the result on show is seen, what of it is measured, and a proxy where it is large."""
+    seen = volume.shown_range(smoke)
+    if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
+        text = iface_("The smoke is seen in frames {:d} to {:d}.")
+        draw_text(layout, context, text.format(*seen), "INFO")
+    known = volume.provenance_note(smoke)
+    if known:
+        draw_text(layout, context, known, "INFO")
+    if index["complete"] and lacks_proxy(smoke, index):
+        column = layout.column(align=True)
+        draw_text(column, context, "This smoke is large: a proxy keeps the viewport fast.", "INFO")
+        column.operator("smokelift.make_proxy", icon="MOD_REMESH")
 
 
 def _draw_job(
     layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, row: bpy.types.PropertyGroup
 ) -> None:
-    box = layout.box()
+    """A run, also of another smoke; that one's warnings stand in its own tab."""
+    box, own = layout.box(), row.smoke_uid == shown.session_uid
     smoke = find_smoke(row.smoke_uid)
-    if smoke is not None and smoke != shown:
+    if smoke is not None and not own:
         box.label(text=smoke.name, icon="VOLUME_DATA")
     if row.outcome == "waiting":
-        box.label(text="Queued", icon="SORTTIME")
+        line = box.row(align=True)
+        line.label(text="Queued", icon="SORTTIME")
+        line.operator("smokelift.cancel", text="", icon="X").take = row.take
     elif row.outcome == "running":
-        draw_progress(box, row)
+        draw_progress(box, row, "smokelift.cancel").take = row.take
     elif row.outcome == "failed":
-        draw_failure(box, context, row.sentence)
+        (draw_failure if own else draw_text)(box, context, row.sentence)
     else:
         draw_text(box, context, row.sentence, "INFO")
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
-    if row.outcome in ENDED:
-        for doubt in row.doubts:
-            draw_doubt(box, context, doubt.kind, doubt.sentence)
-        box.operator("smokelift.open_log", icon="TEXT").take = row.take
-    else:
-        box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
+    if row.outcome not in ENDED:
+        return
+    for doubt in row.doubts if own else ():
+        draw_doubt(box, context, doubt.kind, doubt.sentence)
+    take = Take(Path(row.take))
+    if own and row.outcome == "done" and take != volume.shown_take(shown):  # after an undo to before it
+        box.operator("smokelift.show_take", icon="HIDE_OFF").take = row.take
+    box.operator("smokelift.open_log", icon="TEXT").take = row.take
 
 
 register, unregister = bpy.utils.register_classes_factory(

@@ -109,13 +109,44 @@ def write_directed(smoke: bpy.types.Object) -> Take:
 
 
 def _next_take(smoke: bpy.types.Object) -> Take:
-    """The take with the next free number, in a folder that the smoke keeps from now on."""
+    """The take with the next free number, in a folder that the smoke keeps from now on.
+
+    It takes the place of runs that ended before their first frame.
+    """
     separate_duplicate(smoke)
-    folder = output_folder(smoke)
+    folder, in_use = output_folder(smoke), directories_in_use(bpy.context)
+    for take in own_takes(smoke):
+        if take.log_file.is_file() and not take.read().frames and take.directory.resolve() not in in_use:
+            take.remove()
     if not smoke.smokelift.output:
         smoke.smokelift.results = relative(folder)
         _written_to[smoke.session_uid] = smoke.smokelift.folder, folder
     return new_take(folder)
+
+
+def move_results(smoke: bpy.types.Object, folder: Path) -> None:
+    """Show the result on show from the folder that its files were moved to, which holds all of the smoke's from now on.
+
+    Parameters
+    ----------
+    smoke
+        Shows a result whose files are missing.
+    folder
+        Holds the takes, or is the one on show.
+
+    Raises
+    ------
+    ShotError
+        If that result is not there.
+    """
+    settings, name = smoke.smokelift, volume.shown_take(smoke).directory.name
+    take = next((take for take in (Take(folder / name), Take(folder)) if take.directory.name == name), None)
+    if take is None or not take.read().frames:
+        raise ShotError(rpt_("There is no {:s} in {:s}: choose the folder that holds it.").format(name, str(folder)))
+    before = Path(settings.before).name
+    volume.show(smoke, take)
+    setattr(settings, "output" if settings.output else "results", relative(take.directory.parent))
+    settings.before = relative(take.directory.with_name(before)) if before else ""
 
 
 def find_results_again(smoke: bpy.types.Object) -> None:

@@ -72,6 +72,13 @@ def test_a_sentence(message, said) -> None:
     assert sentence(message) == said
 
 
+def test_a_match_before_a_background_that_may_hold_smoke_is_not_praised() -> None:
+    message = {"text": "", "kind": "reconstructed", "figures": {"frames": 12, "seconds": 28.2, "psnr": 35.6}}
+    said = sentence(message, doubts=["cut", "smoke in the background"])
+    assert "35.6 dB" in said and "good" not in said
+    assert "very good" in sentence(message, doubts=["cut"])
+
+
 @pytest.mark.parametrize(
     ("seconds", "said"), [(0.2, "1 s"), (59.4, "59 s"), (59.6, "1 min 0 s"), (387, "6 min 27 s"), (7380, "2 h 3 min")]
 )

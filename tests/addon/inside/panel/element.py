@@ -49,23 +49,24 @@ def asked(shot, tmp_path, monkeypatch) -> Callable[[], tuple[list[str], dict[str
     return read
 
 
-def test_extract_shows_the_element_of_this_frame(shot, asked) -> None:
+def test_extract_shows_the_element_of_this_frame(shot, asked, tmp_path) -> None:
     shot.frame_set(24)
     smoke(shot).smokelift.camera_mode = "SCENE"
     smoke(shot).smokelift.box = None  # it takes no box to see the element
     assert bpy.ops.smokelift.extract() == {"FINISHED"}
     words, tables = asked()
-    folder = Path(bpy.app.tempdir) / "smokelift_element"
-    scene, out = str(folder.with_suffix(".toml")), str(folder / "element_####.exr")
+    folder = tmp_path / "out" / "element"
+    scene, out = str(Path(bpy.app.tempdir) / "smokelift_element.toml"), str(folder / "element_####.exr")
     assert words == ["extract", scene, "--out", out, "--frames", "23:23", "--progress", "json"]
     assert sorted(tables) == ["background", "clip"]
-    image = bpy.data.images["element.exr"]
+    picture = folder / "element_0023.exr"  # as Render Element names it
+    assert side_job.writing_job.sentence == f"Frame 24 of the clip is in {picture}."
+    image = bpy.data.images[picture.name]
     assert image.alpha_mode == "PREMUL"
     assert list(image.pixels)[:4] == pytest.approx([0.25, 0.0, 0.0, 0.5])
     assert side_job.writing_job.doubts == [("", "The plate is noisy.")]
-    shot.frame_set(25)
     assert bpy.ops.smokelift.extract() == {"FINISHED"}
-    assert [image.name for image in bpy.data.images if "element" in image.name] == ["element.exr"]
+    assert [image.name for image in bpy.data.images if "element" in image.name] == [picture.name]
 
 
 def test_a_frame_without_the_clip_has_no_element(shot, asked) -> None:

@@ -10,6 +10,7 @@ from addon.core.contract import MOVING_CAMERA, QUALITIES
 from addon.result import command_line, shot_check
 from addon.scene import volume
 from addon.scene.clip import clip_table
+from addon.scene.smoke import active_smoke, new_smoke
 from conftest import changed, made
 from tests.example_shot import smoke
 
@@ -44,6 +45,7 @@ def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[s
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
     context = SimpleNamespace(
         scene=scene,
+        window=None,
         region=SimpleNamespace(width=WIDTH),
         preferences=preferences,
         tool_settings=SimpleNamespace(image_paint=SimpleNamespace(brush=brush)),
@@ -199,7 +201,7 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     assert "[new_mask]" in texts[:place]  # beside Mask
     assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
     assert "There is a cut." in texts[place + 3 : place + 6]
-    assert texts.index("There is a cut.") < texts.index("[run]")
+    assert texts.index("[vary]") < place  # the buttons stay where they are
     smoke(shot).smokelift.albedo = 0.5
     state.check_smoke = smoke(shot).session_uid
     assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
@@ -219,21 +221,69 @@ def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot) -> N
     assert "[track_clip]" not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
 
 
-def test_the_next_step_stands_right_below_a_run(shot, tmp_path) -> None:
+def buttons(texts: list[str]) -> int:
+    """Lines from the top of the tab to the last button that makes something."""
+    return texts.index("[vary]")
+
+
+def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_path) -> None:
+    """Whatever the check and the runs say stands below them; those of another smoke warn in its own tab."""
     state = bpy.context.window_manager.smokelift
-    volume.show(smoke(shot), made(tmp_path))
-    for outcome in ("done", "waiting"):
-        row = state.jobs.add()
-        row.smoke_uid, row.outcome, row.sentence = (
-            smoke(shot).session_uid,
-            outcome,
-            "Match to the clip: good (29.0 dB).",
-        )
+    refused, doubt = f"{MOVING_CAMERA} from the clip.", [("not all is smoke", "A person moves.")]
     state.check_smoke = smoke(shot).session_uid
-    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.strip()]
-    end = texts.index("[set_up]")
-    assert texts[end - 4 : end] == ["[open_log]", "Queued", "[cancel]", "Cancel"]
-    assert "Smoke from Video..." in texts
+    places = [buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view))]
+    state.check_error = refused
+    texts = drawn(shot, bpy.types.SMOKELIFT_PT_view)
+    assert buttons(texts) < texts.index("[track_clip]")
+    state.check_error = ""
+    volume.show(smoke(shot), made(tmp_path))
+    for outcome in ("done", "waiting", "running", "failed"):
+        row = state.jobs.add()
+        row.take, row.outcome, row.sentence = str(tmp_path / outcome), outcome, refused
+        row.smoke_uid = smoke(shot).session_uid
+        shot_check.store_doubts(row, doubt)
+        places.append(buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view)))
+    assert len(set(places)) == 1
+    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 2
+    assert {"[track_clip]", "[show_take]"} <= set(texts)
+    for row in state.jobs:
+        row.smoke_uid += 1
+    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    assert texts.count("[cancel]") == 2
+    assert not {"A person moves.", "[track_clip]", "[show_take]"} & set(texts)
+
+
+def test_a_run_that_is_made_has_its_cross_beside_it(shot, tmp_path) -> None:
+    volume.show(smoke(shot), made(tmp_path))
+    row = bpy.context.window_manager.smokelift.jobs.add()
+    row.take, row.outcome, row.smoke_uid = str(tmp_path / "take_0002"), "running", smoke(shot).session_uid
+    assert "[cancel]" in drawn(shot, bpy.types.SMOKELIFT_PT_view_direct)
+
+
+def test_warnings_are_those_of_the_smoke_in_the_tab(shot) -> None:
+    state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
+    state.check_smoke = smoke(shot).session_uid
+    shot_check._store(state, {**each, "qualities": dict.fromkeys(QUALITIES, each)}, [("cut", "There is a cut.")])
+    assert "There is a cut." in " ".join(drawn(shot, bpy.types.SMOKELIFT_PT_view))
+    other = new_smoke(shot, smoke(shot).smokelift.clip)
+    assert active_smoke(shot) == other
+    assert "There is a cut." not in " ".join(drawn(shot, bpy.types.SMOKELIFT_PT_view))
+
+
+@pytest.mark.parametrize("name", ["plate", "mask"])
+def test_pictures_are_chosen_among_pictures(shot, tmp_path, name) -> None:
+    """Blender's own button beside a path would list all files."""
+    settings = smoke(shot).smokelift
+    assert settings.bl_rna.properties[name].subtype == "NONE"
+    kind = bpy.ops.smokelift.choose_picture.get_rna_type().properties
+    assert kind["filter_image"].default and kind["filter_movie"].default
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke = smoke(shot).session_uid  # no check is under way
+    assert drawn(shot, bpy.types.SMOKELIFT_PT_view).count("[choose_picture]") == 2
+    assert bpy.ops.smokelift.choose_picture(setting=name, filepath=str(tmp_path / "a.png")) == {"FINISHED"}
+    assert getattr(settings, name) == str(tmp_path / "a.png")
 
 
 def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:

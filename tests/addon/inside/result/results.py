@@ -12,6 +12,7 @@ from addon.result import smoke_takes
 from addon.scene import volume
 from addon.scene.blender import absolute
 from conftest import changed, made
+from tests.addon.inside.panel.tab import drawn
 from tests.example_shot import EXAMPLE, smoke
 
 
@@ -147,6 +148,51 @@ def test_results_of_a_file_that_was_never_saved_are_its(shot, tmp_path) -> None:
     assert own() == [1, 2]
 
 
+def test_results_that_were_moved_are_said_to_be_missing_and_found_in_their_new_folder(project) -> None:
+    earlier, take = finished(), finished()
+    show(earlier)
+    show(take)
+    bpy.ops.wm.save_mainfile()
+    (project / "archive").mkdir()
+    folder = take.directory.parent.rename(project / "archive" / "smoke")
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    scene = bpy.context.scene
+
+    def said() -> str:
+        bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
+        return " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
+
+    assert "are missing" in said() and "[choose_results]" in said()
+    with pytest.raises(RuntimeError, match="There is no take_0002"):
+        bpy.ops.smokelift.choose_results(directory=str(project))
+    assert bpy.ops.smokelift.choose_results(directory=str(folder)) == {"FINISHED"}
+    assert volume.shown_take(smoke(scene)) == Take(folder / take.directory.name)
+    assert volume.take_before(smoke(scene)) == Take(folder / earlier.directory.name)
+    assert own() == [1, 2] and "are missing" not in said()
+
+
+@pytest.mark.parametrize("frames", [0, 6])
+def test_a_run_that_was_interrupted_is_said_when_its_file_is_opened(project, frames) -> None:
+    """It goes on from its frames; one without any is in no list, and the next run takes its place."""
+    show(finished())
+    take = finished()
+    take.log_file.touch()
+    with changed(take) as index:
+        index["complete"], index["frames"] = False, {str(n): {} for n in range(1, frames + 1)}
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    scene = bpy.context.scene
+    bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
+    said = " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
+    assert "Take 2 was interrupted" in said
+    assert ("[resume]" in said) == ("before its first frame" not in said) == bool(frames)
+    listed = drawn(scene, bpy.types.SMOKELIFT_PT_view_results)
+    assert listed.count("[show_take]") == (2 if frames else 1)
+    assert smoke_takes.write_take(smoke(scene)) == Take(
+        take.directory.with_name("take_0003" if frames else "take_0002")
+    )
+
+
 @pytest.mark.parametrize("moved", [False, True])
 def test_undo_after_saving_elsewhere_finds_all_files(project, moved) -> None:
     """Clip, Volume, pictures, results and what was chosen lead where they led, however often one goes back and forth.
@@ -215,3 +261,10 @@ def test_undo_to_before_a_run_finds_its_result(project, saved_elsewhere) -> None
     assert obj.location.x == 0.0
     assert smoke_takes.output_folder(obj) == take.directory.parent
     assert own() == [1]
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke = obj.session_uid  # no check is under way
+    row = state.jobs.add()
+    row.take, row.outcome, row.smoke_uid = str(take.directory), "done", obj.session_uid
+    assert "[show_take]" in drawn(bpy.context.scene, bpy.types.SMOKELIFT_PT_view)  # beside what the run said
+    show(take)
+    assert volume.shown_take(obj) == take
