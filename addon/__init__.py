@@ -31,18 +31,20 @@ def register() -> None:
     from .core.job import require_fitting_zip
 
     require_fitting_zip()
-    for module in _modules():
-        module.register()
+    from .scene.blender import register_modules
+
+    register_modules(_modules())
 
 
 def unregister() -> None:
     """Unregister them."""
-    for module in reversed(_modules()):
-        module.unregister()
+    from .scene.blender import unregister_modules
+
+    unregister_modules(_modules())
 
 
 def _modules() -> tuple[ModuleType, ...]:
-    """Modules with something to register, each after those it needs; panels in the order of the tab."""
+    """Modules with classes or more to register, each after those it needs; panels in the order of the tab."""
     from .panel import (
         advanced_panel,
         camera_panel,

@@ -52,6 +52,4 @@ def _draw_advanced(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
     layout.operator("smokelift.check", icon="VIEWZOOM")
 
 
-register, unregister = bpy.utils.register_classes_factory(
-    sub_panels("advanced", "Advanced", _draw_advanced, RequiresClip)
-)
+PANELS = sub_panels("advanced", "Advanced", _draw_advanced, RequiresClip)

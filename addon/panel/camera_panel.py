@@ -13,7 +13,7 @@ from ..scene.floor import Floor
 from ..scene.shot_setup import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, closed_sides, refuse
+from .common import ChangesScene, RequiresClip, automatic_unless, check_changed, closed_sides, refuse
 from .layout import draw_automatic, draw_closed
 
 USUAL_DISTANCE = 2.0
@@ -127,12 +127,10 @@ class ShotSettings:
     )
 
 
-class SMOKELIFT_OT_make_box(ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_make_box(ChangesScene, bpy.types.Operator):
     """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
 
-    bl_idname = "smokelift.make_box"
     bl_label = "Frame Box"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -259,6 +257,3 @@ def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     draw_automatic(row, settings, "distance").operator("smokelift.place", text="", icon="EYEDROPPER")
     layout.prop(settings, "light_mode")
     draw_closed(layout, settings)
-
-
-register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_make_box, SMOKELIFT_OT_place))

@@ -6,7 +6,6 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import (
-    BoolProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -21,7 +20,7 @@ from ..scene.blender import ShotError, absolute, frame_rate, relative
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
-from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed, refuse
+from .common import ActsOnSmoke, ChangesScene, ChoosesFile, RequiresClip, automatic_unless, check_changed, refuse
 from .editors import open_tab, show_clip
 from .layout import draw_text
 
@@ -141,23 +140,13 @@ class ClipSettings:
     )
 
 
-class SMOKELIFT_OT_add(ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_add(ChoosesFile, ChangesScene, bpy.types.Operator):
     """Add smoke that is made from a video or an image sequence"""
 
-    bl_idname = "smokelift.add"
     bl_label = "Smoke from Video"
-    bl_options = {"REGISTER", "UNDO"}
 
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        if self.filepath:  # of a video that was dropped
-            return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self.execute(context) if self.filepath else super().invoke(context, event)  # of a video that was dropped
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         unreadable = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
@@ -178,36 +167,30 @@ def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(SMOKELIFT_OT_add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
 
 
-class SMOKELIFT_OT_use_all_files(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_use_all_files(ChangesScene, RequiresClip, bpy.types.Operator):
     """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
 
-    bl_idname = "smokelift.use_all_files"
     bl_label = "Use All Files"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
         settings.last = frame_count(settings.clip)
 
 
-class SMOKELIFT_OT_match_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_match_clip(ChangesScene, RequiresClip, bpy.types.Operator):
     """Set the scene's resolution and frame rate to the clip's, and its length to the result's or its part in use"""
 
-    bl_idname = "smokelift.match_clip"
     bl_label = "Match Scene to Clip"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         shot_setup.match_clip(smoke)
         shot_check.check_again(context)
 
 
-class SMOKELIFT_OT_undistort(ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_undistort(ChangesScene, bpy.types.Operator):
     """Write the clip without its lens's distortion, and use that. Blender waits meanwhile"""
 
-    bl_idname = "smokelift.undistort"
     bl_label = "Undistort Clip"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -236,12 +219,10 @@ class SMOKELIFT_OT_undistort(ActsOnSmoke, bpy.types.Operator):
             setattr(settings, name, value)
 
 
-class SMOKELIFT_OT_plate_from_frame(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_plate_from_frame(ChangesScene, RequiresClip, bpy.types.Operator):
     """Take this frame of the clip, in which there is no smoke, as the clean plate. More frames lessen the noise"""
 
-    bl_idname = "smokelift.plate_from_frame"
     bl_label = "Plate from This Frame"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
@@ -252,48 +233,37 @@ class SMOKELIFT_OT_plate_from_frame(ActsOnSmoke, RequiresClip, bpy.types.Operato
         settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
 
 
-class SMOKELIFT_OT_choose_picture(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, RequiresClip, bpy.types.Operator):
     """Choose a picture or a video; those of the clip's folder come first"""
 
-    bl_idname = "smokelift.choose_picture"
     bl_label = "Choose Picture"
-    bl_options = {"REGISTER", "UNDO"}
 
     setting: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         settings = active_smoke(context.scene).smokelift
         chosen = getattr(settings, self.setting)
         self.filepath = str(absolute(chosen)) if chosen else f"{clip_path(settings.clip).parent}{os.sep}"
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        return super().invoke(context, event)
 
     def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         setattr(smoke.smokelift, self.setting, relative(absolute(self.filepath)))
 
 
-class SMOKELIFT_OT_clear_plate_frames(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_clear_plate_frames(ChangesScene, RequiresClip, bpy.types.Operator):
     """Take none of these frames as the clean plate"""
 
-    bl_idname = "smokelift.clear_plate_frames"
     bl_label = "Clear Frames"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
         settings.plate_frames, settings.plate_mode = "", "ESTIMATE"
 
 
-class SMOKELIFT_OT_new_mask(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_new_mask(ChangesScene, RequiresClip, bpy.types.Operator):
     """Draw over the clip, in the Clip Editor, where smoke may be. Where the mask is black there is none"""
 
-    bl_idname = "smokelift.new_mask"
     bl_label = "New Mask"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         settings = smoke.smokelift
@@ -312,7 +282,6 @@ class SMOKELIFT_OT_new_mask(ActsOnSmoke, RequiresClip, bpy.types.Operator):
 class SMOKELIFT_OT_track_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Open the clip in the Clip Editor, where its camera is tracked, or the picture stabilized (Stabilization)"""
 
-    bl_idname = "smokelift.track_clip"
     bl_label = "Track or Stabilize"
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -390,27 +359,10 @@ def draw_picture(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
     row.operator("smokelift.choose_picture", text="", icon="FILEBROWSER").setting = name
 
 
-_CLASSES = (
-    SMOKELIFT_OT_add,
-    SMOKELIFT_OT_use_all_files,
-    SMOKELIFT_OT_match_clip,
-    SMOKELIFT_OT_undistort,
-    SMOKELIFT_OT_plate_from_frame,
-    SMOKELIFT_OT_choose_picture,
-    SMOKELIFT_OT_clear_plate_frames,
-    SMOKELIFT_OT_new_mask,
-    SMOKELIFT_OT_track_clip,
-)
-
-_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
-
-
 def register() -> None:
-    """Register the operators and what is in Blender's menus."""
-    _register()
+    """Add the entry to Blender's menu."""
     bpy.types.VIEW3D_MT_volume_add.append(_draw_add)
 
 
 def unregister() -> None:
     bpy.types.VIEW3D_MT_volume_add.remove(_draw_add)
-    _unregister()

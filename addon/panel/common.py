@@ -1,10 +1,10 @@
 """What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..core.contract import SIDES
 from ..core.job import EngineMissingError
@@ -53,7 +53,12 @@ class RequiresClipAndResult(RequiresClip, RequiresResult):
 
 
 class ActsOnSmoke:
-    """An operator on the active smoke, which reports what is in the way."""
+    """An operator on the active smoke, which reports what is in the way. Its identifier is that of its class."""
+
+    bl_idname: str
+
+    def __init_subclass__(cls) -> None:
+        cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         """Do it; ShotError or TakeError if something is in the way."""
@@ -66,6 +71,36 @@ class ActsOnSmoke:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+class ChangesScene(ActsOnSmoke):
+    """One that can be undone, and adjusted."""
+
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+
+class ChoosesFile:
+    """An operator that asks for a picture or a video."""
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class ChoosesFolder:
+    """An operator that asks for a folder."""
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
 
 
 class WritesFiles(ActsOnSmoke):
@@ -112,7 +147,13 @@ def sub_panels(name: str, label: str, draw: Draw, requires: type) -> tuple[type,
         panel.layout.use_property_decorate = False
         draw(panel.layout, context, active_smoke(context.scene))
 
-    both = {"bl_category": "Smokelift", "bl_region_type": "UI", "bl_options": {"DEFAULT_CLOSED"}, "bl_label": label}
+    both = {
+        "__module__": draw.__module__,
+        "bl_category": "Smokelift",
+        "bl_region_type": "UI",
+        "bl_options": {"DEFAULT_CLOSED"},
+        "bl_label": label,
+    }
     return tuple(
         type(
             f"SMOKELIFT_PT_{editor}_{name}",

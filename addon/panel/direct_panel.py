@@ -13,6 +13,7 @@ from ..scene.modifiers import CAN_INTERPOLATE
 from ..scene.smoke import active_smoke
 from .common import (
     ActsOnSmoke,
+    ChangesScene,
     RequiresClipAndResult,
     RequiresResult,
     automatic_unless,
@@ -50,7 +51,7 @@ def _speed(name: str, description: str, default: float) -> Any:
     return FloatProperty(name=name, description=description, default=default, update=speed_changed, **limits)
 
 
-class SmokeliftDirecting(bpy.types.PropertyGroup):
+class DirectSettings:
     """What is made of the result on show."""
 
     direction: EnumProperty(
@@ -159,7 +160,6 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
 class SMOKELIFT_OT_direct(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator):
     """Make a new result of the one on show: longer, at another speed, or repeating. The one on show stays"""
 
-    bl_idname = "smokelift.direct"
     bl_label = "Direct Smoke"
     bl_options = {"UNDO"}
 
@@ -168,12 +168,10 @@ class SMOKELIFT_OT_direct(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator
         run_queue.enqueue(context, smoke, take)
 
 
-class SMOKELIFT_OT_add_effectors(ActsOnSmoke, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_add_effectors(ChangesScene, RequiresResult, bpy.types.Operator):
     """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
 
-    bl_idname = "smokelift.add_effectors"
     bl_label = "Add Selected to Effectors"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -257,6 +255,4 @@ def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
 
 
-register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_direct, SMOKELIFT_OT_add_effectors, *sub_panels("direct", "Direct", _draw_direct, RequiresResult))
-)
+PANELS = sub_panels("direct", "Direct", _draw_direct, RequiresResult)

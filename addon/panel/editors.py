@@ -25,7 +25,6 @@ LOG_TEXT = "Smokelift Log"
 class SMOKELIFT_OT_open_log(ActsOnSmoke, bpy.types.Operator):
     """Show the log of the run in a text editor"""
 
-    bl_idname = "smokelift.open_log"
     bl_label = "Open Log"
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
@@ -44,7 +43,6 @@ class SMOKELIFT_OT_open_log(ActsOnSmoke, bpy.types.Operator):
 class SMOKELIFT_OT_show_page(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Show on a page all that was found in the clip and assumed: box and light, background, smoke, doubts"""
 
-    bl_idname = "smokelift.show_page"
     bl_label = "Report"
 
     @classmethod
@@ -134,6 +132,3 @@ def _choose_tab(area_pointer: int, end: float) -> float | None:
         return DRAWN_SECONDS
     area.tag_redraw()
     return None
-
-
-register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_open_log, SMOKELIFT_OT_show_page))

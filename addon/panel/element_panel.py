@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import EnumProperty
 
 from ..core.job import Job
 from ..core.take import Take
@@ -20,7 +20,7 @@ from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
-from .common import ActsOnSmoke, RequiresClip, WritesFiles, sub_panels
+from .common import ChangesScene, ChoosesFolder, RequiresClip, WritesFiles, sub_panels
 from .editors import open_tab, show_image
 from .layout import draw_text, draw_work
 
@@ -34,12 +34,10 @@ PICTURES = "element_####.exr"
 """Names of the pictures, numbered as the frames of the clip's file."""
 
 
-class SMOKELIFT_OT_paint_strokes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_paint_strokes(ChangesScene, RequiresClip, bpy.types.Operator):
     """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
 
-    bl_idname = "smokelift.paint_strokes"
     bl_label = "Paint Strokes"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         now = context.scene.frame_current
@@ -139,7 +137,6 @@ def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
 class SMOKELIFT_OT_extract(WritesFiles, RequiresClip, bpy.types.Operator):
     """Show the smoke of this frame by itself, with alpha, as Render Element would write it"""
 
-    bl_idname = "smokelift.extract"
     bl_label = "Extract"
 
     def request(self, smoke: bpy.types.Object) -> Request:
@@ -159,18 +156,10 @@ class SMOKELIFT_OT_extract(WritesFiles, RequiresClip, bpy.types.Operator):
         return [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"], show
 
 
-class SMOKELIFT_OT_render_element(WritesFiles, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_render_element(ChoosesFolder, WritesFiles, RequiresClip, bpy.types.Operator):
     """Write the smoke of all frames by itself, with alpha, as an image sequence (OpenEXR, linear, premultiplied)"""
 
-    bl_idname = "smokelift.render_element"
     bl_label = "Render Element"
-
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     def request(self, smoke: bpy.types.Object) -> Request:
         folder = Path(self.directory)
@@ -194,13 +183,4 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
         draw_work(layout, context, smoke, operator, icon)
 
 
-register, unregister = bpy.utils.register_classes_factory(
-    (
-        SMOKELIFT_OT_paint_strokes,
-        SMOKELIFT_OT_stroke,
-        SMOKELIFT_PT_strokes,
-        SMOKELIFT_OT_extract,
-        SMOKELIFT_OT_render_element,
-        *sub_panels("element", "Element", _draw_element, RequiresClip),
-    )
-)
+PANELS = sub_panels("element", "Element", _draw_element, RequiresClip)

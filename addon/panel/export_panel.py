@@ -1,7 +1,7 @@
 """The sub-panel Export: the settings of an export, and the buttons for that, for a proxy and for a copy in time."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..core.job import Job
 from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
@@ -12,12 +12,12 @@ from .common import RequiresResult, WritesFiles, refuse, sub_panels
 from .layout import draw_text, draw_work
 
 
-def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
+def _changed(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     size_estimate.ask(settings.id_data)
 
 
-class SmokeliftExport(bpy.types.PropertyGroup):
-    """What is exported of a smoke, on its object."""
+class ExportSettings:
+    """What is exported of a smoke."""
 
     folder: StringProperty(
         name="Folder",
@@ -63,7 +63,6 @@ class SmokeliftExport(bpy.types.PropertyGroup):
 class SMOKELIFT_OT_export(WritesFiles, RequiresResult, bpy.types.Operator):
     """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
 
-    bl_idname = "smokelift.export"
     bl_label = "Export Smoke"
 
     def request(self, smoke: bpy.types.Object) -> Request:
@@ -78,7 +77,6 @@ def _complete(smoke: bpy.types.Object, job: Job) -> None:
 class SMOKELIFT_OT_make_proxy(WritesFiles, RequiresResult, bpy.types.Operator):
     """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
 
-    bl_idname = "smokelift.make_proxy"
     bl_label = "Make Proxy"
 
     def request(self, smoke: bpy.types.Object) -> Request:
@@ -135,23 +133,4 @@ class SMOKELIFT_OT_add_instance(bpy.types.Operator):
         return {"FINISHED"}
 
 
-_CLASSES = (
-    SmokeliftExport,
-    SMOKELIFT_OT_export,
-    SMOKELIFT_OT_make_proxy,
-    SMOKELIFT_OT_add_instance,
-    *sub_panels("export", "Export", _draw_export, RequiresResult),
-)
-
-_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
-
-
-def register() -> None:
-    """Register the settings, operators and panels."""
-    _register()
-    bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
-
-
-def unregister() -> None:
-    del bpy.types.Object.smokelift_export
-    _unregister()
+PANELS = sub_panels("export", "Export", _draw_export, RequiresResult)

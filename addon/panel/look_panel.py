@@ -7,7 +7,7 @@ from ..scene import look, volume
 from ..scene.blender import ShotError
 from ..scene.modifiers import in_viewport, proxy_modifier
 from ..scene.smoke import is_override, smoke_with_look
-from .common import ActsOnSmoke, RequiresResult, sub_panels
+from .common import ChangesScene, RequiresResult, sub_panels
 from .layout import draw_text, draw_work
 
 SHORT = {"Absorption Color": "Absorption"}
@@ -22,12 +22,10 @@ class RequiresLook(RequiresResult):
         return is_override(smoke_with_look(context.scene)) or super().poll(context)
 
 
-class SMOKELIFT_OT_use_look(ActsOnSmoke, RequiresLook, bpy.types.Operator):
+class SMOKELIFT_OT_use_look(ChangesScene, RequiresLook, bpy.types.Operator):
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
 
-    bl_idname = "smokelift.use_look"
     bl_label = "Use Look"
-    bl_options = {"REGISTER", "UNDO"}
 
     preset: EnumProperty(
         name="Preset",
@@ -87,6 +85,4 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
         draw_text(column, context, text, "INFO")
 
 
-register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_use_look, *sub_panels("look", "Look", _draw_look, RequiresLook))
-)
+PANELS = sub_panels("look", "Look", _draw_look, RequiresLook)

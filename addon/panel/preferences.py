@@ -128,8 +128,3 @@ class SMOKELIFT_FH_video(bpy.types.FileHandler):
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
         return context.area is not None and context.area.type in ("VIEW_3D", "CLIP_EDITOR")
-
-
-register, unregister = bpy.utils.register_classes_factory(
-    (SmokeliftPreferences, SMOKELIFT_OT_open_manual, SMOKELIFT_PT_presets, SMOKELIFT_OT_add_preset, SMOKELIFT_FH_video)
-)

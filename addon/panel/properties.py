@@ -15,9 +15,18 @@ from ..scene.blender import PATH_OPTIONS
 from .advanced_panel import PlaybackSettings
 from .camera_panel import ShotSettings
 from .clip_panel import ClipSettings
-from .direct_panel import SmokeliftDirecting
+from .direct_panel import DirectSettings
+from .export_panel import ExportSettings
 from .quality_panel import QualitySettings
 from .setup_panel import SetUpSettings
+
+
+class SmokeliftDirecting(DirectSettings, bpy.types.PropertyGroup):
+    """What is made of the result on show."""
+
+
+class SmokeliftExport(ExportSettings, bpy.types.PropertyGroup):
+    """What is exported of a smoke, on its Volume object."""
 
 
 class SmokeliftSettings(
@@ -96,25 +105,14 @@ class SmokeliftState(bpy.types.PropertyGroup):
     memory_free: FloatProperty(description="GiB")
 
 
-_CLASSES = (
-    SmokeliftDirecting,
-    SmokeliftSettings,
-    SmokeliftDoubt,
-    SmokeliftJob,
-    SmokeliftCost,
-    SmokeliftState,
-)
-
-
 def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    """Give objects their settings, and the session its state."""
     bpy.types.Object.smokelift = PointerProperty(type=SmokeliftSettings)
+    bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
     bpy.types.WindowManager.smokelift = PointerProperty(type=SmokeliftState)
 
 
 def unregister() -> None:
     del bpy.types.WindowManager.smokelift
+    del bpy.types.Object.smokelift_export
     del bpy.types.Object.smokelift
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)

@@ -75,7 +75,6 @@ class QualitySettings:
 class SMOKELIFT_OT_check(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Estimate time, memory and disk space of the run, and list its assumptions"""
 
-    bl_idname = "smokelift.check"
     bl_label = "Check Shot"
     bl_options = {"INTERNAL"}
 
@@ -86,7 +85,6 @@ class SMOKELIFT_OT_check(ActsOnSmoke, RequiresClip, bpy.types.Operator):
 class SMOKELIFT_OT_stop_check(ActsOnSmoke, bpy.types.Operator):
     """Stop reading the clip; Make Smoke and all settings work without the estimate"""
 
-    bl_idname = "smokelift.stop_check"
     bl_label = "Stop Reading"
     bl_options = {"INTERNAL"}
 
@@ -184,6 +182,3 @@ def _brief_fraction(fraction: float) -> str:
 def _brief(value: float, unit: str) -> str:
     """To two digits at least: a cell of the table holds six letters."""
     return f"{value:.1f} {unit}" if value < 9.95 else f"{value:.0f} {unit}"
-
-
-register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_check, SMOKELIFT_OT_stop_check))

@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import StringProperty
 
 from ..core.sentences import disk_size
 from ..core.take import Take
@@ -14,16 +14,14 @@ from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import ShotError, absolute, redraw
 from ..scene.smoke import active_smoke
-from .common import ActsOnSmoke, RequiresClip, RequiresResult, refuse, sub_panels
+from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, RequiresClip, RequiresResult, refuse, sub_panels
 from .layout import draw_text
 
 
-class SMOKELIFT_OT_show_take(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_show_take(ChangesScene, RequiresClip, bpy.types.Operator):
     """Show this result in the smoke. Its place and its material stay as they are"""
 
-    bl_idname = "smokelift.show_take"
     bl_label = "Show Result"
-    bl_options = {"REGISTER", "UNDO"}
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
@@ -34,12 +32,10 @@ class SMOKELIFT_OT_show_take(ActsOnSmoke, RequiresClip, bpy.types.Operator):
         smoke_takes.choose(smoke, take)
 
 
-class SMOKELIFT_OT_switch_take(ActsOnSmoke, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_switch_take(ChangesScene, RequiresResult, bpy.types.Operator):
     """Show the result that was shown before. Press again to come back"""
 
-    bl_idname = "smokelift.switch_take"
     bl_label = "Previous Result"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -53,12 +49,10 @@ class SMOKELIFT_OT_switch_take(ActsOnSmoke, RequiresResult, bpy.types.Operator):
         smoke_takes.choose(smoke, volume.take_before(smoke))
 
 
-class SMOKELIFT_OT_show_beside(ActsOnSmoke, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_show_beside(ChangesScene, RequiresResult, bpy.types.Operator):
     """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
 
-    bl_idname = "smokelift.show_beside"
     bl_label = "Show Beside"
-    bl_options = {"REGISTER", "UNDO"}
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
@@ -68,19 +62,10 @@ class SMOKELIFT_OT_show_beside(ActsOnSmoke, RequiresResult, bpy.types.Operator):
             raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
 
 
-class SMOKELIFT_OT_choose_results(ActsOnSmoke, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, RequiresResult, bpy.types.Operator):
     """Choose the folder that the smoke's results were moved to"""
 
-    bl_idname = "smokelift.choose_results"
     bl_label = "Choose Moved Folder"
-    bl_options = {"REGISTER", "UNDO"}
-
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         smoke_takes.move_results(smoke, absolute(self.directory))
@@ -89,7 +74,6 @@ class SMOKELIFT_OT_choose_results(ActsOnSmoke, RequiresResult, bpy.types.Operato
 class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
     """Give this result a name"""
 
-    bl_idname = "smokelift.name_take"
     bl_label = "Name Result"
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
@@ -107,7 +91,6 @@ class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
 class SMOKELIFT_OT_remove_take(ActsOnSmoke, bpy.types.Operator):
     """Delete the files of this result"""
 
-    bl_idname = "smokelift.remove_take"
     bl_label = "Delete Result?"
 
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
@@ -126,7 +109,6 @@ class SMOKELIFT_OT_remove_take(ActsOnSmoke, bpy.types.Operator):
 class SMOKELIFT_OT_remove_takes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Delete results that nothing needs."""
 
-    bl_idname = "smokelift.remove_takes"
     bl_description = (
         "Delete the files of the results before the one on show. What a Volume of this file shows, what another result "
         "was made of and what other files may show stays"
@@ -186,15 +168,4 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row.operator("smokelift.remove_takes", text=text, translate=False)
 
 
-_CLASSES = (
-    SMOKELIFT_OT_show_take,
-    SMOKELIFT_OT_switch_take,
-    SMOKELIFT_OT_show_beside,
-    SMOKELIFT_OT_choose_results,
-    SMOKELIFT_OT_name_take,
-    SMOKELIFT_OT_remove_take,
-    SMOKELIFT_OT_remove_takes,
-    *sub_panels("results", "Results", _draw_results, RequiresClip),
-)
-
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+PANELS = sub_panels("results", "Results", _draw_results, RequiresClip)

@@ -22,7 +22,6 @@ from .quality_panel import SEEDS, draw_check
 class SMOKELIFT_OT_run(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
 
-    bl_idname = "smokelift.run"
     bl_label = "Make Smoke"
     bl_options = {"UNDO"}
 
@@ -33,7 +32,6 @@ class SMOKELIFT_OT_run(ActsOnSmoke, RequiresClip, bpy.types.Operator):
 class SMOKELIFT_OT_vary(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Make the smoke again with the next variation: it looks the same from the camera, and different from the side"""
 
-    bl_idname = "smokelift.vary"
     bl_label = "Another Variation"
     bl_options = {"UNDO"}
 
@@ -59,7 +57,6 @@ class SMOKELIFT_OT_vary(ActsOnSmoke, RequiresClip, bpy.types.Operator):
 class SMOKELIFT_OT_resume(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     """Resume the stopped run after its last finished frame, with its own settings"""
 
-    bl_idname = "smokelift.resume"
     bl_label = "Resume"
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -185,8 +182,3 @@ def _draw_job(
     if own and row.outcome == "done" and take != volume.shown_take(shown):  # after an undo to before it
         box.operator("smokelift.show_take", icon="HIDE_OFF").take = row.take
     box.operator("smokelift.open_log", icon="TEXT").take = row.take
-
-
-register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_run, SMOKELIFT_OT_vary, SMOKELIFT_OT_resume, SMOKELIFT_OT_cancel)
-)

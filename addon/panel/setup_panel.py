@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty
 from ..result import shot_check
 from ..scene import shot_setup, volume
 from ..scene.blender import ShotError
-from .common import ActsOnSmoke, RequiresClip, RequiresClipAndResult, sub_panels
+from .common import ChangesScene, RequiresClip, RequiresClipAndResult, sub_panels
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
 """Names of the settings."""
@@ -68,16 +68,14 @@ class SetUpSettings:
     )
 
 
-class SMOKELIFT_OT_set_up(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator):
+class SMOKELIFT_OT_set_up(ChangesScene, RequiresClipAndResult, bpy.types.Operator):
     """Make a render from the camera match the clip."""
 
-    bl_idname = "smokelift.set_up"
     bl_description = (
         "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
         "and colors, with samples for about a minute in a new file. The old world stays in the file"
     )
     bl_label = "Set Up Shot"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = volume.shown_take(smoke)
@@ -110,6 +108,4 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
-register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_set_up, *sub_panels("set_up", "Shot Set-Up", _draw_set_up, RequiresClip))
-)
+PANELS = sub_panels("set_up", "Shot Set-Up", _draw_set_up, RequiresClip)

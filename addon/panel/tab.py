@@ -10,18 +10,16 @@ from ..scene.smoke import activate, active_smoke, smokes
 from . import preferences
 from .camera_panel import draw_shot
 from .clip_panel import draw_clip
-from .common import ActsOnSmoke
+from .common import ChangesScene
 from .layout import draw_text
 from .quality_panel import draw_qualities
 from .run_panel import draw_run
 
 
-class SMOKELIFT_OT_show_smoke(ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_show_smoke(ChangesScene, bpy.types.Operator):
     """Select this smoke, and show its settings in the tab"""
 
-    bl_idname = "smokelift.show_smoke"
     bl_label = "Select Smoke"
-    bl_options = {"REGISTER", "UNDO"}
 
     smoke: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
@@ -86,8 +84,3 @@ class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
     """The panel in the Movie Clip Editor."""
 
     bl_space_type = "CLIP_EDITOR"
-
-
-register, unregister = bpy.utils.register_classes_factory(
-    (SMOKELIFT_OT_show_smoke, SMOKELIFT_PT_view, SMOKELIFT_PT_clip)
-)

@@ -245,18 +245,13 @@ def _playing(context: bpy.types.Context) -> bool:
     return context.screen is not None and context.screen.is_animation_playing
 
 
-def register() -> None:
-    bpy.utils.register_class(SMOKELIFT_OT_work)
-
-
 def unregister() -> None:
-    """Unregister the worker and end its jobs."""
+    """End the worker and its jobs."""
     cancel_call(_work_later)
     manager = bpy.context.window_manager
     running = workers(manager)
     for worker in running:
         worker.cancel(bpy.context)
-    bpy.utils.unregister_class(SMOKELIFT_OT_work)
     if running:
         timer = manager.event_timer_add(TICK_SECONDS, window=manager.windows[0])
         bpy.app.timers.register(functools.partial(_wait_for_unregistered, timer), first_interval=TICK_SECONDS)

@@ -143,7 +143,6 @@ def _stop_all(_file: str = "") -> None:
 
 
 def register() -> None:
-    bpy.utils.register_class(SMOKELIFT_OT_stop_writing)
     bpy.app.handlers.load_pre.append(_stop_all)
 
 
@@ -153,4 +152,3 @@ def unregister() -> None:
     for job in SideJob.all:
         cancel_call(job._timer)
     bpy.app.handlers.load_pre.remove(_stop_all)
-    bpy.utils.unregister_class(SMOKELIFT_OT_stop_writing)

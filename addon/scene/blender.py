@@ -1,9 +1,10 @@
 """What all parts ask of Blender: paths, frames, the user's preferences, and values that follow the newest result."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import bpy
@@ -141,6 +142,33 @@ def _equal(found: list[float], set_last: list[float]) -> bool:
     return len(found) == len(set_last) and all(
         abs(a - b) <= TOLERANCE * max(1.0, abs(b)) for a, b in zip(found, set_last, strict=True)
     )
+
+
+def register_modules(modules: Sequence[ModuleType]) -> None:
+    """Register the classes of modules, and whatever else each has to register."""
+    for module in modules:
+        for cls in _classes(module):
+            bpy.utils.register_class(cls)
+        if hasattr(module, "register"):
+            module.register()
+
+
+def unregister_modules(modules: Sequence[ModuleType]) -> None:
+    """Unregister them."""
+    for module in reversed(modules):
+        if hasattr(module, "unregister"):
+            module.unregister()
+        for cls in reversed(_classes(module)):
+            bpy.utils.unregister_class(cls)
+
+
+def _classes(module: ModuleType) -> list[type]:
+    """What Blender has to know of a module: its own classes, and those of a tuple in it, in their order."""
+    values = [each for value in vars(module).values() for each in (value if isinstance(value, tuple) else (value,))]
+    types = bpy.types
+    kinds = (types.Operator, types.Panel, types.PropertyGroup, types.AddonPreferences, types.FileHandler)
+    classes = [each for each in values if isinstance(each, type) and issubclass(each, kinds)]
+    return [cls for cls in classes if cls.__module__ == module.__name__]
 
 
 def redraw(manager: bpy.types.WindowManager) -> None:
