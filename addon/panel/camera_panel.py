@@ -152,7 +152,7 @@ class SMOKELIFT_OT_make_box(ChangesScene, bpy.types.Operator):
         box.rotation_euler = (0.0, 0.0, 0.0)
         box.location = (low + high) / 2
         box.scale = (high - low) / 2
-        shot_check.check_again(context)
+        shot_check.forget()
 
 
 class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
@@ -220,7 +220,7 @@ class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
     def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
-        shot_check.check_again(context)
+        shot_check.forget()
         return outcome
 
 

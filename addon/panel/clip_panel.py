@@ -184,7 +184,7 @@ class SMOKELIFT_OT_match_clip(ChangesScene, RequiresClip, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         shot_setup.match_clip(smoke)
-        shot_check.check_again(context)
+        shot_check.forget()
 
 
 class SMOKELIFT_OT_undistort(ChangesScene, bpy.types.Operator):

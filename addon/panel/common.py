@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..core.contract import SIDES
 from ..core.job import EngineMissingError
 from ..core.take import TakeError
-from ..result.shot_check import check_again
+from ..result.shot_check import forget
 from ..result.side_job import Request, writing_job
 from ..scene import volume
 from ..scene.blender import ShotError
@@ -185,9 +185,9 @@ def closed_sides(description: str, **options: Any) -> Any:
     )
 
 
-def check_changed(_settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+def check_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Check the shot again: one of its settings has changed."""
-    check_again(context)
+    forget()
 
 
 def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

@@ -94,7 +94,6 @@ class SmokeliftState(bpy.types.PropertyGroup):
 
     jobs: CollectionProperty(type=SmokeliftJob)
     check_smoke: IntProperty()
-    check_place: StringProperty(description="Corners of the box that was checked; empty without one")
     check_page: StringProperty(description="Picture of what was found in the shot that was checked")
     check_done: BoolProperty()
     check_error: StringProperty()

@@ -88,8 +88,8 @@ class SMOKELIFT_OT_stop_check(ActsOnSmoke, bpy.types.Operator):
     bl_label = "Stop Reading"
     bl_options = {"INTERNAL"}
 
-    def act(self, _context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
-        shot_check.stop()
+    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+        shot_check.stop(smoke)
 
 
 def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -122,11 +122,10 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
                 cell.active = done
                 cell.alert = cost.memory > state.memory_free
                 cell.label(text=word, translate=False)
-    if not checked:
-        shot_check.check_soon(context)
-    if not checked or state.check_error:
+    reading = not done if checked else shot_check.check_soon(context)
+    if state.check_error or not (checked or reading):
         layout.operator("smokelift.check", icon="VIEWZOOM")
-    elif not done:
+    elif reading:
         seconds = shot_check.check_job.seconds
         text = iface_("Reading the clip: {:s}").format(duration(seconds)) if seconds else iface_("Reading the clip")
         row = layout.row(align=True)

@@ -90,7 +90,7 @@ class SMOKELIFT_OT_set_up(ChangesScene, RequiresClipAndResult, bpy.types.Operato
         if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "CAMERA"
         volume.show(smoke, take)  # the frame rate may have changed
-        shot_check.check_again(context)
+        shot_check.forget()
         done = rpt_("The shot is set up: press F12 for a render that matches the clip.")
         self.report({"INFO"}, " ".join([done, *said]))
 

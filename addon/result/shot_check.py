@@ -16,7 +16,6 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core.job import ENDED, EngineMissingError, Job
 from ..core.take import Take, TakeError
 from ..scene.blender import ShotError, absolute, redraw, thread_options
-from ..scene.box import box_corners, box_of
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
 from ..scene.smoke import active_smoke, find_smoke
@@ -73,44 +72,59 @@ check_job = SideJob()
 
 
 def check(smoke: bpy.types.Object) -> None:
-    """Check a shot once its settings rest; without a window, at once and to the end."""
+    """Check a shot; without a window, to the end."""
+    bpy.context.view_layer.update()  # or what waits to be evaluated would count as a later change
     state = bpy.context.window_manager.smokelift
-    state.check_smoke, state.check_place = smoke.session_uid, box_position(smoke)
-    state.check_done, state.check_error = False, ""
-    if check_job.smoke != smoke.session_uid:
-        check_job.stop()
+    state.check_smoke, state.check_done, state.check_error = smoke.session_uid, False, ""
+    _start(smoke)
     if bpy.app.background:
-        _start(smoke)
         check_job.wait()
-    else:
-        call_later(_start_later, REST_SECONDS)
 
 
-def stop() -> None:
+def stop(smoke: bpy.types.Object) -> None:
     """Stop reading the clip, until a setting changes or the artist asks for a check."""
     check_job.stop()
-    cancel_call(_start_later)
+    forget()
     state = bpy.context.window_manager.smokelift
-    state.check_error = rpt_("Time and memory are not estimated: Check Shot under Advanced does it.")
+    state.check_smoke = smoke.session_uid
+    state.check_error = rpt_("Time and memory are not estimated: Check Shot does it.")
 
 
 def make_way() -> None:
     """Stop reading the clip for a run, which reads it too; the tab begins again when no run is left."""
-    state = bpy.context.window_manager.smokelift
     if check_job.job is not None or bpy.app.timers.is_registered(_start_later):
         check_job.stop()
-        cancel_call(_start_later)
-        _forget(state)
+        forget()
+
+
+def forget() -> None:
+    """Forget the last check, for the shot has changed; the tab begins another when it is drawn."""
+    cancel_call(_start_later)
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+
+
+def check_soon(context: bpy.types.Context) -> bool:
+    """Have the active smoke checked once its settings rest, if no run is at work; whether it will be.
+
+    Drawing code may call this.
+    """
+    busy = any(row.outcome not in ENDED for row in context.window_manager.smokelift.jobs)
+    if busy or bpy.app.background or context.window != context.window_manager.windows[0]:
+        return False
+    if not bpy.app.timers.is_registered(_start_later):
+        call_later(_start_later, REST_SECONDS)
+    return True
 
 
 def _start_later() -> None:
-    """Start the engine on the shot whose settings changed last; a timer, which has no window."""
+    """Check the smoke in the tab; a timer, which has no window."""
     manager = bpy.context.window_manager
-    smoke = find_smoke(manager.smokelift.check_smoke)
-    if smoke is not None:
-        with bpy.context.temp_override(window=manager.windows[0]):
-            _start(smoke)
-        redraw(manager)
+    with bpy.context.temp_override(window=manager.windows[0]):
+        smoke = active_smoke(bpy.context.scene)
+        if smoke is not None and smoke.smokelift.clip is not None:
+            check(smoke)
+    redraw(manager)
 
 
 def _start(smoke: bpy.types.Object) -> None:
@@ -132,9 +146,12 @@ def _start(smoke: bpy.types.Object) -> None:
             _store(state, *_known[shot])
             return
 
-        def store(_smoke: bpy.types.Object, job: Job) -> None:
+        def store(smoke: bpy.types.Object, job: Job) -> None:
             if job.outcome == "done":
                 _known[shot] = job.details, job.doubts
+            if not is_checked(state, smoke):  # it has changed meanwhile
+                return
+            if job.outcome == "done":
                 _store(state, *_known[shot])
             else:
                 state.check_error = job.sentence
@@ -176,65 +193,33 @@ def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -
     ).hexdigest()[:16]
 
 
-def box_position(smoke: bpy.types.Object) -> str:
-    """Where the corners of a smoke's box are; empty without one."""
-    box = box_of(smoke) if smoke.smokelift.camera_mode == "SCENE" else None
-    return "" if box is None else " ".join(f"{number:.5g}" for corner in box_corners(box) for number in corner)
-
-
 def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
-    """Whether the last check is of this smoke, whose box has not been moved since: Blender tells of that by drawing."""
-    return state.check_smoke == smoke.session_uid and state.check_place in ("", box_position(smoke))
-
-
-def check_again(context: bpy.types.Context) -> None:
-    """Forget the last check, for the shot has changed, and begin another if there is a window."""
-    _forget(context.window_manager.smokelift)
-    if not bpy.app.background and context.window is not None and bpy.ops.smokelift.check.poll():
-        bpy.ops.smokelift.check()
-
-
-def _forget(state: bpy.types.PropertyGroup) -> None:
-    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+    """Whether the last check is of this smoke as it is."""
+    return state.check_smoke == smoke.session_uid
 
 
 @persistent
-def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Forget the check of a smoke whose mask was drawn on; the tab begins another when it is drawn."""
+def _when_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Forget the check of a smoke whose mask was drawn on, or whose box was moved."""
     manager = bpy.context.window_manager
-    state = manager.smokelift
-    if not state.check_smoke or not depsgraph.id_type_updated("MASK"):
+    smoke = find_smoke(manager.smokelift.check_smoke)
+    if smoke is None or smoke.name not in scene.objects:
         return
-    smoke = find_smoke(state.check_smoke)
-    mask = None if smoke is None else smoke.smokelift.drawn_mask
-    if mask is None or smoke.name not in scene.objects:
-        return
-    if any(update.id.original == mask for update in depsgraph.updates):
-        _forget(state)
-        redraw(manager)
-
-
-def check_soon(context: bpy.types.Context) -> None:
-    """Check the active smoke unless it was checked. Drawing code may call this."""
-    state, first = context.window_manager.smokelift, context.window_manager.windows[0]
-    smoke = active_smoke(context.scene)
-    known = smoke is None or is_checked(state, smoke) or any(row.outcome not in ENDED for row in state.jobs)
-    if not known and context.window == first and not bpy.app.timers.is_registered(_start_check):
-        call_later(_start_check, 0.0)  # drawing code may not change data
-
-
-def _start_check() -> None:
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        if bpy.ops.smokelift.check.poll():
-            bpy.ops.smokelift.check()
+    settings = smoke.smokelift
+    box = settings.box if settings.camera_mode == "SCENE" else None
+    for update in depsgraph.updates:
+        changed = update.id.original
+        if changed == settings.drawn_mask or (changed == box and update.is_updated_transform):
+            forget()
+            redraw(manager)
+            return
 
 
 def register() -> None:
-    bpy.app.handlers.depsgraph_update_post.append(_when_drawn_on)
+    bpy.app.handlers.depsgraph_update_post.append(_when_changed)
 
 
 def unregister() -> None:
     """End what would start a check."""
-    bpy.app.handlers.depsgraph_update_post.remove(_when_drawn_on)
-    for timer in (_start_check, _start_later):
-        cancel_call(timer)
+    bpy.app.handlers.depsgraph_update_post.remove(_when_changed)
+    cancel_call(_start_later)
