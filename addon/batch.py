@@ -11,8 +11,8 @@ import bpy
 def _run_as_script() -> int:
     """Run the enabled add-on, else the one that holds this script."""
     words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    if hasattr(bpy.types.WindowManager, "smokelift"):
-        package = type(bpy.context.window_manager.smokelift).__module__.removesuffix(".panel.properties")
+    if hasattr(bpy.types, "SMOKELIFT_PT_view"):
+        package = bpy.types.SMOKELIFT_PT_view.__module__.removesuffix(".panel.tab")
         return importlib.import_module(f"{package}.result.command_line").main(words)
     init = Path(__file__).resolve().parent / "__init__.py"
     name = "smokelift_addon"  # not the folder's name, which an extension shares with the engine

@@ -28,8 +28,6 @@ from .sentences import sentence, stopped
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 
-ENDED: tuple[Outcome, ...] = ("done", "failed", "cancelled")
-
 HOME = Path(__file__).parents[1]
 """The extension; the one with Taichi for the GPU lies beside it."""
 
@@ -169,7 +167,12 @@ class Job:
     @property
     def ended(self) -> bool:
         """Whether its state is final."""
-        return self.outcome in ENDED
+        return self.outcome in ("done", "failed", "cancelled")
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was cancelled, and its engine has not ended yet."""
+        return self._kill_at is not None and not self.ended
 
     def start(self) -> None:
         """Start the process; a failure to start is an outcome too."""

@@ -3,6 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
+from ..result.shot_check import found_lines, state
 from ..scene.modifiers import CAN_INTERPOLATE
 from .common import RequiresClip, speed_changed, sub_panels
 from .layout import draw_automatic
@@ -28,7 +29,7 @@ class PlaybackSettings:
     )
 
 
-def _draw_advanced(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
     row = layout.row()
     row.active = settings.camera_mode == "SCENE"
@@ -44,10 +45,9 @@ def _draw_advanced(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
     column.active = settings.use_medium
     for name in ("extinction", "albedo", "anisotropy"):
         column.prop(settings, name)
-    state = context.window_manager.smokelift
-    if state.check_smoke == smoke.session_uid and state.notes:
-        for note in state.notes.split("\n"):
-            layout.label(text=note, translate=False)
+    if state.fits(smoke) and state.done:
+        for line in found_lines(state.details.get("facts", ())):
+            layout.label(text=line, translate=False)
     layout.operator("smokelift.show_page", icon="IMAGE_DATA")
     layout.operator("smokelift.check", icon="VIEWZOOM")
 

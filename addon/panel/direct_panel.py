@@ -209,9 +209,9 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.scale_y = 1.5
     text = iface_("{:s} Smoke").format(iface_(label))
     row.operator("smokelift.direct", text=text, translate=False, icon="PLAY")
-    for job in context.window_manager.smokelift.jobs:
-        if job.outcome == "running" and job.smoke_uid == smoke.session_uid:
-            draw_progress(layout, job, "smokelift.cancel").take = job.take
+    run = run_queue.running()
+    if run is not None and run.smoke == smoke.session_uid:
+        draw_progress(layout, run.job, "smokelift.cancel").take = str(run.take.directory)
 
 
 def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:

@@ -9,6 +9,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
 from ..core.take import Take
+from ..result.shot_check import state
 from ..scene.blender import ShotError
 from ..scene.smoke import active_smoke
 from .common import ActsOnSmoke, RequiresClip, refuse
@@ -49,14 +50,12 @@ class SMOKELIFT_OT_show_page(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not super().poll(context):
             return False
-        state = context.window_manager.smokelift
-        own = state.check_done and state.check_smoke == active_smoke(context.scene).session_uid
-        if not (own and state.check_page and Path(state.check_page).is_file()):
+        if not (state.fits(active_smoke(context.scene)) and state.done and Path(state.page).is_file()):
             return refuse(cls, "Check the shot first")
         return True
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        page = bpy.data.images.load(context.window_manager.smokelift.check_page, check_existing=True)
+        page = bpy.data.images.load(state.page, check_existing=True)
         page.reload()
         if not bpy.app.background:
             show_image(page)

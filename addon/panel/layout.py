@@ -1,12 +1,12 @@
 """How the parts of the tab draw what they have in common."""
 
 import textwrap
-from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import MOVING_CAMERA
+from ..core.job import Job
 from ..core.sentences import duration
 from ..result.side_job import writing_job
 from ..scene.smoke import active_smoke
@@ -38,13 +38,13 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
     column.row(align=True).prop(settings, "closed")
 
 
-def draw_progress(layout: bpy.types.UILayout, work: Any, operator: str) -> bpy.types.OperatorProperties:
+def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.types.OperatorProperties:
     """How far a run or a job has come, and beside it the cross that cancels it, whose properties are returned."""
     row = layout.row(align=True)
     text = iface_("{:d} of {:d}").format(work.done, work.total) if work.total else iface_("Reading the clip")
-    if getattr(work, "cancel", None) is True:
+    if work.stopping:
         text = iface_("Stopping")
-    elif work.total and (work.seconds_left or -1.0) >= 0.0:
+    elif work.total and work.seconds_left is not None:
         text = iface_("{:s}, {:s} left").format(text, duration(work.seconds_left))
     row.progress(factor=work.done / work.total if work.total else 0.0, text=text, translate=False)
     return row.operator(operator, text="", icon="X")

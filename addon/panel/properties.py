@@ -1,12 +1,8 @@
-"""Settings of a smoke, saved with its object, and the state of this session, on the window manager."""
+"""Settings of a smoke, saved with its object."""
 
 import bpy
 from bpy.props import (
     BoolProperty,
-    CollectionProperty,
-    FloatProperty,
-    IntProperty,
-    IntVectorProperty,
     PointerProperty,
     StringProperty,
 )
@@ -56,62 +52,11 @@ class SmokeliftSettings(
     )
 
 
-class SmokeliftDoubt(bpy.types.PropertyGroup):
-    """Why a result may be nothing, or wrong."""
-
-    kind: StringProperty(description="The engine's name of the sentence; empty if it has none")
-    sentence: StringProperty()
-
-
-class SmokeliftJob(bpy.types.PropertyGroup):
-    """One run in the panel."""
-
-    smoke_uid: IntProperty()
-    take: StringProperty()
-    outcome: StringProperty(default="waiting")
-    done: IntProperty()
-    total: IntProperty()
-    seconds_left: FloatProperty(default=-1.0)
-    sentence: StringProperty()
-    doubts: CollectionProperty(type=SmokeliftDoubt)
-    icon: IntProperty()
-    cancel: BoolProperty()
-    left: BoolProperty(description="The artist chose another result while it runs")
-
-
-class SmokeliftCost(bpy.types.PropertyGroup):
-    """What a run takes at the quality that it is named after."""
-
-    resolution: IntVectorProperty(size=3)
-    seconds: FloatProperty()
-    memory: FloatProperty(description="GiB")
-    disk: FloatProperty(description="MB")
-    lost: FloatProperty(description="Fraction of the smoke's contrast in the clip; below 0 if unknown")
-
-
-class SmokeliftState(bpy.types.PropertyGroup):
-    """This session's runs, and the estimate of the next one; never saved."""
-
-    jobs: CollectionProperty(type=SmokeliftJob)
-    check_smoke: IntProperty()
-    check_page: StringProperty(description="Picture of what was found in the shot that was checked")
-    check_done: BoolProperty()
-    check_error: StringProperty()
-    notes: StringProperty()
-    doubts: CollectionProperty(type=SmokeliftDoubt)
-    costs: CollectionProperty(type=SmokeliftCost)
-    costs_smoke: IntProperty(description="Whose the costs are")
-    memory_free: FloatProperty(description="GiB")
-
-
 def register() -> None:
-    """Give objects their settings, and the session its state."""
     bpy.types.Object.smokelift = PointerProperty(type=SmokeliftSettings)
     bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
-    bpy.types.WindowManager.smokelift = PointerProperty(type=SmokeliftState)
 
 
 def unregister() -> None:
-    del bpy.types.WindowManager.smokelift
     del bpy.types.Object.smokelift_export
     del bpy.types.Object.smokelift

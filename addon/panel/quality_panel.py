@@ -98,10 +98,8 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
     While a change is estimated, the figures of before stay, grayed. The line below is one of the same height always,
     so that nothing moves under the pointer; `draw_check` has the rest.
     """
-    state, settings = context.window_manager.smokelift, smoke.smokelift
-    checked = shot_check.is_checked(state, smoke)
-    done = checked and state.check_done
-    costs = state.costs if state.costs_smoke == smoke.session_uid and not (checked and state.check_error) else {}
+    state, settings = shot_check.state, smoke.smokelift
+    checked, costs = state.fits(smoke), state.costs(smoke)
     column = layout.column(align=True)
     column.use_property_split = False
     title = settings.bl_rna.properties["quality"].name
@@ -113,17 +111,17 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         cost = costs.get(item.identifier)
         if cost is not None:
             words = (
-                _brief_time(cost.seconds),
-                _brief(cost.memory, "G"),
-                _brief_disk(cost.disk),
-                _brief_fraction(cost.lost),
+                _brief_time(cost["seconds"]),
+                _brief(cost["memory"] / 2**30, "G"),
+                _brief_disk(cost["disk"] / 1e6),
+                _brief_fraction(cost["lost"]),
             )
             for cell, word in zip(cells, words, strict=True):
-                cell.active = done
-                cell.alert = cost.memory > state.memory_free
+                cell.active = checked and state.done
+                cell.alert = cost["memory"] > state.details["memory_free"]
                 cell.label(text=word, translate=False)
-    reading = not done if checked else shot_check.check_soon(context)
-    if state.check_error or not (checked or reading):
+    reading = not state.done if checked else shot_check.check_soon(context)
+    if state.error or not (checked or reading):
         layout.operator("smokelift.check", icon="VIEWZOOM")
     elif reading:
         seconds = shot_check.check_job.seconds
@@ -133,24 +131,24 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         row.operator("smokelift.stop_check", text="", icon="X")
     else:
         own = costs.get(settings.quality)
-        text = iface_("{} x {} x {} voxels").format(*own.resolution) if own is not None else ""
+        text = iface_("{} x {} x {} voxels").format(*own["resolution"]) if own is not None else ""
         layout.label(text=text, translate=False, icon="MESH_GRID")
 
 
 def draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """What the check of this smoke warns of, or why it failed."""
-    state = context.window_manager.smokelift
-    if not shot_check.is_checked(state, smoke):
+    state = shot_check.state
+    if not state.fits(smoke):
         return
-    if state.check_error:
-        draw_failure(layout, context, state.check_error)
-    elif state.check_done:
-        own = state.costs.get(smoke.smokelift.quality) if state.costs_smoke == smoke.session_uid else None
-        if own is not None and own.memory > state.memory_free:
+    if state.error:
+        draw_failure(layout, context, state.error)
+    elif state.done:
+        free = state.details["memory_free"]
+        if state.costs(smoke)[smoke.smokelift.quality]["memory"] > free:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(layout, context, text.format(state.memory_free), "ERROR")
-        for doubt in state.doubts:
-            draw_doubt(layout, context, doubt.kind, doubt.sentence)
+            draw_text(layout, context, text.format(free / 2**30), "ERROR")
+        for kind, words in state.doubts:
+            draw_doubt(layout, context, kind, words)
 
 
 def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
@@ -171,9 +169,9 @@ def _brief_disk(megabytes: float) -> str:
     return f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G")
 
 
-def _brief_fraction(fraction: float) -> str:
-    """A fraction in percent; nothing below 0, where it is unknown."""
-    if fraction < 0.0:
+def _brief_fraction(fraction: float | None) -> str:
+    """A fraction in percent; nothing where it is unknown."""
+    if fraction is None:
         return ""
     return f"{fraction:.1%}" if 0.0005 <= fraction < 0.00995 else f"{fraction:.0%}"
 

@@ -101,7 +101,7 @@ class SMOKELIFT_OT_remove_take(ActsOnSmoke, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = Take(Path(self.take))
-        if take.directory.resolve() in directories_in_use(context):
+        if take.directory.resolve() in directories_in_use():
             raise ShotError("A Volume shows this result, or a run needs it: show another one first.")
         take.remove()
 

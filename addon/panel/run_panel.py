@@ -1,15 +1,14 @@
 """Runs in the tab: the buttons that make smoke and stop that, and the queue."""
 
-from pathlib import Path
 from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.props import StringProperty
 
-from ..core.job import ENDED
 from ..core.take import Take, TakeError
 from ..result import run_queue, smoke_takes
+from ..result.smoke_takes import Run, runs
 from ..scene import volume
 from ..scene.blender import ShotError
 from ..scene.modifiers import lacks_proxy
@@ -61,7 +60,7 @@ class SMOKELIFT_OT_resume(ActsOnSmoke, RequiresClip, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = smoke_takes.unfinished(smoke)
-        if take is None or smoke_takes.busy(context.window_manager, take):
+        if take is None or smoke_takes.busy(take):
             raise ShotError("No stopped run to resume: press Make Smoke.")
         smoke_takes.update_moved_files(smoke, take)
         run_queue.enqueue(context, smoke, take)
@@ -82,24 +81,21 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        jobs = context.window_manager.smokelift.jobs
-        for place in reversed(range(len(jobs))):
-            row = jobs[place]
-            if row.take != self.take and (self.take or row.outcome != "running"):
+        for run in list(runs):
+            if str(run.take.directory) != self.take and (self.take or run.job.outcome != "running"):
                 continue
-            if row.outcome == "waiting":  # it leaves nothing behind
-                Take(Path(row.take)).remove_unless_begun()
-                jobs.remove(place)
+            if run.job.outcome == "waiting":  # it leaves nothing behind
+                run.take.remove_unless_begun()
+                runs.remove(run)
             else:
-                row.cancel = True
+                run.job.cancel()
         return {"FINISHED"}
 
 
 def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """The buttons, whose places do not change; below them the warnings, the runs, and what is known of the result."""
-    jobs = context.window_manager.smokelift.jobs
-    own = [row for row in jobs if row.smoke_uid == smoke.session_uid]
-    idle, index = all(row.outcome in ENDED for row in own), volume.shown_index(smoke)
+    own = [run for run in runs if run.smoke == smoke.session_uid]
+    idle, index = all(run.job.ended for run in own), volume.shown_index(smoke)
     begun = smoke_takes.unfinished(smoke) if idle else None
     text = "Start Again" if begun is not None and begun.read().frames else "Make Smoke"
     column = layout.column()
@@ -112,10 +108,10 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
     row.enabled = index is not None and index["complete"]
     row.operator("smokelift.vary", icon="MOD_NOISE")
     draw_check(layout, context, smoke)
-    for row in jobs:
-        _draw_job(layout, context, smoke, row)
+    for run in runs:
+        _draw_run(layout, context, smoke, run)
     if begun is not None:
-        _draw_begun(layout, context, smoke, begun, any(row.take == str(begun.directory) for row in own))
+        _draw_begun(layout, context, smoke, begun, any(run.take == begun for run in own))
     if index is not None:
         _draw_shown(layout, context, smoke, index)
     elif (take := volume.shown_take(smoke)) is not None:
@@ -154,31 +150,28 @@ def _draw_shown(
         column.operator("smokelift.make_proxy", icon="MOD_REMESH")
 
 
-def _draw_job(
-    layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, row: bpy.types.PropertyGroup
-) -> None:
+def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, run: Run) -> None:
     """A run, also of another smoke; that one's warnings stand in its own tab."""
-    box, own = layout.box(), row.smoke_uid == shown.session_uid
-    smoke = find_smoke(row.smoke_uid)
+    box, job, own = layout.box(), run.job, run.smoke == shown.session_uid
+    smoke, name = find_smoke(run.smoke), str(run.take.directory)
     if smoke is not None and not own:
         box.label(text=smoke.name, icon="VOLUME_DATA")
-    if row.outcome == "waiting":
+    if job.outcome == "waiting":
         line = box.row(align=True)
         line.label(text="Queued", icon="SORTTIME")
-        line.operator("smokelift.cancel", text="", icon="X").take = row.take
-    elif row.outcome == "running":
-        draw_progress(box, row, "smokelift.cancel").take = row.take
-    elif row.outcome == "failed":
-        (draw_failure if own else draw_text)(box, context, row.sentence)
+        line.operator("smokelift.cancel", text="", icon="X").take = name
+    elif job.outcome == "running":
+        draw_progress(box, job, "smokelift.cancel").take = name
+    elif job.outcome == "failed":
+        (draw_failure if own else draw_text)(box, context, job.sentence)
     else:
-        draw_text(box, context, row.sentence, "INFO")
-    if row.icon:
-        box.template_icon(icon_value=row.icon, scale=8.0)
-    if row.outcome not in ENDED:
+        draw_text(box, context, job.sentence, "INFO")
+    if run.icon:
+        box.template_icon(icon_value=run.icon, scale=8.0)
+    if not job.ended:
         return
-    for doubt in row.doubts if own else ():
-        draw_doubt(box, context, doubt.kind, doubt.sentence)
-    take = Take(Path(row.take))
-    if own and row.outcome == "done" and take != volume.shown_take(shown):  # after an undo to before it
-        box.operator("smokelift.show_take", icon="HIDE_OFF").take = row.take
-    box.operator("smokelift.open_log", icon="TEXT").take = row.take
+    for kind, words in job.doubts if own else ():
+        draw_doubt(box, context, kind, words)
+    if own and job.outcome == "done" and run.take != volume.shown_take(shown):  # after an undo to before it
+        box.operator("smokelift.show_take", icon="HIDE_OFF").take = name
+    box.operator("smokelift.open_log", icon="TEXT").take = name

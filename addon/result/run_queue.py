@@ -2,31 +2,36 @@
 
 import functools
 import time
-from pathlib import Path
 
 import bpy
 import bpy.utils.previews
+from bpy.app.handlers import persistent
 
-from ..core.job import ENDED, EngineMissingError, Job, engine_command
-from ..core.sentences import stopped
+from ..core.job import EngineMissingError, Job, engine_command
 from ..core.take import Take, TakeError
 from ..scene import volume
 from ..scene.blender import redraw, thread_options
 from ..scene.smoke import active_smoke, find_smoke, scene_of
 from . import shot_check
 from .side_job import TICK_SECONDS, call_later, cancel_call
-from .smoke_takes import show_while_made
+from .smoke_takes import Run, runs, show_while_made
 
 
 def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:
-    """Append a take to the queue; without a window, wait for its end."""
-    jobs = context.window_manager.smokelift.jobs
-    for place in reversed(range(len(jobs))):
-        if jobs[place].outcome in ENDED and jobs[place].smoke_uid == smoke.session_uid:
-            jobs.remove(place)
-    row = jobs.add()
+    """Append a take to the queue; without a window, wait for its end.
+
+    EngineMissingError, TakeError if it cannot be made.
+    """
+    try:
+        words = engine_command(take.arguments() + thread_options())
+    except (EngineMissingError, TakeError):
+        take.remove_unless_begun()
+        raise
     shot_check.make_way()
-    row.take, row.smoke_uid, row.done = str(take.directory), smoke.session_uid, take.read().frames
+    done, uid = take.read().frames, smoke.session_uid
+    job = Job(words, take.log_file, volume.frames_before_take(smoke, take), done)
+    runs[:] = [run for run in runs if run.smoke != uid or not run.job.ended]
+    runs.append(Run(take, uid, job, (done, False)))
     work(context)
 
 
@@ -88,14 +93,14 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the timer."""
-        self._begin()
+        self._thumbnails = bpy.utils.previews.new()
         self._timer = context.window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Poll on the timer, pass other events on; Esc asks whether to stop."""
-        if event.type == "ESC" and event.value == "PRESS" and self._job and not _playing(context):
+        if event.type == "ESC" and event.value == "PRESS" and running() and not _playing(context):
             bpy.ops.smokelift.cancel("INVOKE_DEFAULT")
             return {"RUNNING_MODAL"}
         if event.type == "TIMER" and not self._tick(context):
@@ -105,7 +110,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Without a window: poll to the end."""
-        self._begin()
+        self._thumbnails = bpy.utils.previews.new()
         self._timer = None
         try:
             while self._tick(context):
@@ -118,102 +123,54 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         """Blender quits or loads another file: end the engine; finished frames stay."""
         self._end(context)
 
-    def _begin(self) -> None:
-        self._take, self._job = "", None  # the run, and its process
-        self._before: dict[str, Take | None] = {}  # what was on show when a run's first frame came
-        self._seen: set[str] = set()  # takes to whose smoke the playhead went; the artist may leave it
-        self._not_shown: dict[str, Job] = {}  # runs whose newest frames the viewport does not show yet
-        self._thumbnails = bpy.utils.previews.new()
-
     def _end(self, context: bpy.types.Context) -> None:
-        if self._job is not None:
-            self._job.kill()
-        for row in context.window_manager.smokelift.jobs:
-            row.icon = 0
-            if row.outcome == "waiting" and find_smoke(row.smoke_uid) is not None:  # a deleted one may come back
-                Take(Path(row.take)).remove_unless_begun()
-            if row.outcome not in ENDED:
-                row.outcome, row.sentence = "cancelled", stopped(row.done)
+        for run in runs:
+            run.icon = 0
+            waits = run.job.outcome == "waiting"
+            run.job.kill()
+            if waits and find_smoke(run.smoke) is not None:  # a deleted one may come back
+                run.take.remove_unless_begun()
         bpy.utils.previews.remove(self._thumbnails)
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
 
     def _tick(self, context: bpy.types.Context) -> bool:
         """Poll once; returns whether work remains."""
-        manager = context.window_manager
-        rows = {row.take: row for row in manager.smokelift.jobs}
-        waiting = next((row for row in rows.values() if row.outcome == "waiting"), None)
-        changed = False
-        if self._job is not None:
-            changed = self._poll(rows.get(self._take))
-        elif waiting is not None:
-            self._start(waiting)
+        for run in runs:
+            if not run.job.ended and find_smoke(run.smoke) is None:
+                run.job.cancel()  # it has nowhere to go; undo brings the smoke back, and Resume goes on
+        run = running()
+        waiting = next((run for run in runs if run.job.outcome == "waiting"), None)
+        changed = run is not None and run.job.poll()
+        if run is None and waiting is not None:
+            waiting.job.start()
             changed = True
-        while self._not_shown and not bpy.app.is_job_running("RENDER"):  # its data must stay
-            name, job = self._not_shown.popitem()
-            if name in rows:
-                self._show(rows[name], job)
+        new = [run for run in runs if (run.job.done, run.job.ended) != run.shown]
+        if new and not bpy.app.is_job_running("RENDER"):  # its data must stay
+            for run in new:
+                self._show(run)
+            new = []
         if changed:
-            redraw(manager)
-        return bool(self._job or self._not_shown or waiting)
+            redraw(context.window_manager)
+        return bool(new) or any(not run.job.ended for run in runs)
 
-    def _start(self, row: bpy.types.PropertyGroup) -> None:
-        """Start the engine on a run that waits."""
-        take, smoke = Take(Path(row.take)), find_smoke(row.smoke_uid)
-        if smoke is None:  # undo brings it back, and Resume goes on
-            row.outcome, row.sentence = "cancelled", "Cancelled before it began."
-            return
-        try:
-            words = engine_command(take.arguments() + thread_options())
-        except (EngineMissingError, TakeError) as error:
-            row.outcome, row.sentence = "failed", str(error)
-            return
-        job = Job(words, take.log_file, volume.frames_before_take(smoke, take), take.read().frames)
-        job.start()
-        self._take, self._job = row.take, None if job.ended else job
-        self._update_row(row, job)
-
-    def _poll(self, row: bpy.types.PropertyGroup | None) -> bool:
-        """Read what the engine says; returns whether anything changed."""
-        job = self._job
-        if row is not None and find_smoke(row.smoke_uid) is None:
-            row.cancel = True  # it has nowhere to go; undo brings the smoke back, and Resume goes on
-        if row is None or row.cancel:
-            job.cancel()
-        changed = job.poll()
-        if job.ended:
-            self._job = None
-        if changed and row is not None:
-            self._update_row(row, job)
-        return changed
-
-    def _update_row(self, row: bpy.types.PropertyGroup, job: Job) -> None:
-        """Show a job's progress in the panel."""
-        new_frames = job.done != row.done
-        row.outcome, row.sentence = job.outcome, job.sentence
-        shot_check.store_doubts(row, job.doubts)
-        row.done, row.total = job.done, job.total
-        row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
-        if new_frames or job.ended:
-            self._not_shown[row.take] = job
-
-    def _show(self, row: bpy.types.PropertyGroup, job: Job) -> None:
-        """Show a job's frames in the viewport, and its end."""
-        take = Take(Path(row.take))
-        smoke = find_smoke(row.smoke_uid)
+    def _show(self, run: Run) -> None:
+        """Show a run's frames in the viewport, and its end."""
+        smoke, job = find_smoke(run.smoke), run.job
         created, said = 0, ""
         if smoke is not None:
             count = _datablocks()
-            before = self._before.setdefault(row.take, volume.shown_take(smoke))
-            if not row.left:
-                said = show_while_made(smoke, take, before, job.outcome)
+            if run.first:
+                run.before, run.first = volume.shown_take(smoke), False
+            if not run.left:
+                said = show_while_made(smoke, run.take, run.before, job.outcome)
             created = _datablocks() - count
             in_tab = smoke == active_smoke(scene_of(smoke))  # of another the artist sees nothing now
-            first = before is None and in_tab and row.take not in self._seen
-            if first and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
-                self._seen.add(row.take)
+            if run.before is None and in_tab and not run.seen:  # the artist may leave it afterwards
+                run.seen = _playing(bpy.context) or volume.go_to_smoke(smoke)
+        run.shown = job.done, job.ended
         if not bpy.app.background:
-            row.icon = self._thumbnail(take)
+            run.icon = self._thumbnail(run.take)
             if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
                 # an undo to a step before new objects leaves Blender with dangling pointers
                 bpy.ops.ed.undo_push(message="Make Smoke")
@@ -237,6 +194,11 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         return preview.icon_id
 
 
+def running() -> Run | None:
+    """The run that is made now."""
+    return next((run for run in runs if run.job.outcome == "running"), None)
+
+
 def _datablocks() -> int:
     return sum(map(len, (bpy.data.objects, bpy.data.volumes, bpy.data.cameras, bpy.data.materials)))
 
@@ -245,13 +207,25 @@ def _playing(context: bpy.types.Context) -> bool:
     return context.screen is not None and context.screen.is_animation_playing
 
 
+@persistent
+def _forget_all(_file: str = "") -> None:
+    """Forget the runs of the file that was open before."""
+    runs.clear()
+
+
+def register() -> None:
+    bpy.app.handlers.load_post.append(_forget_all)
+
+
 def unregister() -> None:
     """End the worker and its jobs."""
+    bpy.app.handlers.load_post.remove(_forget_all)
     cancel_call(_work_later)
     manager = bpy.context.window_manager
     running = workers(manager)
     for worker in running:
         worker.cancel(bpy.context)
+    runs.clear()
     if running:
         timer = manager.event_timer_add(TICK_SECONDS, window=manager.windows[0])
         bpy.app.timers.register(functools.partial(_wait_for_unregistered, timer), first_interval=TICK_SECONDS)

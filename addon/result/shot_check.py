@@ -6,6 +6,7 @@ session is not measured anew.
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,14 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core.job import ENDED, EngineMissingError, Job
+from ..core.job import EngineMissingError, Job
 from ..core.take import Take, TakeError
 from ..scene.blender import ShotError, absolute, redraw, thread_options
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
 from ..scene.smoke import active_smoke, find_smoke
 from .side_job import REST_SECONDS, SideJob, call_later, cancel_call
+from .smoke_takes import runs
 
 _known: dict[str, tuple[Mapping[str, Any], list[tuple[str, str]]]] = {}
 """What the engine said of the shots of this session at its end, and its doubts, by their fingerprints."""
@@ -46,26 +48,48 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
     return [f"{WORDS[fact['what']]}: {fact['short']}" for fact in facts if fact["what"] in WORDS]
 
 
-def store_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
-    """Keep what each quality takes and loses.
+@dataclass
+class ShotCheck:
+    """The last check, of which the newest figures are shown until there are others.
 
-    Parameters
+    Attributes
     ----------
-    state
-        Of this session.
-    smoke_uid
-        The smoke that was checked.
-    details
-        What the engine says at the end of a check.
+    smoke
+        The number of the smoke that was checked as it is; 0 where it has changed.
+    page
+        Picture of what was found.
+    done, error
+        Whether the engine has said what it found, or why it could not.
+    of, details
+        The number of the smoke that the engine spoke of last, and what it said at its end.
+    doubts
+        Why the result may be wrong, as `Job` has them.
     """
-    state.costs.clear()
-    for name, cost in details["qualities"].items():
-        row = state.costs.add()
-        row.name, row.resolution = name, cost["resolution"]
-        row.lost = -1.0 if cost["lost"] is None else cost["lost"]
-        row.seconds, row.memory, row.disk = cost["seconds"], cost["memory"] / 2**30, cost["disk"] / 1e6
-    state.costs_smoke, state.memory_free = smoke_uid, details["memory_free"] / 2**30
 
+    smoke: int = 0
+    page: str = ""
+    done: bool = False
+    error: str = ""
+    of: int = 0
+    details: Mapping[str, Any] = field(default_factory=dict)
+    doubts: list[tuple[str, str]] = field(default_factory=list)
+
+    def fits(self, smoke: bpy.types.Object) -> bool:
+        """Whether it is of this smoke as it is."""
+        return self.smoke == smoke.session_uid
+
+    def costs(self, smoke: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
+        """What each quality takes and loses, also of this smoke before its last change; nothing of one that failed."""
+        failed = self.fits(smoke) and self.error
+        return self.details["qualities"] if self.of == smoke.session_uid and not failed else {}
+
+    def store(self, details: Mapping[str, Any], doubts: list[tuple[str, str]]) -> None:
+        """Keep what the engine said of the smoke."""
+        self.done, self.of, self.details, self.doubts = True, self.smoke, details, doubts
+
+
+state = ShotCheck()
+"""That of this session, which is never saved."""
 
 check_job = SideJob()
 """The check's own, beside which files may be written."""
@@ -74,8 +98,7 @@ check_job = SideJob()
 def check(smoke: bpy.types.Object) -> None:
     """Check a shot; without a window, to the end."""
     bpy.context.view_layer.update()  # or what waits to be evaluated would count as a later change
-    state = bpy.context.window_manager.smokelift
-    state.check_smoke, state.check_done, state.check_error = smoke.session_uid, False, ""
+    state.smoke, state.done, state.error = smoke.session_uid, False, ""
     _start(smoke)
     if bpy.app.background:
         check_job.wait()
@@ -85,9 +108,8 @@ def stop(smoke: bpy.types.Object) -> None:
     """Stop reading the clip, until a setting changes or the artist asks for a check."""
     check_job.stop()
     forget()
-    state = bpy.context.window_manager.smokelift
-    state.check_smoke = smoke.session_uid
-    state.check_error = rpt_("Time and memory are not estimated: Check Shot does it.")
+    state.smoke = smoke.session_uid
+    state.error = rpt_("Time and memory are not estimated: Check Shot does it.")
 
 
 def make_way() -> None:
@@ -100,8 +122,7 @@ def make_way() -> None:
 def forget() -> None:
     """Forget the last check, for the shot has changed; the tab begins another when it is drawn."""
     cancel_call(_start_later)
-    state = bpy.context.window_manager.smokelift
-    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+    state.smoke, state.done, state.error = 0, False, ""
 
 
 def check_soon(context: bpy.types.Context) -> bool:
@@ -109,7 +130,7 @@ def check_soon(context: bpy.types.Context) -> bool:
 
     Drawing code may call this.
     """
-    busy = any(row.outcome not in ENDED for row in context.window_manager.smokelift.jobs)
+    busy = any(not run.job.ended for run in runs)
     if busy or bpy.app.background or context.window != context.window_manager.windows[0]:
         return False
     if not bpy.app.timers.is_registered(_start_later):
@@ -132,50 +153,34 @@ def _start(smoke: bpy.types.Object) -> None:
 
     Its result goes into the state of the session.
     """
-    state, folder = bpy.context.window_manager.smokelift, Path(bpy.app.tempdir)
+    folder = Path(bpy.app.tempdir)
     try:
         take, words = Take(folder / "smokelift_check"), options(smoke)
         take.write(shot_tables(smoke, quick=True), words)
         shot = _fingerprint(take.scene_file.read_bytes(), words + thread_options(), smoke)
         page = folder / f"smokelift_inspect_{shot}.png"
-        if check_job.job is not None and state.check_page == str(page):
+        if check_job.job is not None and state.page == str(page):
             return
         check_job.stop()
-        state.check_done, state.check_page = False, str(page)
+        state.done, state.page = False, str(page)
         if shot in _known:
-            _store(state, *_known[shot])
+            state.store(*_known[shot])
             return
 
         def store(smoke: bpy.types.Object, job: Job) -> None:
             if job.outcome == "done":
                 _known[shot] = job.details, job.doubts
-            if not is_checked(state, smoke):  # it has changed meanwhile
+            if not state.fits(smoke):  # it has changed meanwhile
                 return
             if job.outcome == "done":
-                _store(state, *_known[shot])
+                state.store(*_known[shot])
             else:
-                state.check_error = job.sentence
+                state.error = job.sentence
 
         check_job.start(smoke, (["inspect", str(take.scene_file), "--page", str(page), *words], store))
     except (ShotError, TakeError, EngineMissingError) as error:
         check_job.stop()
-        state.check_error = str(error)
-
-
-def store_doubts(owner: bpy.types.PropertyGroup, doubts: Iterable[tuple[str, str]]) -> None:
-    """Keep why a result may be wrong, as `Job` has it, in a run or in the state of the session."""
-    owner.doubts.clear()
-    for kind, words in doubts:
-        row = owner.doubts.add()
-        row.kind, row.sentence = kind, words
-
-
-def _store(state: bpy.types.PropertyGroup, details: Mapping[str, Any], doubts: Iterable[tuple[str, str]]) -> None:
-    """Show what the engine said of the shot."""
-    state.check_done = True
-    store_doubts(state, doubts)
-    state.notes = "\n".join(found_lines(details.get("facts", ())))
-    store_costs(state, state.check_smoke, details)
+        state.error = str(error)
 
 
 def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -> str:
@@ -193,16 +198,11 @@ def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -
     ).hexdigest()[:16]
 
 
-def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
-    """Whether the last check is of this smoke as it is."""
-    return state.check_smoke == smoke.session_uid
-
-
 @persistent
 def _when_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Forget the check of a smoke whose mask was drawn on, or whose box was moved."""
     manager = bpy.context.window_manager
-    smoke = find_smoke(manager.smokelift.check_smoke)
+    smoke = find_smoke(state.smoke)
     if smoke is None or smoke.name not in scene.objects:
         return
     settings = smoke.smokelift

@@ -4,12 +4,13 @@ Several .blend files may keep their takes in one folder, since one is saved as a
 files that may show it, to which each of them adds itself when it is saved.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core.job import ENDED, Outcome
+from ..core.job import Job, Outcome
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
 from ..scene.blender import ShotError, absolute, preferred_output_folder, relative
@@ -21,6 +22,45 @@ from . import directing
 
 _written_to: dict[int, tuple[str, Path]] = {}
 """Folders that this session wrote takes to, with their names, by the numbers of their smokes."""
+
+
+@dataclass(eq=False)
+class Run:
+    """A run of this session in the panel, which is never saved.
+
+    Attributes
+    ----------
+    take, smoke
+        What is made, and the number of its smoke.
+    job
+        The engine's process, which may wait.
+    shown
+        How many frames of it are on show, and whether its end is.
+    first
+        Whether nothing of it was shown yet.
+    before
+        What was on show when its first frame came.
+    seen
+        Whether the playhead went to its first smoke.
+    left
+        Whether the artist chose another result while it runs.
+    icon
+        Of its thumbnail; 0 without one.
+    """
+
+    take: Take
+    smoke: int
+    job: Job
+    shown: tuple[int, bool]
+    first: bool = True
+    before: Take | None = None
+    seen: bool = False
+    left: bool = False
+    icon: int = 0
+
+
+runs: list[Run] = []
+"""The runs of this session, in the order of the queue."""
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:
@@ -99,7 +139,7 @@ def write_directed(smoke: bpy.types.Object) -> Take:
     source = volume.shown_take(smoke)
     if source is None:
         raise ShotError("Make smoke first: there is none yet to direct.")
-    if busy(bpy.context.window_manager, source):
+    if busy(source):
         raise ShotError("The result on show is still being made: wait for its end, or cancel it.")
     direction, options, meshes = directing.engine_request(smoke)
     take = _next_take(smoke)
@@ -114,7 +154,7 @@ def _next_take(smoke: bpy.types.Object) -> Take:
     It takes the place of runs that ended before their first frame.
     """
     separate_duplicate(smoke)
-    folder, in_use = output_folder(smoke), directories_in_use(bpy.context)
+    folder, in_use = output_folder(smoke), directories_in_use()
     for take in own_takes(smoke):
         if take.log_file.is_file() and not take.read().frames and take.directory.resolve() not in in_use:
             take.remove()
@@ -210,9 +250,9 @@ def present(smoke: bpy.types.Object, take: Take) -> str:
 def choose(smoke: bpy.types.Object, take: Take) -> None:
     """Show the take that the artist chose; a run that goes on does not take it back."""
     present(smoke, take)
-    for row in bpy.context.window_manager.smokelift.jobs:
-        if row.smoke_uid == smoke.session_uid and row.outcome == "running":
-            row.left = row.take != str(take.directory)
+    for run in runs:
+        if run.smoke == smoke.session_uid and run.job.outcome == "running":
+            run.left = run.take != take
 
 
 def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> str:
@@ -233,9 +273,9 @@ def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, ou
     return present(smoke, before if stopped and before is not None else take)
 
 
-def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
+def busy(take: Take) -> bool:
     """Whether a take runs or waits."""
-    return any(row.take == str(take.directory) and row.outcome not in ENDED for row in manager.smokelift.jobs)
+    return any(run.take == take and not run.job.ended for run in runs)
 
 
 def earlier_takes(context: bpy.types.Context) -> list[Take]:
@@ -244,7 +284,7 @@ def earlier_takes(context: bpy.types.Context) -> list[Take]:
     What an earlier version of the add-on made stays too, since nothing says which files show it.
     """
     smoke = active_smoke(context.scene)
-    own, shown, in_use = own_takes(smoke), volume.shown_take(smoke), directories_in_use(context)
+    own, shown, in_use = own_takes(smoke), volume.shown_take(smoke), directories_in_use()
     earlier = own[: own.index(shown)] if shown in own else []
     removable = [
         take for take in earlier if take.directory.resolve() not in in_use and foreign_files(smoke, take) == []
@@ -277,9 +317,8 @@ def _known_takes() -> list[Take]:
     return [take for folder in folders for take in takes(folder)]
 
 
-def directories_in_use(context: bpy.types.Context) -> set[Path]:
+def directories_in_use() -> set[Path]:
     """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
-    rows = context.window_manager.smokelift.jobs
-    queued = {Take(Path(row.take)) for row in rows if row.outcome not in ENDED}
+    queued = {run.take for run in runs if not run.job.ended}
     read = {source for take in queued if (source := take.read().source) is not None}
     return volume.directories_on_show() | {take.directory.resolve() for take in queued | read}

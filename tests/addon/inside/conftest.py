@@ -12,7 +12,9 @@ import bpy
 import pytest
 
 import addon
+from addon.core.job import Job
 from addon.core.take import Take
+from addon.result.smoke_takes import Run, runs
 from smokelift.output.vdb import write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE, set_up_example
@@ -82,6 +84,14 @@ def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium |
     index = {"complete": True, "scene": scene, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
     (take.directory / "sequence.json").write_text(json.dumps(index))
     return take
+
+
+def known_run(smoke: bpy.types.Object, take: Take, outcome: str, sentence: str = "") -> Run:
+    """A run of this session in a state, without a process."""
+    run = Run(take, smoke.session_uid, Job([], take.log_file), (0, True))
+    run.job.outcome, run.job.sentence = outcome, sentence
+    runs.append(run)
+    return run
 
 
 @contextmanager

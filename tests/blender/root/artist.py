@@ -12,12 +12,13 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import bpy
 
 FOLDER = Path(sys.argv[-1])
 PATIENCE_SECONDS = 400.0
-ENDED = ("done", "failed", "cancelled")
 report: dict[str, object] = {}
 
 
@@ -53,9 +54,19 @@ def largest_area(kind: str) -> bpy.types.Area:
     return max((area for area in first_window().screen.areas if area.type == kind), key=lambda area: area.width)
 
 
-def jobs() -> list[bpy.types.PropertyGroup]:
+def of_addon(module: str) -> ModuleType:
+    """A module of the add-on that is enabled."""
+    return next(known for name, known in sys.modules.items() if name.endswith(f".smokelift.{module}"))
+
+
+def runs() -> list[Any]:
     """What runs, waits and has ended."""
-    return list(bpy.context.window_manager.smokelift.jobs)
+    return of_addon("result.smoke_takes").runs
+
+
+def checked() -> bool:
+    """Whether the shot in the tab is checked."""
+    return of_addon("result.shot_check").state.done
 
 
 def until(condition: Callable[[], object]) -> Iterator[float]:

@@ -12,11 +12,10 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from artist import (
-    ENDED,
+    checked,
     click,
     find,
     first_window,
-    jobs,
     largest_area,
     look_away,
     perform,
@@ -24,6 +23,7 @@ from artist import (
     place,
     region,
     report,
+    runs,
     shell,
     take,
     until,
@@ -88,11 +88,11 @@ def story() -> Iterator[float]:
 
 def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
     """Take a picture of the tab with what each quality takes and loses, where the resolution is automatic."""
-    settings, state = volume(window).smokelift, bpy.context.window_manager.smokelift
+    settings = volume(window).smokelift
     chosen, settings.longest_side = settings.longest_side, 0
     region(area, "UI").active_panel_category = "Smokelift"
     area.tag_redraw()
-    yield from until(lambda: state.check_done)
+    yield from until(checked)
     yield 1.0
     yield from picture("qualities")
     settings.longest_side = chosen
@@ -102,7 +102,7 @@ def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]
 
 def stands(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
     """Click on the floor in the picture, from a view that is not the camera's; returns the distance that this gives."""
-    settings, state = volume(window).smokelift, bpy.context.window_manager.smokelift
+    settings = volume(window).smokelift
     area.spaces.active.region_3d.view_perspective = "PERSP"
     yield from find(window, area, region(area, "UI"), "bpy.ops.smokelift.place()", EYEDROPPER)
     click()
@@ -115,7 +115,7 @@ def stands(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
     click()
     yield 1.0
     known, settings.distance = settings.distance, 0.0
-    yield from until(lambda: state.check_done)
+    yield from until(checked)
     return known
 
 
@@ -158,8 +158,7 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
     yield from picture(f"{name}_closed")
     sidebar.active_panel_category = "Smokelift"
     area.tag_redraw()
-    state = bpy.context.window_manager.smokelift
-    yield from until(lambda: state.check_done)  # the engine looks at the shot and says what it will take
+    yield from until(checked)  # the engine looks at the shot and says what it will take
     yield 1.0
     yield from picture(f"{name}_idle")
     yield from find(window, area, sidebar, command)
@@ -173,13 +172,13 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
         return TICK_SECONDS
 
     bpy.app.timers.register(tick)
-    earlier = {job.take for job in jobs()}
+    earlier = list(runs())
     clicked = time.monotonic()
     click()
-    yield from until(lambda: {job.take for job in jobs()} - earlier)
-    job = next(job for job in jobs() if job.take not in earlier)
+    yield from until(lambda: runs()[-1:] != earlier[-1:])
+    job = runs()[-1].job
     half_way = None
-    while job.outcome not in ENDED:
+    while not job.ended:
         if seen["progress"][-1:] != [job.done]:
             seen["progress"].append(job.done)
             seen["playhead"].append(window.scene.frame_current)

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from artist import ENDED, first_window, jobs, perform, picture, report, shell, until
+from artist import first_window, perform, picture, report, runs, shell, until
 
 MODULE = "bl_ext.user_default.smokelift"
 
@@ -48,19 +48,19 @@ def press(operator: str, *arguments: object, **settings: object) -> None:
 def begin() -> Iterator[float]:
     """Press the button and wait for the first frames."""
     press("smokelift.run")
-    yield from until(lambda: jobs()[-1].done >= 2)
+    yield from until(lambda: runs()[-1].job.done >= 2)
 
 
 def end() -> Iterator[float]:
     """Wait until everything has ended; returns how."""
-    yield from until(lambda: all(job.outcome in ENDED for job in jobs()))
+    yield from until(lambda: all(run.job.ended for run in runs()))
     yield 0.5
     (obj,) = volumes() or [None]
     return {
-        "outcomes": [job.outcome for job in jobs()],
-        "sentence": jobs()[-1].sentence,
+        "outcomes": [run.job.outcome for run in runs()],
+        "sentence": runs()[-1].job.sentence,
         "volumes": len(volumes()),
-        "done": jobs()[-1].done,
+        "done": runs()[-1].job.done,
         "frames": obj and obj.data.frame_duration,
         "file": obj and Path(bpy.path.abspath(obj.data.filepath)).is_file(),
     }
@@ -123,7 +123,7 @@ def queue() -> Iterator[float]:
     press("smokelift.run")
     press("smokelift.run")
     yield 0.5
-    press("smokelift.cancel", take=jobs()[1].take)
+    press("smokelift.cancel", take=str(runs()[1].take.directory))
     report["queue"] = yield from end()
 
 
@@ -143,7 +143,7 @@ def fail() -> Iterator[float]:
     yield 1.0
     report["log_opened_by_itself"] = bool(logs())
     yield from picture("failed")
-    press("smokelift.open_log", take=jobs()[-1].take)
+    press("smokelift.open_log", take=str(runs()[-1].take.directory))
     yield 1.0
     report["log"] = logs() and logs()[0].spaces.active.text.as_string()
     clip.write_bytes(good)
@@ -152,7 +152,7 @@ def fail() -> Iterator[float]:
 def disable() -> Iterator[float]:
     """The add-on is switched off, and on again."""
     yield from begin()
-    index = Path(jobs()[-1].take) / "sequence.json"
+    index = runs()[-1].take.directory / "sequence.json"
     bpy.ops.preferences.addon_disable(module=MODULE)
     before = index.read_bytes()
     clip = next(iter(bpy.data.movieclips))  # what the add-on listened to
@@ -172,7 +172,7 @@ def disable() -> Iterator[float]:
 def close() -> Iterator[float]:
     """And quit, which ends the story."""
     yield from begin()
-    report["last_take"] = jobs()[-1].take
+    report["last_take"] = str(runs()[-1].take.directory)
 
 
 perform(story)

@@ -7,11 +7,13 @@ import bpy
 import pytest
 
 from addon.core.contract import MOVING_CAMERA, QUALITIES
+from addon.core.take import Take
 from addon.result import command_line, shot_check
+from addon.result.smoke_takes import runs
 from addon.scene import volume
 from addon.scene.clip import clip_table
 from addon.scene.smoke import active_smoke, new_smoke
-from conftest import changed, made
+from conftest import changed, known_run, made
 from tests.example_shot import smoke
 
 WIDTH = 258
@@ -56,52 +58,37 @@ def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[s
     return texts
 
 
-def drawn_with(scene: bpy.types.Scene, plate_mode: str, *panels: type) -> list[str]:
-    """The texts with a kind of background; the check stays done."""
-    state = bpy.context.window_manager.smokelift
-    kept = {name: getattr(state, name) for name in ("check_smoke", "check_done", "notes")}
-    smoke(scene).smokelift.plate_mode = plate_mode
-    for name, value in kept.items():
-        setattr(state, name, value)
-    return drawn(scene, *panels)
+def know(scene: bpy.types.Scene, doubts: list[tuple[str, str]] | None = None, **figures: Any) -> None:
+    """The shot is checked, and all qualities have these figures."""
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "disk": 3e7, "lost": 0.0772, **figures}
+    details = {"memory_free": 2**33, "qualities": dict.fromkeys(QUALITIES, each)}
+    details["facts"] = [{"what": "background", "short": "a picture"}]
+    shot_check.state.smoke, shot_check.state.error = smoke(scene).session_uid, ""
+    shot_check.state.store(details, doubts or [])
 
 
-def test_no_line_is_cut_off(shot) -> None:
-    manager = bpy.context.window_manager
-    state = manager.smokelift
-    state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Background: a picture"
-    know_costs(shot, seconds=86000.0, memory=112.4, disk=99900.0, lost=0.123)
-    state.memory_free = 11.8
+def test_no_line_is_cut_off(shot, tmp_path) -> None:
+    figures = {"seconds": 86000.0, "memory": 112.4 * 2**30, "disk": 99.9e9, "lost": 0.123}
     for outcome in ("waiting", "running", "done", "failed"):
-        row = manager.smokelift.jobs.add()
-        row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
-        row.done, row.total, row.seconds_left = 1250, 2500, 80000.0
-        shot_check.store_doubts(row, [("not all is smoke", "This is a doubt. " * 5)])
+        job = known_run(smoke(shot), Take(tmp_path / outcome), outcome, "One word after the other. " * 5).job
+        job.done, job.total, job.seconds_left = 1250, 2500, 80000.0
+        job.doubts = [("not all is smoke", "This is a doubt. " * 5)]
     panels = (bpy.types.SMOKELIFT_PT_view, bpy.types.SMOKELIFT_PT_view_element, bpy.types.SMOKELIFT_PT_view_advanced)
-    texts = [text for mode in ("ESTIMATE", "FILE", "FRAMES", "COLOR") for text in drawn_with(shot, mode, *panels)]
+    texts = []
+    for mode in ("ESTIMATE", "FILE", "FRAMES", "COLOR"):
+        smoke(shot).smokelift.plate_mode = mode
+        know(shot, **figures)
+        texts += drawn(shot, *panels)
     bpy.ops.smokelift.new_mask()
-    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    know(shot, **figures)
     texts += drawn(shot, *panels)
     assert {"24 h", "112 G", "100 G", "12%"} <= set(texts)
     assert [text for text in texts if len(text) > LETTERS] == []
 
 
-def know_costs(scene: bpy.types.Scene, **figures: float) -> None:
-    """All qualities were estimated, each with these figures."""
-    state = bpy.context.window_manager.smokelift
-    usual = {"resolution": (48, 48, 64), "seconds": 12.0, "memory": 0.4, "disk": 30.0, "lost": 0.0772}
-    for quality in QUALITIES:
-        row = state.costs.add()
-        row.name = quality
-        for name, value in {**usual, **figures}.items():
-            setattr(row, name, value)
-    state.costs_smoke = smoke(scene).session_uid
-
-
 def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
     take = made(tmp_path)
     volume.show(smoke(shot), take)
-    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
     offer = "This smoke is large"
     assert not [text for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.startswith(offer)]
     with changed(take) as index:
@@ -146,7 +133,6 @@ def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> N
     settings.clip = bpy.data.movieclips.load(str(tmp_path / "frame_0017.png"))
 
     def said() -> str:
-        bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
         return " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
 
     assert (settings.first, settings.last) == (1, 2)
@@ -167,57 +153,51 @@ def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> N
 
 def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     """Also while another setting is estimated; nothing of another smoke, nor of a shot that is refused."""
-    state = bpy.context.window_manager.smokelift
-    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
-    each |= {"lost": 0.0772}
-    shot_check.store_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
-    cells = ("12 s", "0.2 G", "30 M", "8%")
+    state, cells = shot_check.state, ("12 s", "0.2 G", "30 M", "8%")
 
     def shown() -> list[int]:
         texts = drawn(shot, bpy.types.SMOKELIFT_PT_view)
         return [texts.count(cell) for cell in cells]
 
-    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    know(shot)
     assert shown() == [4, 4, 4, 4]
     smoke(shot).smokelift.albedo = 0.5
-    assert not state.check_done
-    state.check_smoke = smoke(shot).session_uid
+    assert not state.done
     assert shown() == [4, 4, 4, 4]
-    state.check_smoke, state.check_error = smoke(shot).session_uid, "The box is flat."
+    state.smoke, state.error = smoke(shot).session_uid, "The box is flat."
     assert shown() == [0, 0, 0, 0]
-    state.check_error, state.costs_smoke = "", state.costs_smoke + 1
+    know(shot)
+    state.of += 1
+    state.done = False
     assert shown() == [0, 0, 0, 0]
 
 
 def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_it(shot) -> None:
-    """Beside the forecast, and not while it is made anew; without a forecast in the window the tab stays as it was."""
-    state = bpy.context.window_manager.smokelift
-    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
-    details = {**each, "qualities": dict.fromkeys(QUALITIES, each)}
-    state.check_smoke = smoke(shot).session_uid
-    shot_check._store(state, details, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")])
+    """Not while the shot is checked anew, and of no other smoke."""
+    know(shot, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")], lost=None)
     texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
     place = texts.index("A person moves.")
     assert "[new_mask]" in texts[:place]  # beside Mask
     assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
     assert "There is a cut." in texts[place + 3 : place + 6]
     assert texts.index("[vary]") < place  # the buttons stay where they are
+    other = new_smoke(shot, smoke(shot).smokelift.clip)
+    assert active_smoke(shot) == other
+    assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    bpy.data.objects.remove(other)
     smoke(shot).smokelift.albedo = 0.5
-    state.check_smoke = smoke(shot).session_uid
     assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
 
 
-def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot) -> None:
+def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot, tmp_path) -> None:
     """In the check that ends with it and below the run, and below no other failure."""
-    state = bpy.context.window_manager.smokelift
     refused = f"{MOVING_CAMERA} from the clip. Stabilize the clip."
-    state.check_smoke, state.check_error = smoke(shot).session_uid, refused
-    row = state.jobs.add()
-    row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, "failed", refused
+    shot_check.state.smoke, shot_check.state.error = smoke(shot).session_uid, refused
+    job = known_run(smoke(shot), Take(tmp_path), "failed", refused).job
     texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
     assert texts.count("[track_clip]") == 2
     assert bpy.ops.smokelift.track_clip() == {"FINISHED"}
-    state.check_error = row.sentence = "The box is flat."
+    shot_check.state.error = job.sentence = "The box is flat."
     assert "[track_clip]" not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
 
 
@@ -228,27 +208,24 @@ def buttons(texts: list[str]) -> int:
 
 def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_path) -> None:
     """Whatever the check and the runs say stands below them; those of another smoke warn in its own tab."""
-    state = bpy.context.window_manager.smokelift
-    refused, doubt = f"{MOVING_CAMERA} from the clip.", [("not all is smoke", "A person moves.")]
-    state.check_smoke = smoke(shot).session_uid
+    state, refused = shot_check.state, f"{MOVING_CAMERA} from the clip."
+    know(shot)
     places = [buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view))]
-    state.check_error = refused
+    state.error = refused
     texts = drawn(shot, bpy.types.SMOKELIFT_PT_view)
     assert buttons(texts) < texts.index("[track_clip]")
-    state.check_error = ""
+    know(shot)
     volume.show(smoke(shot), made(tmp_path))
     for outcome in ("done", "waiting", "running", "failed"):
-        row = state.jobs.add()
-        row.take, row.outcome, row.sentence = str(tmp_path / outcome), outcome, refused
-        row.smoke_uid = smoke(shot).session_uid
-        shot_check.store_doubts(row, doubt)
+        run = known_run(smoke(shot), Take(tmp_path / outcome), outcome, refused)
+        run.job.doubts = [("not all is smoke", "A person moves.")]
         places.append(buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view)))
     assert len(set(places)) == 1
     texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
     assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 2
     assert {"[track_clip]", "[show_take]"} <= set(texts)
-    for row in state.jobs:
-        row.smoke_uid += 1
+    for run in runs:
+        run.smoke += 1
     texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
     assert texts.count("[cancel]") == 2
     assert not {"A person moves.", "[track_clip]", "[show_take]"} & set(texts)
@@ -256,20 +233,8 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
 
 def test_a_run_that_is_made_has_its_cross_beside_it(shot, tmp_path) -> None:
     volume.show(smoke(shot), made(tmp_path))
-    row = bpy.context.window_manager.smokelift.jobs.add()
-    row.take, row.outcome, row.smoke_uid = str(tmp_path / "take_0002"), "running", smoke(shot).session_uid
+    known_run(smoke(shot), Take(tmp_path / "take_0002"), "running")
     assert "[cancel]" in drawn(shot, bpy.types.SMOKELIFT_PT_view_direct)
-
-
-def test_warnings_are_those_of_the_smoke_in_the_tab(shot) -> None:
-    state = bpy.context.window_manager.smokelift
-    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
-    state.check_smoke = smoke(shot).session_uid
-    shot_check._store(state, {**each, "qualities": dict.fromkeys(QUALITIES, each)}, [("cut", "There is a cut.")])
-    assert "There is a cut." in " ".join(drawn(shot, bpy.types.SMOKELIFT_PT_view))
-    other = new_smoke(shot, smoke(shot).smokelift.clip)
-    assert active_smoke(shot) == other
-    assert "There is a cut." not in " ".join(drawn(shot, bpy.types.SMOKELIFT_PT_view))
 
 
 @pytest.mark.parametrize("name", ["plate", "mask"])
@@ -279,8 +244,6 @@ def test_pictures_are_chosen_among_pictures(shot, tmp_path, name) -> None:
     assert settings.bl_rna.properties[name].subtype == "NONE"
     kind = bpy.ops.smokelift.choose_picture.get_rna_type().properties
     assert kind["filter_image"].default and kind["filter_movie"].default
-    state = bpy.context.window_manager.smokelift
-    state.check_smoke = smoke(shot).session_uid  # no check is under way
     assert drawn(shot, bpy.types.SMOKELIFT_PT_view).count("[choose_picture]") == 2
     assert bpy.ops.smokelift.choose_picture(setting=name, filepath=str(tmp_path / "a.png")) == {"FINISHED"}
     assert getattr(settings, name) == str(tmp_path / "a.png")
@@ -288,7 +251,6 @@ def test_pictures_are_chosen_among_pictures(shot, tmp_path, name) -> None:
 
 def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
     def said() -> bool:
-        bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
         return "inside its lines" in " ".join(map(str.strip, drawn(shot, bpy.types.SMOKELIFT_PT_view)))
 
     assert not said()
@@ -297,13 +259,13 @@ def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
 
 
 def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
-    state = bpy.context.window_manager.smokelift
+    state = shot_check.state
     for mode in ("SCENE", "ESTIMATE"):
         smoke(shot).smokelift.camera_mode = mode
         bpy.context.view_layer.update()
-        state.check_smoke = smoke(shot).session_uid
+        state.smoke = smoke(shot).session_uid
         bpy.context.view_layer.update()
-        assert shot_check.is_checked(state, smoke(shot))
+        assert state.fits(smoke(shot))
         smoke(shot).smokelift.box.scale.x *= 1.1
         bpy.context.view_layer.update()
-        assert shot_check.is_checked(state, smoke(shot)) == (mode == "ESTIMATE")
+        assert state.fits(smoke(shot)) == (mode == "ESTIMATE")

@@ -13,7 +13,7 @@ from addon.result import directing, smoke_takes
 from addon.scene import volume
 from addon.scene.blender import ShotError
 from addon.scene.smoke import activate, smokes
-from conftest import changed
+from conftest import changed, known_run
 from smokelift.direct import BoxObstacle, Mesh
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import DOMAIN, write_plume
@@ -157,8 +157,8 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     wanted = BoxObstacle((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
     np.testing.assert_array_equal(solid(files[-1], tmp_path), wanted)
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, row.done) == ("done", FRAMES + 5), row.sentence
+    (run,) = smoke_takes.runs
+    assert (run.job.outcome, run.job.done) == ("done", FRAMES + 5), run.job.sentence
     moved = Sequence.open(volume.shown_take(result).directory)
     part = DOMAIN.slices_in(moved.scene.domain)
     assert not moved.density(FRAMES + 5)[part][wanted].any()
@@ -273,17 +273,14 @@ def test_what_the_artist_shows_while_a_run_goes_on_stays(result, tmp_path) -> No
     """Also the result from before, unless it is an undo that brings that back."""
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
-    rows = bpy.context.window_manager.smokelift.jobs
-    for outcome in ("running", "waiting"):
-        row = rows.add()
-        row.take, row.smoke_uid, row.outcome = str(take.directory), result.session_uid, outcome
+    both = [known_run(result, take, outcome) for outcome in ("running", "waiting")]
     smoke_takes.show_while_made(result, take, shown, "running")
-    assert [row.left for row in rows] == [False, False]
+    assert [run.left for run in both] == [False, False]
     assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
     assert volume.shown_take(result) == shown
-    assert [row.left for row in rows] == [True, False]
+    assert [run.left for run in both] == [True, False]
     assert bpy.ops.smokelift.show_take(take=str(take.directory)) == {"FINISHED"}
-    assert [row.left for row in rows] == [False, False]
+    assert [run.left for run in both] == [False, False]
 
 
 # the pace that is tried out

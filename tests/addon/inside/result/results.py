@@ -11,7 +11,7 @@ from addon.core.take import Take, takes
 from addon.result import smoke_takes
 from addon.scene import volume
 from addon.scene.blender import absolute
-from conftest import changed, made
+from conftest import changed, known_run, made
 from tests.addon.inside.panel.tab import drawn
 from tests.example_shot import EXAMPLE, smoke
 
@@ -159,7 +159,6 @@ def test_results_that_were_moved_are_said_to_be_missing_and_found_in_their_new_f
     scene = bpy.context.scene
 
     def said() -> str:
-        bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
         return " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
 
     assert "are missing" in said() and "[choose_results]" in said()
@@ -182,7 +181,6 @@ def test_a_run_that_was_interrupted_is_said_when_its_file_is_opened(project, fra
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     scene = bpy.context.scene
-    bpy.context.window_manager.smokelift.check_smoke = smoke(scene).session_uid  # no check is under way
     said = " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
     assert "Take 2 was interrupted" in said
     assert ("[resume]" in said) == ("before its first frame" not in said) == bool(frames)
@@ -261,10 +259,7 @@ def test_undo_to_before_a_run_finds_its_result(project, saved_elsewhere) -> None
     assert obj.location.x == 0.0
     assert smoke_takes.output_folder(obj) == take.directory.parent
     assert own() == [1]
-    state = bpy.context.window_manager.smokelift
-    state.check_smoke = obj.session_uid  # no check is under way
-    row = state.jobs.add()
-    row.take, row.outcome, row.smoke_uid = str(take.directory), "done", obj.session_uid
+    known_run(obj, take, "done")
     assert "[show_take]" in drawn(bpy.context.scene, bpy.types.SMOKELIFT_PT_view)  # beside what the run said
     show(take)
     assert volume.shown_take(obj) == take

@@ -5,8 +5,10 @@ import sys
 import bpy
 import pytest
 
+from addon.core.job import EngineMissingError, Job
 from addon.core.take import Take, takes
 from addon.result import run_queue, smoke_takes
+from addon.result.smoke_takes import Run, runs
 from addon.scene import volume
 from addon.scene.smoke import find_smoke, new_smoke
 from conftest import made
@@ -33,12 +35,14 @@ def clip(blender) -> bpy.types.MovieClip:
     return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
 
 
-def queued(obj: bpy.types.Object, count: int) -> list:
-    """Takes of a smoke that wait."""
-    written = [smoke_takes.write_take(obj) for _ in range(count)]
-    for take in written:
-        row = bpy.context.window_manager.smokelift.jobs.add()
-        row.take, row.smoke_uid = str(take.directory), obj.session_uid
+def queued(obj: bpy.types.Object, count: int, engine: str = "", *words: str) -> list[Take]:
+    """Takes of a smoke that wait for a script in the engine's place."""
+    written = []
+    for _ in range(count):
+        take = smoke_takes.write_take(obj)
+        command = [sys.executable, "-c", engine, *words, *take.arguments()]
+        runs.append(Run(take, obj.session_uid, Job(command, take.log_file), (0, False)))
+        written.append(take)
     return written
 
 
@@ -56,7 +60,7 @@ for message in (
 
 def finished_before(obj: bpy.types.Object) -> Take:
     """A take that waits, with all its frames."""
-    (take,) = queued(obj, 1)
+    (take,) = queued(obj, 1, FRAMES)
     saved = {file: file.read_bytes() for file in (take.scene_file, take.request_file)}
     take.remove()
     made(take.directory.parent, number=int(take.directory.name[-4:]))
@@ -65,8 +69,7 @@ def finished_before(obj: bpy.types.Object) -> Take:
     return take
 
 
-def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", FRAMES])
+def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, tmp_path) -> None:
     other, active = new_smoke(scene, clip), new_smoke(scene, clip)
     for obj, frame in ((other, 40), (active, 2)):
         obj.smokelift.output = str(tmp_path / obj.name)
@@ -78,15 +81,13 @@ def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, 
         assert scene.frame_current in ((frame,) if frame == 40 else (1, 2))
 
 
-def test_runs_follow_one_another_and_a_failed_one_stops_none(scene, clip, tmp_path, monkeypatch) -> None:
+def test_runs_follow_one_another_and_a_failed_one_stops_none(scene, clip, tmp_path) -> None:
     obj, journal = new_smoke(scene, clip), tmp_path / "journal"
     obj.smokelift.output = str(tmp_path / "takes")
-    written = queued(obj, 3)
-    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", ENGINE, str(journal), *words])
+    written = queued(obj, 3, ENGINE, str(journal))
     run_queue.work(bpy.context)
-    rows = bpy.context.window_manager.smokelift.jobs
-    assert [row.outcome for row in rows] == ["done", "failed", "done"]
-    assert [row.sentence for row in rows] == ["Done.", "No clip.", "Done."]
+    assert [run.job.outcome for run in runs] == ["done", "failed", "done"]
+    assert [run.job.sentence for run in runs] == ["Done.", "No clip.", "Done."]
     first, second, third = (take.directory for take in written)
     wanted = [f"begin {first}", f"end {first}", f"begin {second}", f"begin {third}", f"end {third}"]
     assert journal.read_text().splitlines() == wanted
@@ -95,29 +96,35 @@ def test_runs_follow_one_another_and_a_failed_one_stops_none(scene, clip, tmp_pa
 def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
     obj = new_smoke(scene, clip)
     obj.smokelift.output = str(tmp_path)
-    take = smoke_takes.write_take(obj)
-    uid = obj.session_uid
-    assert find_smoke(uid) == obj
+    (take,) = queued(obj, 1)
+    assert find_smoke(obj.session_uid) == obj
     scene.collection.objects.unlink(obj)
-    assert find_smoke(uid) is None
-    rows = bpy.context.window_manager.smokelift.jobs
-    row = rows.add()
-    row.take, row.smoke_uid = str(take.directory), uid
+    assert find_smoke(obj.session_uid) is None
     run_queue.work(bpy.context)
-    assert rows[0].outcome == "cancelled"
+    assert runs[0].job.outcome == "cancelled"
     assert take.read().resumable
 
 
 def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
     obj = new_smoke(scene, clip)
     obj.smokelift.output = str(tmp_path)
-    rows, written = bpy.context.window_manager.smokelift.jobs, [smoke_takes.write_take(obj) for _ in range(3)]
-    for take in written:
-        row = rows.add()
-        row.take, row.smoke_uid = str(take.directory), obj.session_uid
-    rows[0].outcome = "running"
-    assert bpy.ops.smokelift.cancel(take=str(written[1].directory)) == {"FINISHED"}
-    assert [row.take for row in rows] == [str(written[0].directory), str(written[2].directory)]
-    assert takes(tmp_path) == [written[0], written[2]]
+    first, second, third = queued(obj, 3, "import sys; sys.stdin.read()")
+    running = runs[0].job
+    running.start()
+    assert bpy.ops.smokelift.cancel(take=str(second.directory)) == {"FINISHED"}
+    assert [run.take for run in runs] == takes(tmp_path) == [first, third]
     assert bpy.ops.smokelift.cancel() == {"FINISHED"}
-    assert [row.cancel for row in rows] == [True, False]
+    assert running.stopping and [run.job.outcome for run in runs] == ["running", "waiting"]
+    running.kill()
+
+
+def test_what_cannot_be_started_is_not_queued(scene, clip, tmp_path, monkeypatch) -> None:
+    def missing(_words: list[str]) -> list[str]:
+        raise EngineMissingError("It is missing.")
+
+    monkeypatch.setattr(run_queue, "engine_command", missing)
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    with pytest.raises(RuntimeError, match="missing"):
+        bpy.ops.smokelift.run()
+    assert runs == takes(tmp_path) == []

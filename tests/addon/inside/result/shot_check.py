@@ -41,17 +41,17 @@ def readings(journal: Path) -> int:
 
 
 def test_another_quality_is_known_and_another_shot_is_read(shot, engine) -> None:
-    state, settings = bpy.context.window_manager.smokelift, smoke(shot).smokelift
+    state, settings = shot_check.state, smoke(shot).smokelift
     for quality in QUALITIES:
         settings.quality = quality
         bpy.ops.smokelift.check()
-        assert state.check_done and not state.check_error
-        assert [cost.name for cost in state.costs] == list(QUALITIES)
+        assert state.done and not state.error
+        assert list(state.costs(smoke(shot))) == list(QUALITIES)
     assert readings(engine) == 1
     settings.albedo, settings.use_medium = 0.5, True
-    assert not state.check_done
+    assert not state.done
     bpy.ops.smokelift.check()
-    assert state.check_done and readings(engine) == 2
+    assert state.done and readings(engine) == 2
 
 
 def test_a_reading_of_the_same_shot_goes_on(shot, engine, monkeypatch) -> None:
@@ -73,7 +73,7 @@ def test_a_reading_can_be_stopped(shot, engine, monkeypatch) -> None:
     command = [sys.executable, "-c", ENGINE, str(engine), "30"]
     monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
     bpy.context.view_layer.update()
-    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid
+    shot_check.state.smoke = smoke(shot).session_uid
     shot_check._start(smoke(shot))
     job = shot_check.check_job.job
     assert "[stop_check]" in drawn(shot, bpy.types.SMOKELIFT_PT_view)
@@ -92,22 +92,4 @@ def test_a_run_does_not_read_the_clip_beside_a_check(shot, engine, tmp_path, mon
     job = shot_check.check_job.job
     assert bpy.ops.smokelift.run() == {"FINISHED"}
     assert job.outcome == "cancelled" and shot_check.check_job.job is None
-    assert not shot_check.is_checked(bpy.context.window_manager.smokelift, smoke(shot))
-
-
-def test_a_check_of_a_drawn_mask_is_not_ended_by_its_drawing(shot, engine) -> None:
-    state = bpy.context.window_manager.smokelift
-    bpy.ops.smokelift.new_mask()
-    line = smoke(shot).smokelift.drawn_mask.layers[0].splines.new()
-    line.points.add(3)
-    line.use_cyclic = True
-    for point, place in zip(line.points, [(0.2, 0.2), (0.8, 0.2), (0.8, 0.8)], strict=False):
-        point.co = place
-    for _ in range(2):
-        bpy.ops.smokelift.check()
-        assert not state.check_error
-        bpy.context.view_layer.update()
-        assert shot_check.is_checked(state, smoke(shot)) and state.check_done
-    line.points[0].co = (0.3, 0.3)
-    bpy.context.view_layer.update()
-    assert not shot_check.is_checked(state, smoke(shot))
+    assert not shot_check.state.fits(smoke(shot))

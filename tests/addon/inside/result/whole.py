@@ -10,6 +10,7 @@ import pytest
 
 import smokelift
 from addon.core.contract import QUALITIES
+from addon.core.job import Job
 from addon.core.take import Take, takes
 from addon.result import shot_check, smoke_takes
 from addon.scene import look, volume
@@ -63,12 +64,12 @@ def cut_off(run: smokelift.Reconstruction, folder: Path, count: int) -> None:
         run.write(folder, on_frame=cancel)
 
 
-def make(scene: bpy.types.Scene, folder: Path) -> bpy.types.PropertyGroup:
+def make(scene: bpy.types.Scene, folder: Path) -> Job:
     """Press the button; without a window that waits for the end."""
     choose(scene, folder)
     assert bpy.ops.smokelift.run() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    return row
+    (run,) = smoke_takes.runs
+    return run.job
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +107,8 @@ def test_a_shot_of_which_everything_is_given_is_made(shot, kept, tmp_path) -> No
     """Camera, box, sun and plate: frames, place and material are the engine's, and a render looks like the clip."""
     if hasattr(shot.cycles, "volume_biased"):
         shot.cycles.volume_biased = False  # as an artist has it
-    row = make(shot, kept)
-    assert (row.outcome, row.done, row.total) == ("done", 4, 4)
+    job = make(shot, kept)
+    assert (job.outcome, job.done, job.total) == ("done", 4, 4)
     sequence = Sequence.open(kept / "take_0001")
     assert sequence.complete
     data = smoke(shot).data
@@ -137,14 +138,14 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
     smoke(scene).smokelift.plate_mode, smoke(scene).smokelift.plate = "FILE", str(EXAMPLE / "plate.png")
     smoke(scene).smokelift.quality = "draft"
-    row = make(scene, tmp_path / "out")
-    assert row.outcome == "done"
+    job = make(scene, tmp_path / "out")
+    assert job.outcome == "done"
     assert cube.hide_render and cube.hide_viewport
     assert scene.frame_current == FIRST
     assert bpy.context.view_layer.objects.active == smoke(scene)
     assert smoke(scene).select_get()
-    assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
-    assert not row.doubts
+    assert "Camera not given" in Take(tmp_path / "out" / "take_0001").log_file.read_text()
+    assert not job.doubts
     whole, within = look_alike(scene, tmp_path)
     assert lamp.hide_render and lamp.hide_viewport
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
@@ -176,9 +177,9 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
     settings.clip = bpy.data.movieclips.load(str(tmp_path / "clip_0.png"))
     settings.output = str(tmp_path / "out")
     assert bpy.ops.smokelift.run() == {"FINISHED"}
-    (row,) = bpy.context.window_manager.smokelift.jobs
-    assert row.outcome == "done", row.sentence
-    sequence = Sequence.open(row.take)
+    (run,) = smoke_takes.runs
+    assert run.job.outcome == "done", run.job.sentence
+    sequence = Sequence.open(run.take.directory)
     for number in sequence.frames:
         found = np.average(points.reshape(-1, 3), axis=0, weights=sequence.density(number).ravel())
         assert np.abs(found - centre)[[0, 2]].max() < known.domain.voxel_size
@@ -194,32 +195,29 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
 
 def test_the_check_says_what_a_run_takes_and_assumes(shot, monkeypatch) -> None:
     bpy.ops.smokelift.check()
-    state = bpy.context.window_manager.smokelift
-    assert state.check_done
-    assert [cost.name for cost in state.costs] == list(QUALITIES)
-    draft, *_, final = state.costs
-    assert tuple(draft.resolution) == (44, 44, 64)
-    assert 1 < draft.seconds < final.seconds
-    assert 0.1 < draft.memory < min(final.memory, state.memory_free)
-    assert 1 < draft.disk < 100
-    assert final.lost < draft.lost < 0.2
-    assert "Background: " in state.notes
-    assert len(state.notes.split("\n")) <= 5
+    state = shot_check.state
+    assert state.done
+    costs, lines = state.costs(smoke(shot)), shot_check.found_lines(state.details["facts"])
+    assert list(costs) == list(QUALITIES)
+    draft, final = costs["draft"], costs["final"]
+    assert draft["resolution"] == [44, 44, 64]
+    assert 1 < draft["seconds"] < final["seconds"]
+    assert 0.1 * 2**30 < draft["memory"] < min(final["memory"], state.details["memory_free"])
+    assert 1e6 < draft["disk"] < 1e8
+    assert final["lost"] < draft["lost"] < 0.2
+    assert any(line.startswith("Background: ") for line in lines) and len(lines) <= 5
     assert bpy.ops.smokelift.show_page() == {"FINISHED"}
-    page = bpy.data.images[Path(state.check_page).name]
+    page = bpy.data.images[Path(state.page).name]
     assert page.size[0] > 1000
-    known = draft.seconds, state.notes, state.check_page
     with monkeypatch.context() as blocked:
         blocked.setattr(shot_check, "Job", None)  # a shot that was checked before is not measured anew
-        state.notes, state.check_done = "", False
-        state.costs.clear()
+        shot_check.forget()
         bpy.ops.smokelift.check()
-        assert state.check_done
-        assert (state.costs[0].seconds, state.notes, state.check_page) == known
+        assert state.done and state.costs(smoke(shot)) == costs
     shot.camera = None
     bpy.ops.smokelift.check()
-    assert not state.check_done
-    assert "no camera" in state.check_error
+    assert not state.done
+    assert "no camera" in state.error
 
 
 def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
@@ -275,8 +273,8 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     (tmp_path / "root" / "elsewhere").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "root" / "elsewhere" / "shot.blend"))
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
-    row = bpy.context.window_manager.smokelift.jobs[-1]
-    assert (row.outcome, row.done) == ("done", 2), row.sentence
+    job = smoke_takes.runs[-1].job
+    assert (job.outcome, job.done) == ("done", 2), job.sentence
     assert stopped.read().complete
 
     left.smokelift.output, right.smokelift.output = (str(folder) for folder in folders)

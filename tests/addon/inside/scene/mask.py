@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.core.take import Take
-from addon.result import smoke_takes
+from addon.result import shot_check, smoke_takes
 from addon.scene import mask
 from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables, shot_tables
@@ -176,18 +176,18 @@ def test_a_result_keeps_the_mask_that_it_was_made_with(shot, tmp_path, moves) ->
 
 def test_a_mask_that_is_drawn_on_is_checked_anew(shot) -> None:
     """But not one that only moves because the clip plays, nor another one."""
-    line, state = draw(shot), bpy.context.window_manager.smokelift
+    line, state = draw(shot), shot_check.state
     other = bpy.data.masks.new("Other").layers.new(name="Other").splines.new()
     bpy.context.view_layer.update()
-    state.check_smoke = smoke(shot).session_uid
+    state.smoke = smoke(shot).session_uid
     shot.frame_set(7)
     other.use_cyclic = True
     bpy.context.view_layer.update()
     shot_tables(smoke(shot), quick=True)
-    assert state.check_smoke
+    assert state.smoke
     line.points[0].co = (0.2, 0.1)
     bpy.context.view_layer.update()
-    assert not state.check_smoke
+    assert not state.smoke
 
 
 def test_a_mask_is_drawn_on_a_frame_that_is_used(shot) -> None:
