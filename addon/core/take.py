@@ -91,9 +91,6 @@ class Take:
     def _moving_files(self) -> list[Path]:
         return sorted(self.directory.parent.glob(f"{self.directory.name}_{'[0-9]' * 4}*.stl"))
 
-    def _mask_files(self) -> list[Path]:
-        return sorted(self.directory.parent.glob(f"{self.directory.name}_mask*.png"))
-
     def copy_mask(self, drawn: Path) -> str:
         """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
 
@@ -250,8 +247,7 @@ class Take:
     def remove(self) -> None:
         """Delete all its files."""
         shutil.rmtree(self.directory, ignore_errors=True)
-        own = (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file)
-        for file in (*own, *self._moving_files(), *self._mask_files()):
+        for file in self.directory.parent.glob(f"{self.directory.name}[._]*"):
             file.unlink(missing_ok=True)
 
 

@@ -12,10 +12,6 @@ from .common import RequiresResult, WritesFiles, refuse, sub_panels
 from .layout import draw_text, draw_work
 
 
-def _changed(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    size_estimate.ask(settings.id_data)
-
-
 class ExportSettings:
     """What is exported of a smoke."""
 
@@ -24,7 +20,6 @@ class ExportSettings:
         description="Folder for the export; by default export_ and the program's name, beside the results",
         subtype="DIR_PATH",
         options=PATH_OPTIONS,
-        update=_changed,
     )
     host: EnumProperty(
         name="For",
@@ -34,7 +29,6 @@ class ExportSettings:
             ("houdini", "Houdini", "Y up, grids density and vel"),
             ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
         ],
-        update=_changed,
     )
     precision: EnumProperty(
         name="Precision",
@@ -43,10 +37,9 @@ class ExportSettings:
             ("half", "Half", "Floats of 16 bits"),
             ("quantised", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
         ],
-        update=_changed,
     )
     use_velocity: BoolProperty(
-        name="Velocity", description="Export the velocity, which motion blur needs", default=True, update=_changed
+        name="Velocity", description="Export the velocity, which motion blur needs", default=True
     )
     proxy: EnumProperty(
         name="Proxy",
@@ -56,7 +49,6 @@ class ExportSettings:
             ("2", "1/2", "Half the resolution, an eighth of the voxels"),
             ("4", "1/4", "A quarter of the resolution"),
         ],
-        update=_changed,
     )
 
 
@@ -93,10 +85,7 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
     for name in ("host", "precision", "use_velocity", "proxy"):
         layout.prop(settings, name)
-    if not size_estimate.fits(smoke):
-        size_estimate.ask(smoke)
-    elif size_estimate.size:
-        draw_text(layout, context, size_estimate.size, "DISK_DRIVE")
+    draw_text(layout, context, size_estimate.size(smoke), "DISK_DRIVE")
     draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 

@@ -13,53 +13,39 @@ from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import ShotError, absolute, redraw
-from ..scene.smoke import active_smoke
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, RequiresClip, RequiresResult, refuse, sub_panels
+from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, RequiresClip, RequiresResult, sub_panels
 from .layout import draw_text
 
 
-class SMOKELIFT_OT_show_take(ChangesScene, RequiresClip, bpy.types.Operator):
+class _OnResult:
+    """An operator on one result."""
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def result(self) -> Take:
+        """The result; ShotError if it has no finished frame."""
+        take = Take(Path(self.take))
+        if not take.read().frames:
+            raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
+        return take
+
+
+class SMOKELIFT_OT_show_take(_OnResult, ChangesScene, RequiresClip, bpy.types.Operator):
     """Show this result in the smoke. Its place and its material stay as they are"""
 
     bl_label = "Show Result"
 
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = Take(Path(self.take))
-        if not take.read().frames:
-            raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
-        smoke_takes.choose(smoke, take)
+        smoke_takes.choose(smoke, self.result())
 
 
-class SMOKELIFT_OT_switch_take(ChangesScene, RequiresResult, bpy.types.Operator):
-    """Show the result that was shown before. Press again to come back"""
-
-    bl_label = "Previous Result"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if volume.take_before(active_smoke(context.scene)) is None:
-            return refuse(cls, "Show another result first")
-        return True
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        smoke_takes.choose(smoke, volume.take_before(smoke))
-
-
-class SMOKELIFT_OT_show_beside(ChangesScene, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_show_beside(_OnResult, ChangesScene, RequiresResult, bpy.types.Operator):
     """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
 
     bl_label = "Show Beside"
 
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = Take(Path(self.take))
-        if volume.show_beside(smoke, take) is None:
-            raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
+        volume.show_beside(smoke, self.result())
 
 
 class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, RequiresResult, bpy.types.Operator):
@@ -71,12 +57,11 @@ class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, RequiresResult, b
         smoke_takes.move_results(smoke, absolute(self.directory))
 
 
-class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_name_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
     """Give this result a name"""
 
     bl_label = "Name Result"
 
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
     title: StringProperty(name="Name", options={"SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -88,12 +73,10 @@ class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
         redraw(context.window_manager)
 
 
-class SMOKELIFT_OT_remove_take(ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_remove_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
     """Delete the files of this result"""
 
     bl_label = "Delete Result?"
-
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         take = Take(Path(self.take))
@@ -152,13 +135,12 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
         row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
         row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
         row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
-    if len(found) > 1:
-        column = layout.column()
-        column.operator("smokelift.switch_take", icon="FILE_REFRESH")
-        other = volume.take_before(smoke)
-        if other is not None:
-            text = iface_("Show {:s} Beside").format(other.read().title)
-            column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
+    other = volume.take_before(smoke)
+    if other is not None:
+        column, name = layout.column(), str(other.directory)
+        column.operator("smokelift.show_take", text="Previous Result", icon="FILE_REFRESH").take = name
+        text = iface_("Show {:s} Beside").format(other.read().title)
+        column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = name
     if found:
         draw_text(layout, context, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
     removable = earlier_takes(context)

@@ -26,43 +26,38 @@ class SizeEstimate:
     """The size of the next export of a smoke; never saved."""
 
     def __init__(self) -> None:
-        self.smoke = 0
-        self.size = ""
-        self._of: tuple[int, Path | None, int] | None = None
-        self.timer = self.start  # each `self.start` is another object, by which Blender knows a timer
+        self._of: tuple[object, ...] = ()
+        self._smoke, self._size = 0, ""
 
-    def fits(self, smoke: bpy.types.Object) -> bool:
-        """Whether it is of what a smoke shows now."""
-        return self._of == _shown(smoke)
-
-    def ask(self, smoke: bpy.types.Object) -> None:
-        """Estimate the size once the settings rest. Drawing code may call this."""
-        if not bpy.app.background and not writing_job.writing:
-            self.smoke, self.size, self._of = smoke.session_uid, "", _shown(smoke)
-            call_later(self.timer, REST_SECONDS)
+    def size(self, smoke: bpy.types.Object) -> str:
+        """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
+        now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
+        if self._of != now and not writing_job.writing:
+            self._of, self._smoke, self._size = now, smoke.session_uid, ""
+            call_later(_estimate, REST_SECONDS)
+        return self._size if self._of == now else ""
 
     def start(self) -> None:
-        """Start the engine; a timer that runs once."""
-        smoke = find_smoke(self.smoke)
+        """Ask the engine."""
+        smoke = find_smoke(self._smoke)
         if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
             return
         try:
             writing_job.start(smoke, ([*arguments(smoke), "--size"], self._store))
         except EngineMissingError as error:
-            self.size = str(error)
+            self._size = str(error)
 
     def _store(self, _smoke: bpy.types.Object, job: Job) -> None:
         done = job.outcome == "done"
-        self.size = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
-
-
-def _shown(smoke: bpy.types.Object) -> tuple[int, Path | None, int]:
-    """A smoke by its number, the take that it shows, and how many frames that has."""
-    take = volume.shown_take(smoke)
-    return smoke.session_uid, take and take.directory, take.read().frames if take else 0
+        self._size = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
 
 
 size_estimate = SizeEstimate()
+
+
+def _estimate() -> None:
+    """Ask once the settings rest; a timer."""
+    size_estimate.start()
 
 
 def folder_of(smoke: bpy.types.Object) -> Path:
@@ -157,6 +152,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister it, and the estimate that waits."""
-    cancel_call(size_estimate.timer)
+    cancel_call(_estimate)
     if getattr(SMOKELIFT_USD_import, "is_registered", False):
         bpy.utils.unregister_class(SMOKELIFT_USD_import)

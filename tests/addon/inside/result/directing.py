@@ -250,7 +250,8 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
     assert result.data.sequence_mode == "REPEAT"
     assert result.data.frame_duration == 4
-    assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
+    before = volume.take_before(result)
+    assert bpy.ops.smokelift.show_take(take=str(before.directory)) == {"FINISHED"}
     assert (result.data.sequence_mode, result.data.frame_duration) == ("CLIP", FRAMES)
     settings.direction, settings.speed, settings.live = "retime", 0.5, True
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
@@ -276,7 +277,7 @@ def test_what_the_artist_shows_while_a_run_goes_on_stays(result, tmp_path) -> No
     both = [known_run(result, take, outcome) for outcome in ("running", "waiting")]
     smoke_takes.show_while_made(result, take, shown, "running")
     assert [run.left for run in both] == [False, False]
-    assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
+    assert bpy.ops.smokelift.show_take(take=str(shown.directory)) == {"FINISHED"}
     assert volume.shown_take(result) == shown
     assert [run.left for run in both] == [True, False]
     assert bpy.ops.smokelift.show_take(take=str(take.directory)) == {"FINISHED"}

@@ -138,12 +138,17 @@ def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
     assert grids(obj.data, start + 1) == ("smoke_0002.vdb", {"density", "velocity"})
 
 
-def test_the_size_is_that_of_what_is_on_show(made, tmp_path) -> None:
+def test_the_size_is_that_of_what_is_on_show(made, monkeypatch) -> None:
+    """And of the settings: it is asked for once."""
+    asked = []
+    monkeypatch.setattr(export, "call_later", lambda *_: asked.append(1))
     estimate = export.SizeEstimate()
-    assert not estimate.fits(made)
-    estimate._of = export._shown(made)
-    assert estimate.fits(made)
+    assert estimate.size(made) == estimate.size(made) == "" and len(asked) == 1
+    estimate._size = "About 3 MB"
+    assert estimate.size(made) == "About 3 MB"
     directory = volume.shown_take(made).directory
     shutil.copytree(directory, directory.with_name("take_0002"))
     volume.show(made, Take(directory.with_name("take_0002")))
-    assert not estimate.fits(made)
+    assert estimate.size(made) == "" and len(asked) == 2
+    made.smokelift_export.proxy = "2"
+    assert estimate.size(made) == "" and len(asked) == 3
