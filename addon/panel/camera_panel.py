@@ -6,25 +6,23 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
-from ..result import shot_check
 from ..scene.blender import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
 from ..scene.floor import Floor
 from ..scene.shot_setup import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ChangesScene, RequiresClip, automatic_unless, check_changed, closed_sides, refuse
+from .common import ChangesScene, RequiresClip, automatic_unless, closed_sides, refuse
 from .layout import draw_automatic, draw_closed
 
 USUAL_DISTANCE = 2.0
 """Meters from which a distance is given by hand where there is no box."""
 
 
-def _box_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+def _box_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """A box belongs to the scene's camera."""
     if settings.box is not None:
         settings.camera_mode = "SCENE"
-    check_changed(settings, context)
 
 
 def _middle_of_box(settings: bpy.types.PropertyGroup) -> float:
@@ -58,7 +56,6 @@ class ShotSettings:
             ),
             ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
         ],
-        update=check_changed,
     )
     box: PointerProperty(
         name="Box",
@@ -72,7 +69,6 @@ class ShotSettings:
         description=("Empty at the smoke's source, as large as the opening. Without one, sources are estimated"),
         type=bpy.types.Object,
         poll=_is_empty,
-        update=check_changed,
     )
     distance: FloatProperty(
         name="Distance",
@@ -81,12 +77,10 @@ class ShotSettings:
         subtype="DISTANCE",
         default=0.0,
         min=0.0,
-        update=check_changed,
     )
     use_distance: automatic_unless("distance", "Distance", _middle_of_box)
     closed: closed_sides(
         "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
-        update=check_changed,
     )
     light_mode: EnumProperty(
         name="Light",
@@ -95,11 +89,8 @@ class ShotSettings:
             ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
             ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
         ],
-        update=check_changed,
     )
-    use_medium: BoolProperty(
-        name="Smoke Material", description="Set the smoke's optical properties", update=check_changed
-    )
+    use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties")
     extinction: FloatProperty(
         name="Extinction",
         description="Extinction coefficient per meter of smoke of density 1",
@@ -107,7 +98,6 @@ class ShotSettings:
         min=0.001,
         max=1e9,
         soft_max=50.0,
-        update=check_changed,
     )
     albedo: FloatProperty(
         name="Albedo",
@@ -115,7 +105,6 @@ class ShotSettings:
         default=0.9,
         min=0.0,
         max=1.0,
-        update=check_changed,
     )
     anisotropy: FloatProperty(
         name="Anisotropy",
@@ -123,7 +112,6 @@ class ShotSettings:
         default=0.0,
         min=-0.95,
         max=0.95,
-        update=check_changed,
     )
 
 
@@ -152,7 +140,6 @@ class SMOKELIFT_OT_make_box(ChangesScene, bpy.types.Operator):
         box.rotation_euler = (0.0, 0.0, 0.0)
         box.location = (low + high) / 2
         box.scale = (high - low) / 2
-        shot_check.forget()
 
 
 class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
@@ -220,7 +207,6 @@ class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
     def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
-        shot_check.forget()
         return outcome
 
 

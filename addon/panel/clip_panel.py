@@ -14,13 +14,13 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..result import shot_check, smoke_takes
+from ..result import smoke_takes
 from ..scene import shot_setup
 from ..scene.blender import ShotError, absolute, frame_rate, relative
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
-from .common import ActsOnSmoke, ChangesScene, ChoosesFile, RequiresClip, automatic_unless, check_changed, refuse
+from .common import ActsOnSmoke, ChangesScene, ChoosesFile, RequiresClip, automatic_unless, refuse
 from .editors import open_tab, show_clip
 from .layout import draw_text
 
@@ -51,14 +51,12 @@ class ClipSettings:
         description="First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
         default=1,
         min=1,
-        update=check_changed,
     )
     last: IntProperty(
         name="Last",
         description="Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
         default=1,
         min=1,
-        update=check_changed,
     )
     plate_mode: EnumProperty(
         name="Background",
@@ -73,7 +71,6 @@ class ClipSettings:
             ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
             ("COLOR", "Color", "One color, as behind stock footage on black"),
         ],
-        update=check_changed,
     )
     plate_color: FloatVectorProperty(
         name="Background Color",
@@ -82,7 +79,6 @@ class ClipSettings:
         default=(0.0, 0.0, 0.0),
         min=0.0,
         soft_max=1.0,
-        update=check_changed,
     )
     plate: StringProperty(
         name="Clean Plate",
@@ -90,26 +86,22 @@ class ClipSettings:
             "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, "
             "with one image for each frame of the clip"
         ),
-        update=check_changed,
     )
     plate_frames: StringProperty(
         name="Frames",
         description="Frames of the clip without smoke, counted from 1 and separated by commas",
-        update=check_changed,
     )
     strokes: PointerProperty(
         name="Strokes",
         description="Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel "
         "shows the background. Nothing is said of the rest, which is transparent",
         type=bpy.types.Image,
-        update=check_changed,
     )
     drawn_mask: PointerProperty(
         name="Mask",
         description="Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is "
         "inverted, and nowhere else, whatever moves there",
         type=bpy.types.Mask,
-        update=check_changed,
     )
     mask: StringProperty(
         name="Mask File",
@@ -117,7 +109,6 @@ class ClipSettings:
             "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
             "mask_####.png, with one for each frame of the clip"
         ),
-        update=check_changed,
     )
     fps: FloatProperty(
         name="Frame Rate",
@@ -125,7 +116,6 @@ class ClipSettings:
         default=0.0,
         min=0.0,
         soft_max=1000.0,
-        update=check_changed,
     )
     use_fps: automatic_unless("fps", "Frame Rate", 120.0)
     transfer: EnumProperty(
@@ -136,7 +126,6 @@ class ClipSettings:
             ("srgb", "sRGB", "Ordinary video and pictures"),
             ("linear", "Linear Rec.709", "Proportional to light"),
         ],
-        update=check_changed,
     )
 
 
@@ -184,7 +173,6 @@ class SMOKELIFT_OT_match_clip(ChangesScene, RequiresClip, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         shot_setup.match_clip(smoke)
-        shot_check.forget()
 
 
 class SMOKELIFT_OT_undistort(ChangesScene, bpy.types.Operator):

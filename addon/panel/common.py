@@ -9,7 +9,6 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..core.contract import SIDES
 from ..core.job import EngineMissingError
 from ..core.take import TakeError
-from ..result.shot_check import forget
 from ..result.side_job import Request, writing_job
 from ..scene import volume
 from ..scene.blender import ShotError
@@ -183,11 +182,6 @@ def closed_sides(description: str, **options: Any) -> Any:
     return EnumProperty(
         name="Closed Sides", description=description, items=items, options={"ANIMATABLE", "ENUM_FLAG"}, **options
     )
-
-
-def check_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Check the shot again: one of its settings has changed."""
-    forget()
 
 
 def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty
 from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
-from .common import ActsOnSmoke, RequiresClip, automatic_unless, check_changed
+from .common import ActsOnSmoke, RequiresClip, automatic_unless
 from .layout import draw_doubt, draw_failure, draw_text
 
 SEEDS = 2**31
@@ -31,7 +31,6 @@ class QualitySettings:
             ("final", "Final", "All of the clip's detail, a voxel a pixel: much memory, seconds to minutes a frame"),
         ],
         default="balanced",
-        update=check_changed,
     )
     detail: FloatProperty(
         name="Depth Detail",
@@ -43,7 +42,6 @@ class QualitySettings:
         default=1.0,
         min=0.0,
         max=1.0,
-        update=check_changed,
     )
     seed: IntProperty(
         name="Variation",
@@ -58,7 +56,6 @@ class QualitySettings:
         default=0,
         min=0,
         max=1024,
-        update=check_changed,
     )
     use_longest_side: automatic_unless("longest_side", "Resolution", BOX_VOXELS)
     device: EnumProperty(
@@ -120,7 +117,7 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
                 cell.active = checked and state.done
                 cell.alert = cost["memory"] > state.details["memory_free"]
                 cell.label(text=word, translate=False)
-    reading = not state.done if checked else shot_check.check_soon(context)
+    reading = not state.done if checked else shot_check.check_soon(context, smoke)
     if state.error or not (checked or reading):
         layout.operator("smokelift.check", icon="VIEWZOOM")
     elif reading:

@@ -4,7 +4,6 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, PointerProperty
 
-from ..result import shot_check
 from ..scene import shot_setup, volume
 from ..scene.blender import ShotError
 from .common import ChangesScene, RequiresClip, RequiresClipAndResult, sub_panels
@@ -90,7 +89,6 @@ class SMOKELIFT_OT_set_up(ChangesScene, RequiresClipAndResult, bpy.types.Operato
         if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "CAMERA"
         volume.show(smoke, take)  # the frame rate may have changed
-        shot_check.forget()
         done = rpt_("The shot is set up: press F12 for a render that matches the clip.")
         self.report({"INFO"}, " ".join([done, *said]))
 

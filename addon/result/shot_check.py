@@ -17,9 +17,10 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core.job import EngineMissingError, Job
 from ..core.take import Take, TakeError
 from ..scene.blender import ShotError, absolute, redraw, thread_options
+from ..scene.box import box_corners, box_of
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
-from ..scene.smoke import active_smoke, find_smoke
+from ..scene.smoke import active_smoke, scene_of, smokes
 from .side_job import REST_SECONDS, SideJob, call_later, cancel_call
 from .smoke_takes import runs
 
@@ -54,8 +55,8 @@ class ShotCheck:
 
     Attributes
     ----------
-    smoke
-        The number of the smoke that was checked as it is; 0 where it has changed.
+    settings
+        Those of the smoke that was checked, as `settings_text` has them; empty where something else has changed.
     page
         Picture of what was found.
     done, error
@@ -64,32 +65,49 @@ class ShotCheck:
         The number of the smoke that the engine spoke of last, and what it said at its end.
     doubts
         Why the result may be wrong, as `Job` has them.
+    awaited
+        Those of the smoke that is checked soon.
     """
 
-    smoke: int = 0
+    settings: str = ""
     page: str = ""
     done: bool = False
     error: str = ""
     of: int = 0
     details: Mapping[str, Any] = field(default_factory=dict)
     doubts: list[tuple[str, str]] = field(default_factory=list)
+    awaited: str = ""
 
     def fits(self, smoke: bpy.types.Object) -> bool:
         """Whether it is of this smoke as it is."""
-        return self.smoke == smoke.session_uid
+        return self.settings == settings_text(smoke)
 
     def costs(self, smoke: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
         """What each quality takes and loses, also of this smoke before its last change; nothing of one that failed."""
         failed = self.fits(smoke) and self.error
         return self.details["qualities"] if self.of == smoke.session_uid and not failed else {}
 
-    def store(self, details: Mapping[str, Any], doubts: list[tuple[str, str]]) -> None:
+    def store(self, smoke: bpy.types.Object, details: Mapping[str, Any], doubts: list[tuple[str, str]]) -> None:
         """Keep what the engine said of the smoke."""
-        self.done, self.of, self.details, self.doubts = True, self.smoke, details, doubts
+        self.done, self.of, self.details, self.doubts = True, smoke.session_uid, details, doubts
 
 
 state = ShotCheck()
 """That of this session, which is never saved."""
+
+
+def settings_text(smoke: bpy.types.Object) -> str:
+    """All settings of a smoke, its scene's size and rate, and the place of its box, as a text to compare them by.
+
+    Some of them decide nothing; the engine is not asked again about a shot that differs in those alone.
+    """
+    settings, render = smoke.smokelift, scene_of(smoke).render
+    values = [getattr(settings, setting.identifier) for setting in settings.bl_rna.properties]
+    box = box_of(smoke) if settings.camera_mode == "SCENE" else None
+    place = [f"{number:.5g}" for corner in box_corners(box) for number in corner] if box is not None else []
+    size = (render.resolution_x, render.resolution_y, render.fps, render.fps_base)
+    return repr((smoke.session_uid, values, size, place))
+
 
 check_job = SideJob()
 """The check's own, beside which files may be written."""
@@ -97,8 +115,8 @@ check_job = SideJob()
 
 def check(smoke: bpy.types.Object) -> None:
     """Check a shot; without a window, to the end."""
-    bpy.context.view_layer.update()  # or what waits to be evaluated would count as a later change
-    state.smoke, state.done, state.error = smoke.session_uid, False, ""
+    bpy.context.view_layer.update()  # or the box would be where it was
+    state.settings, state.done, state.error = settings_text(smoke), False, ""
     _start(smoke)
     if bpy.app.background:
         check_job.wait()
@@ -106,34 +124,29 @@ def check(smoke: bpy.types.Object) -> None:
 
 def stop(smoke: bpy.types.Object) -> None:
     """Stop reading the clip, until a setting changes or the artist asks for a check."""
-    check_job.stop()
-    forget()
-    state.smoke = smoke.session_uid
+    make_way()
+    state.settings, state.done = settings_text(smoke), False
     state.error = rpt_("Time and memory are not estimated: Check Shot does it.")
 
 
 def make_way() -> None:
     """Stop reading the clip for a run, which reads it too; the tab begins again when no run is left."""
-    if check_job.job is not None or bpy.app.timers.is_registered(_start_later):
-        check_job.stop()
-        forget()
-
-
-def forget() -> None:
-    """Forget the last check, for the shot has changed; the tab begins another when it is drawn."""
     cancel_call(_start_later)
-    state.smoke, state.done, state.error = 0, False, ""
+    if check_job.job is not None:
+        check_job.stop()
+        state.settings = ""
 
 
-def check_soon(context: bpy.types.Context) -> bool:
-    """Have the active smoke checked once its settings rest, if no run is at work; whether it will be.
+def check_soon(context: bpy.types.Context, smoke: bpy.types.Object) -> bool:
+    """Have the smoke in the tab checked once its settings rest, if no run is at work; whether it will be.
 
     Drawing code may call this.
     """
     busy = any(not run.job.ended for run in runs)
     if busy or bpy.app.background or context.window != context.window_manager.windows[0]:
         return False
-    if not bpy.app.timers.is_registered(_start_later):
+    if not bpy.app.timers.is_registered(_start_later) or state.awaited != settings_text(smoke):
+        state.awaited = settings_text(smoke)
         call_later(_start_later, REST_SECONDS)
     return True
 
@@ -164,7 +177,7 @@ def _start(smoke: bpy.types.Object) -> None:
         check_job.stop()
         state.done, state.page = False, str(page)
         if shot in _known:
-            state.store(*_known[shot])
+            state.store(smoke, *_known[shot])
             return
 
         def store(smoke: bpy.types.Object, job: Job) -> None:
@@ -173,7 +186,7 @@ def _start(smoke: bpy.types.Object) -> None:
             if not state.fits(smoke):  # it has changed meanwhile
                 return
             if job.outcome == "done":
-                state.store(*_known[shot])
+                state.store(smoke, *_known[shot])
             else:
                 state.error = job.sentence
 
@@ -199,27 +212,21 @@ def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -
 
 
 @persistent
-def _when_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Forget the check of a smoke whose mask was drawn on, or whose box was moved."""
-    manager = bpy.context.window_manager
-    smoke = find_smoke(state.smoke)
-    if smoke is None or smoke.name not in scene.objects:
+def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Forget the last check where the mask of a smoke was drawn on; the tab begins another when it is drawn."""
+    if not state.settings or not depsgraph.id_type_updated("MASK"):
         return
-    settings = smoke.smokelift
-    box = settings.box if settings.camera_mode == "SCENE" else None
-    for update in depsgraph.updates:
-        changed = update.id.original
-        if changed == settings.drawn_mask or (changed == box and update.is_updated_transform):
-            forget()
-            redraw(manager)
-            return
+    changed = {update.id.original for update in depsgraph.updates}
+    if any(smoke.smokelift.drawn_mask in changed for smoke in smokes(scene)):
+        state.settings = ""
+        redraw(bpy.context.window_manager)
 
 
 def register() -> None:
-    bpy.app.handlers.depsgraph_update_post.append(_when_changed)
+    bpy.app.handlers.depsgraph_update_post.append(_when_drawn_on)
 
 
 def unregister() -> None:
     """End what would start a check."""
-    bpy.app.handlers.depsgraph_update_post.remove(_when_changed)
+    bpy.app.handlers.depsgraph_update_post.remove(_when_drawn_on)
     cancel_call(_start_later)

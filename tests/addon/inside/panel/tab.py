@@ -63,8 +63,8 @@ def know(scene: bpy.types.Scene, doubts: list[tuple[str, str]] | None = None, **
     each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "disk": 3e7, "lost": 0.0772, **figures}
     details = {"memory_free": 2**33, "qualities": dict.fromkeys(QUALITIES, each)}
     details["facts"] = [{"what": "background", "short": "a picture"}]
-    shot_check.state.smoke, shot_check.state.error = smoke(scene).session_uid, ""
-    shot_check.state.store(details, doubts or [])
+    shot_check.state.settings, shot_check.state.error = shot_check.settings_text(smoke(scene)), ""
+    shot_check.state.store(smoke(scene), details, doubts or [])
 
 
 def test_no_line_is_cut_off(shot, tmp_path) -> None:
@@ -162,9 +162,9 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     know(shot)
     assert shown() == [4, 4, 4, 4]
     smoke(shot).smokelift.albedo = 0.5
-    assert not state.done
+    assert not state.fits(smoke(shot))
     assert shown() == [4, 4, 4, 4]
-    state.smoke, state.error = smoke(shot).session_uid, "The box is flat."
+    state.settings, state.error = shot_check.settings_text(smoke(shot)), "The box is flat."
     assert shown() == [0, 0, 0, 0]
     know(shot)
     state.of += 1
@@ -192,7 +192,7 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
 def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot, tmp_path) -> None:
     """In the check that ends with it and below the run, and below no other failure."""
     refused = f"{MOVING_CAMERA} from the clip. Stabilize the clip."
-    shot_check.state.smoke, shot_check.state.error = smoke(shot).session_uid, refused
+    shot_check.state.settings, shot_check.state.error = shot_check.settings_text(smoke(shot)), refused
     job = known_run(smoke(shot), Take(tmp_path), "failed", refused).job
     texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
     assert texts.count("[track_clip]") == 2
@@ -259,13 +259,10 @@ def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
 
 
 def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
-    state = shot_check.state
     for mode in ("SCENE", "ESTIMATE"):
         smoke(shot).smokelift.camera_mode = mode
         bpy.context.view_layer.update()
-        state.smoke = smoke(shot).session_uid
-        bpy.context.view_layer.update()
-        assert state.fits(smoke(shot))
+        know(shot)
         smoke(shot).smokelift.box.scale.x *= 1.1
         bpy.context.view_layer.update()
-        assert state.fits(smoke(shot)) == (mode == "ESTIMATE")
+        assert shot_check.state.fits(smoke(shot)) == (mode == "ESTIMATE")

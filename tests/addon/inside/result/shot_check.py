@@ -49,7 +49,7 @@ def test_another_quality_is_known_and_another_shot_is_read(shot, engine) -> None
         assert list(state.costs(smoke(shot))) == list(QUALITIES)
     assert readings(engine) == 1
     settings.albedo, settings.use_medium = 0.5, True
-    assert not state.done
+    assert not state.fits(smoke(shot))
     bpy.ops.smokelift.check()
     assert state.done and readings(engine) == 2
 
@@ -73,7 +73,7 @@ def test_a_reading_can_be_stopped(shot, engine, monkeypatch) -> None:
     command = [sys.executable, "-c", ENGINE, str(engine), "30"]
     monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
     bpy.context.view_layer.update()
-    shot_check.state.smoke = smoke(shot).session_uid
+    shot_check.state.settings = shot_check.settings_text(smoke(shot))
     shot_check._start(smoke(shot))
     job = shot_check.check_job.job
     assert "[stop_check]" in drawn(shot, bpy.types.SMOKELIFT_PT_view)

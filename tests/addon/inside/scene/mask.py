@@ -179,15 +179,15 @@ def test_a_mask_that_is_drawn_on_is_checked_anew(shot) -> None:
     line, state = draw(shot), shot_check.state
     other = bpy.data.masks.new("Other").layers.new(name="Other").splines.new()
     bpy.context.view_layer.update()
-    state.smoke = smoke(shot).session_uid
+    state.settings = shot_check.settings_text(smoke(shot))
     shot.frame_set(7)
     other.use_cyclic = True
     bpy.context.view_layer.update()
     shot_tables(smoke(shot), quick=True)
-    assert state.smoke
+    assert state.settings
     line.points[0].co = (0.2, 0.1)
     bpy.context.view_layer.update()
-    assert not state.smoke
+    assert not state.settings
 
 
 def test_a_mask_is_drawn_on_a_frame_that_is_used(shot) -> None:
