@@ -67,6 +67,12 @@ def shot(scene) -> bpy.types.Scene:
     return set_up_example(scene)
 
 
+@pytest.fixture
+def clip(blender) -> bpy.types.MovieClip:
+    """The example's."""
+    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+
+
 def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium | None = None, number: int = 1) -> Take:
     """A take as the engine leaves it: smoke that fills a box in a corner of the domain, and the first frame empty."""
     take = Take(folder / f"take_{number:04d}")
@@ -101,6 +107,15 @@ def changed(take: Take) -> Iterator[dict[str, Any]]:
     index = json.loads(file.read_text())
     yield index
     file.write_text(json.dumps(index))
+
+
+def played(obj: bpy.types.Object, frame: int) -> str:
+    """Name of the file that the viewport shows of a Volume in a frame; empty where it shows none."""
+    bpy.context.scene.frame_set(frame)
+    data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    data.grids.load()
+    assert data.grids.error_message == ""
+    return Path(data.grids.frame_filepath).name
 
 
 def rendered(scene: bpy.types.Scene, path: Path) -> Any:

@@ -22,12 +22,6 @@ def user(blender) -> Iterator[bpy.types.AddonPreferences]:
     bpy.context.preferences.addons.remove(entry)
 
 
-@pytest.fixture
-def clip(blender) -> bpy.types.MovieClip:
-    """The example's."""
-    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-
-
 def test_without_preferences_everything_is_as_usual(scene, clip) -> None:
     obj = new_smoke(scene, clip)
     assert obj.smokelift.quality == "balanced"

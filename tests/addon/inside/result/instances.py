@@ -1,12 +1,10 @@
 """Another object that plays a smoke's files at its own time."""
 
-from pathlib import Path
-
 import bpy
 import pytest
 
 from addon.scene import volume
-from conftest import FRAMES, made
+from conftest import FRAMES, made, played
 from smokelift.scene import Medium
 from tests.example_shot import smoke
 
@@ -17,14 +15,6 @@ def shown(scene, tmp_path) -> bpy.types.Object:
     obj = volume.show(smoke(scene), made(tmp_path, medium=Medium(4.0, 0.8)))
     bpy.context.view_layer.objects.active = obj
     return obj
-
-
-def played(obj: bpy.types.Object, frame: int) -> str:
-    """The file that a Volume shows in a frame; none before and after its frames."""
-    bpy.context.scene.frame_set(frame)
-    data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    data.grids.load()
-    return Path(data.grids.frame_filepath).name
 
 
 def test_an_instance_plays_later_once_or_again(shown) -> None:

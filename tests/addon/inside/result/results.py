@@ -34,11 +34,7 @@ def finished(direction: str = "", source: Take | None = None) -> Take:
     if source is not None:
         take.write_directed(direction, source, [])
         take.note_file(Path(bpy.data.filepath))
-    kept = {file: file.read_bytes() for file in (take.scene_file, take.request_file)}
-    take.remove()
     made(take.directory.parent, number=int(take.directory.name[-4:]))
-    for file, content in kept.items():
-        file.write_bytes(content)
     return take
 
 

@@ -12,7 +12,6 @@ from addon.result.smoke_takes import Run, runs
 from addon.scene import volume
 from addon.scene.smoke import find_smoke, new_smoke
 from conftest import made
-from tests.example_shot import EXAMPLE
 
 ENGINE = """
 import json, sys
@@ -27,12 +26,6 @@ with journal.open("a") as file:
     print("end", out, file=file, flush=True)
 """
 """Stands in for the engine: the second run fails."""
-
-
-@pytest.fixture
-def clip(blender) -> bpy.types.MovieClip:
-    """The example's."""
-    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
 
 
 def queued(obj: bpy.types.Object, count: int, engine: str = "", *words: str) -> list[Take]:
@@ -61,11 +54,7 @@ for message in (
 def finished_before(obj: bpy.types.Object) -> Take:
     """A take that waits, with all its frames."""
     (take,) = queued(obj, 1, FRAMES)
-    saved = {file: file.read_bytes() for file in (take.scene_file, take.request_file)}
-    take.remove()
     made(take.directory.parent, number=int(take.directory.name[-4:]))
-    for file, content in saved.items():
-        file.write_bytes(content)
     return take
 
 

@@ -1,9 +1,12 @@
 """How the smoke looks: presets and fire."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 
+from addon.core.take import Take
 from addon.scene import look, volume
 from addon.scene.smoke import is_override, smokes
 from conftest import made, rendered
@@ -38,9 +41,26 @@ def node(scene: bpy.types.Scene) -> bpy.types.ShaderNode:
     return look.node_of(smoke(scene))
 
 
+def blacken(scene: bpy.types.Scene, sun: bool = True) -> None:
+    """Put black behind the smoke, and nothing but its fire into the scene where the sun is hidden too."""
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    bpy.data.objects["Sun"].hide_render = not sun
+
+
+def burning(folder: Path, grid: str, medium: Medium, number: int = 1) -> Take:
+    """A take of `made` whose third file has its density as the grid of a fire, too."""
+    take = made(folder, medium=medium, number=number)
+    file = take.directory / "smoke_0003.vdb"
+    grids, metadata = vdb_module().readAll(str(file))
+    fire = next(each for each in grids if each.name == "density").deepCopy()
+    fire.name = grid
+    vdb_module().write(str(file), [*grids, fire], metadata)
+    return take
+
+
 def test_presets_look_different(lit, tmp_path) -> None:
     """In the sun before black: soot is dark, mist thin, dust red, steam white and brightest against the light."""
-    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    blacken(lit)
     volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
     seen = {}
     for name in look.PRESETS:
@@ -75,7 +95,7 @@ def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) ->
     [("Edge Contrast", 2.0, 0.03, 0.25), ("Edge Contrast", 0.5, 1.8, 5.0), ("Density", 4.0, 3.0, 4.5)],
 )
 def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
-    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    blacken(lit)
     lit.cycles.samples = 512
     volume.show(smoke(lit), made(tmp_path, medium=Medium(0.02, 0.8)))  # so thin that all of it is an edge
     before = rendered(lit, tmp_path / "before.exr").sum()
@@ -87,7 +107,7 @@ def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
 
 
 def test_smoke_evaporates_on_its_way_up(lit, tmp_path) -> None:
-    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    blacken(lit)
     volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
     inputs = node(lit).inputs
     assert (inputs["Floor"].default_value, inputs["Height"].default_value) == (0.0, 3.0)
@@ -104,33 +124,18 @@ def test_smoke_evaporates_on_its_way_up(lit, tmp_path) -> None:
 
 @pytest.mark.parametrize("grid", ["flame", "temperature"])
 def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
-    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
-    bpy.data.objects["Sun"].hide_render = True
+    blacken(lit, sun=False)
     volume.show(smoke(lit), made(tmp_path))
     assert rendered(lit, tmp_path / "dark.exr").max() == 0.0
-    take = made(tmp_path, number=2)
-    openvdb = vdb_module()
-    file = take.directory / "smoke_0003.vdb"
-    grids, metadata = openvdb.readAll(str(file))
-    density = next(each for each in grids if each.name == "density")
-    fire = density.deepCopy()
-    fire.name = grid
-    openvdb.write(str(file), [*grids, fire], metadata)
-    volume.show(smoke(lit), take)
+    volume.show(smoke(lit), burning(tmp_path, grid, MEDIUM, number=2))
     assert rendered(lit, tmp_path / "fire.exr").max() > 0.01
 
 
 def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_path) -> None:
-    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
-    bpy.data.objects["Sun"].hide_render = True
+    blacken(lit, sun=False)
     lit.cycles.samples = 4096
-    take = made(tmp_path, medium=Medium(1e-4, 0.8, flame_color=(1.0, 0.4, 0.1)))
-    file = take.directory / "smoke_0003.vdb"
-    grids, metadata = vdb_module().readAll(str(file))
-    flame = next(each for each in grids if each.name == "density").deepCopy()
-    flame.name = "flame"
-    vdb_module().write(str(file), [*grids, flame], metadata)
-    volume.show(smoke(lit), take)
+    medium = Medium(1e-4, 0.8, flame_color=(1.0, 0.4, 0.1))
+    volume.show(smoke(lit), burning(tmp_path, "flame", medium))
     assert node(lit).inputs["Flame Color"].default_value[:] == pytest.approx((1.0, 0.4, 0.1, 1.0))
     seen = rendered(lit, tmp_path / "fire.exr")
     np.testing.assert_allclose(seen[3:5, 3:5].mean((0, 1)), (1.0, 0.4, 0.1), rtol=0.03)

@@ -59,18 +59,16 @@ def test_the_clip_is_made_straight(bent, tmp_path) -> None:
     assert not bpy.ops.smokelift.undistort.poll()
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "said"), [("plate_mode", "FILE", "clean plate"), ("mask", "//mask.png", "mask")]
-)
-def test_what_is_distorted_too_is_refused(bent, name, value, said) -> None:
-    setattr(smoke(bent).smokelift, name, value)
-    with pytest.raises(RuntimeError, match=f"{said} is distorted too"):
-        bpy.ops.smokelift.undistort()
-
-
-def test_strokes_that_are_distorted_too_are_refused(bent) -> None:
-    smoke(bent).smokelift.strokes = bpy.data.images.new("strokes.png", SIZE, SIZE, alpha=True)
-    with pytest.raises(RuntimeError, match="strokes are distorted too"):
+@pytest.mark.parametrize("said", ["clean plate is", "mask is", "strokes are"])
+def test_what_is_distorted_too_is_refused(bent, said) -> None:
+    settings = smoke(bent).smokelift
+    if said == "clean plate is":
+        settings.plate_mode = "FILE"
+    elif said == "mask is":
+        settings.mask = "//mask.png"
+    else:
+        settings.strokes = bpy.data.images.new("strokes.png", SIZE, SIZE, alpha=True)
+    with pytest.raises(RuntimeError, match=f"{said} distorted too"):
         bpy.ops.smokelift.undistort()
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from addon.core.take import Take
 from addon.scene import modifiers, volume
-from conftest import FRAMES, changed, made, rendered
+from conftest import FRAMES, changed, made, played, rendered
 from smokelift.output.vdb import write_proxy
 from smokelift.scene import Domain
 from tests.example_shot import add_camera, smoke
@@ -28,14 +28,6 @@ def with_proxy(folder: Path, number: int = 1) -> Take:
 def obj(scene, tmp_path) -> bpy.types.Object:
     """A smoke with a proxy."""
     return volume.show(smoke(scene), with_proxy(tmp_path))
-
-
-def in_viewport(obj: bpy.types.Object, frame: int) -> str:
-    """Name of the file that the viewport shows in a frame; empty where it shows none."""
-    bpy.context.scene.frame_set(frame)
-    data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    data.grids.load()
-    return Path(data.grids.frame_filepath).name
 
 
 def in_render(obj: bpy.types.Object) -> list[str]:
@@ -60,7 +52,7 @@ def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) ->
     scene.render.engine, scene.cycles.samples, scene.cycles.seed = "CYCLES", 2, 1
     scene.render.resolution_x = scene.render.resolution_y = 8
     add_camera(scene, (0.44, -3.0, 1.62), (np.pi / 2, 0.0, 0.0)).data.ortho_scale = 0.5
-    assert [in_viewport(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_0001.vdb", "proxy_0003.vdb", ""]
+    assert [played(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_0001.vdb", "proxy_0003.vdb", ""]
     scene.frame_set(3)
     assert set(in_render(obj)) == {"smoke_0001.vdb"}
     picture = rendered(scene, tmp_path / "with.exr")
@@ -72,10 +64,10 @@ def test_it_has_a_switch(obj, tmp_path) -> None:
     modifiers.proxy_modifier(obj).show_viewport = False
     volume.show(obj, volume.shown_take(obj))
     volume.show(obj, with_proxy(tmp_path, number=2))
-    assert in_viewport(obj, 3) == "smoke_0003.vdb"
+    assert played(obj, 3) == "smoke_0003.vdb"
     assert modifiers.in_viewport(obj) == obj.data
     modifiers.proxy_modifier(obj).show_viewport = True
-    assert in_viewport(obj, 3) == "proxy_0003.vdb"
+    assert played(obj, 3) == "proxy_0003.vdb"
     assert modifiers.in_viewport(obj) == modifiers.proxy_of(obj)
 
 
@@ -90,30 +82,30 @@ def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, spee
         index["start_number"] = 1001
     scene.render.fps, smoke(scene).smokelift.speed = 24, speed
     obj = volume.show(smoke(scene), take)
-    assert [in_viewport(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_1001.vdb", "proxy_1003.vdb", ""]
+    assert [played(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_1001.vdb", "proxy_1003.vdb", ""]
     modifiers.proxy_modifier(obj).show_viewport = False
-    assert [in_viewport(obj, frame) for frame in (1, 3)] == ["smoke_1001.vdb", "smoke_1003.vdb"]
+    assert [played(obj, frame) for frame in (1, 3)] == ["smoke_1001.vdb", "smoke_1003.vdb"]
     assert volume.shown_numbers(obj) == list(range(1, FRAMES + 1))
     assert volume.number_at(obj, 3) == 3
     scene.render.fps = 48
     volume.synchronize_playback()
     later = "smoke_1002.vdb" if speed == "REAL" else "smoke_1003.vdb"
-    assert in_viewport(obj, 3) == later
+    assert played(obj, 3) == later
 
 
 def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
     settings = smoke(shot).smokelift
     shot.render.fps, settings.speed = 48, "REAL"
     obj = volume.show(smoke(shot), with_proxy(tmp_path))
-    assert [in_viewport(obj, frame) for frame in (1, 2, 3)] == ["proxy_0001.vdb"] * 2 + ["proxy_0002.vdb"]
+    assert [played(obj, frame) for frame in (1, 2, 3)] == ["proxy_0001.vdb"] * 2 + ["proxy_0002.vdb"]
     settings.clip.frame_start = 101
     volume.synchronize_playback()
-    assert [in_viewport(obj, frame) for frame in (1, 103)] == ["", "proxy_0002.vdb"]
+    assert [played(obj, frame) for frame in (1, 103)] == ["", "proxy_0002.vdb"]
 
 
 def test_a_result_without_one_is_shown_itself(scene, obj, tmp_path) -> None:
     volume.show(obj, made(tmp_path, number=2))
-    assert in_viewport(obj, 3) == "smoke_0003.vdb"
+    assert played(obj, 3) == "smoke_0003.vdb"
     assert list(bpy.data.volumes) == [obj.data] and not obj.modifiers
     assert modifiers.proxy_of(obj) is None
 
@@ -134,7 +126,7 @@ def test_it_is_saved_with_the_file(scene, obj, tmp_path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     (again,) = [obj for obj in bpy.context.scene.objects if obj.type == "VOLUME"]
-    assert in_viewport(again, 3) == "proxy_0003.vdb"
+    assert played(again, 3) == "proxy_0003.vdb"
 
 
 def test_it_follows_a_run(scene, tmp_path) -> None:
@@ -147,4 +139,4 @@ def test_it_follows_a_run(scene, tmp_path) -> None:
     assert modifiers.proxy_modifier(obj) is None
     (take.directory / "sequence.json").write_text(index.replace(', "3": {}, "4": {}, "5": {}, "6": {}', ""))
     volume.show(obj, take)
-    assert in_viewport(obj, 2) == "proxy_0002.vdb"
+    assert played(obj, 2) == "proxy_0002.vdb"

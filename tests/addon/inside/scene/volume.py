@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from addon.core.take import Take
 from addon.result import smoke_takes
 from addon.scene import look, shot_setup, volume
 from addon.scene.box import box_corners
-from conftest import FRAMES, changed, made, quietly, rendered
+from conftest import FRAMES, changed, made, played, quietly, rendered
 from smokelift.output.images import write_image, write_video
 from smokelift.scene import Camera, Medium, Scene, scene_to_dict
 from tests.example_shot import smoke
@@ -33,10 +32,8 @@ def evaluated(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
 
 def plays(scene: bpy.types.Scene, frame: int) -> int | None:
     """Number of the file that is seen in a frame."""
-    grids = evaluated(scene, frame).data.grids
-    assert grids.error_message == ""
-    found = re.search(r"smoke_(\d{4})\.vdb$", grids.frame_filepath)
-    return int(found[1]) if found else None
+    name = played(smoke(scene), frame)
+    return int(name[6:10]) if name else None
 
 
 # what plays when
