@@ -78,14 +78,13 @@ class SMOKELIFT_OT_set_up(ChangesScene, RequiresClipAndResult, bpy.types.Operato
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = volume.shown_take(smoke)
-        index = take.read().index
-        if index is None:
+        if volume.shown_index(smoke) is None:
             text = rpt_("The files of the smoke in {:s} are missing: make it again.")
             raise ShotError(text.format(str(take.directory)))
         settings = smoke.smokelift
         if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
             raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
-        said = shot_setup.set_up(smoke, take, index)
+        said = shot_setup.set_up(smoke)
         if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "CAMERA"
         volume.show(smoke, take)  # the frame rate may have changed

@@ -240,7 +240,7 @@ def present(smoke: bpy.types.Object, take: Take) -> str:
     index, first = take.read().index, volume.shown_take(smoke) is None
     if not volume.show(smoke, take) or index is None:
         return ""
-    assumed = shot_setup.assumed_camera(smoke, index) is not None
+    assumed = shot_setup.assumed_camera(smoke) is not None
     if index["complete"] or take.read().direction is None:  # how long a directed one becomes is not known before
         shot_setup.follow_range(smoke)
     hidden = first and assumed and hide_default_cube(scene_of(smoke))

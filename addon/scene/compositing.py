@@ -10,11 +10,11 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
-from ..core.take import Take
 from .box import engine_to_world
 from .nodes import Input, feed, file_group
-from .plate import plate_image, synchronize_plate
+from .plate import plate_image, shown_background, synchronize_plate
 from .smoke import scene_of
+from .volume import shown_index
 
 GROUP = "Smokelift Composite"
 """Name of the node group, and of its node in the scene's compositor."""
@@ -59,22 +59,14 @@ SINCE_5 = bpy.app.version >= (5, 0, 0)
 """Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
 
 
-def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
-    """Set the compositor up for a smoke; a second time changes the plate and the clip only.
-
-    Parameters
-    ----------
-    smoke
-        Shows its take already.
-    take, index
-        The take on show, and its `sequence.json`.
-    """
+def composite(smoke: bpy.types.Object) -> None:
+    """Set the compositor up for the result on show; a second time changes the plate and the clip only."""
     scene = scene_of(smoke)
     if scene.render.engine != "CYCLES":
         scene[_ENGINE] = scene.render.engine
         scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
     scene.render.film_transparent = True
-    _catch_shadow(scene, smoke, index["scene"]["domain"])
+    _catch_shadow(scene, smoke, shown_index(smoke)["scene"]["domain"])
     _hold_out(scene)
     tree, shown = compositor(scene)
     node = tree.nodes.get(GROUP)
@@ -82,7 +74,7 @@ def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> Non
         node = _insert(tree, shown)
     elif node.mute:
         _show(scene, node, True)
-    _connect_plate(tree, node, smoke, take, index["scene"])
+    _connect_plate(tree, node, smoke)
     _connect_clip(tree, node, smoke.smokelift.clip)
 
 
@@ -176,11 +168,9 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
     return node
 
 
-def _connect_plate(
-    tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object, take: Take, tables: dict[str, Any]
-) -> None:
+def _connect_plate(tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
     """Feed the plate's socket, whose source has our name unless the artist put another there."""
-    background, socket = tables.get("background") or {}, node.inputs["Plate"]
+    background, socket = shown_background(smoke), node.inputs["Plate"]
     name = f"{GROUP} Plate"
     if socket.links and tree.nodes.get(name) is None:
         return
@@ -192,8 +182,8 @@ def _connect_plate(
     source = tree.nodes.get(name)
     if source is None:
         source = _source(tree, "CompositorNodeImage", name, node, -300.0, socket)
-    source.image = plate_image(take, background["image"])
-    synchronize_plate(source.image, source, smoke.smokelift.clip, "matrices" in tables["camera"])
+    source.image = plate_image(smoke)
+    synchronize_plate(smoke, source.image, source)
 
 
 def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:

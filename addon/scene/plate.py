@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
-from ..core.take import Take
+from . import volume
 from .blender import ShotError, absolute, relative
 from .clip import frame_count, number_in_file
 from .strokes import saved_strokes
@@ -53,10 +53,15 @@ def _clean_frames(settings: bpy.types.PropertyGroup) -> list[int]:
     return sorted({int(word) for word in words})
 
 
-def plate_image(take: Take, path: str) -> bpy.types.Image:
-    """The plate of a take, by a path relative to the .blend where there is one."""
-    file = Path(path)
-    file = file if file.is_absolute() else take.directory / file
+def shown_background(smoke: bpy.types.Object) -> dict[str, Any]:
+    """The table of the background of the result on show; empty where black was assumed."""
+    return volume.shown_index(smoke)["scene"].get("background") or {}
+
+
+def plate_image(smoke: bpy.types.Object) -> bpy.types.Image:
+    """The plate of the result on show, by a path relative to the .blend where there is one."""
+    file = Path(shown_background(smoke)["image"])
+    file = file if file.is_absolute() else volume.shown_take(smoke).directory / file
     image = bpy.data.images.load(str(file), check_existing=True)
     if image.filepath != relative(file):
         image.filepath = relative(file)
@@ -64,33 +69,28 @@ def plate_image(take: Take, path: str) -> bpy.types.Image:
 
 
 def show_plate(
+    smoke: bpy.types.Object,
     tree: bpy.types.NodeTree,
     shader: bpy.types.ShaderNode,
     place: Callable[[], bpy.types.NodeSocket],
-    take: Take,
-    background: dict[str, Any],
-) -> bpy.types.ShaderNode | None:
-    """Have a shader show the clean plate, or one color if the background is that.
+) -> None:
+    """Have a shader show the clean plate of the result on show, or one color if the background is that.
 
     Parameters
     ----------
+    smoke
+        Shows a result.
     tree, shader
         The shader, which has an input Color.
     place
         Makes coordinates in the plate; asked for them only if no texture is connected yet.
-    take, background
-        The take that the plate belongs to, and the table of its background.
-
-    Returns
-    -------
-    The texture node, or None for one color.
     """
-    color = shader.inputs["Color"]
+    color, background = shader.inputs["Color"], shown_background(smoke)
     if "image" not in background:
         for link in list(color.links):
             tree.links.remove(link)
         color.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-        return None
+        return
     if not color.links:
         texture, coordinates = tree.nodes.new("ShaderNodeTexImage"), place()
         texture.extension = "EXTEND"
@@ -99,24 +99,23 @@ def show_plate(
         for node, left in ((texture, 300.0), (coordinates.node, 500.0)):
             node.location = shader.location - Vector((left, 0.0))
     node = color.links[0].from_node
-    node.image = plate_image(take, background["image"])
-    return node
+    node.image = plate_image(smoke)
+    synchronize_plate(smoke, node.image, node.image_user)
 
 
-def synchronize_plate(image: bpy.types.Image, user: Any, clip: bpy.types.MovieClip, tracked: bool) -> None:
-    """Keep a plate of many pictures in step with the clip.
+def synchronize_plate(smoke: bpy.types.Object, image: bpy.types.Image, user: Any) -> None:
+    """Keep a plate of many pictures in step with the clip; one of a moving camera has a picture for every frame.
 
     Parameters
     ----------
+    smoke
+        Shows a result.
     image
         The plate.
     user
         What says which of its frames is shown: an image user, or a node of the compositor.
-    clip
-        The clip that it belongs to.
-    tracked
-        Whether the camera moves, so that every frame has a plate of its own.
     """
+    clip, tracked = smoke.smokelift.clip, "matrices" in volume.shown_index(smoke)["scene"]["camera"]
     number = re.search(r"(\d+)\.\w+$", image.filepath)
     if tracked and image.source == "FILE" and number:
         image.source = "SEQUENCE"

@@ -9,13 +9,12 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
-from ..core.take import Take
 from .blender import set_unless_changed
 from .box import engine_to_world
 from .nodes import Input, add_node, file_group, math_node, vector_node
-from .plate import show_plate, synchronize_plate
+from .plate import show_plate
 from .smoke import scene_of
-from .volume import frames_before
+from .volume import frames_before, shown_index
 
 MATERIAL = "Smokelift Projection"
 """Name of the material, and of the node group in it."""
@@ -43,27 +42,16 @@ CARD_WIDTHS = 2.0
 """Width of the card over the picture's there: room for a camera that moves aside."""
 
 
-def project(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
-    """Set the projection up; a second time changes the plate and what the artist left as it was.
-
-    Parameters
-    ----------
-    smoke
-        Shows its take already.
-    take, index
-        The take on show, and its `sequence.json`.
-    """
-    scene, tables = scene_of(smoke), index["scene"]
+def project(smoke: bpy.types.Object) -> None:
+    """Project the plate of the result on show; a second time changes it and what the artist left as it was."""
+    scene, tables = scene_of(smoke), shown_index(smoke)["scene"]
     scene.render.film_transparent = False
-    projector = _projector(smoke, index)
+    projector = _projector(smoke, tables["camera"])
     material = _material(projector, tables["camera"])
-    shader = material.node_tree.nodes[MATERIAL]
     placed = material.node_tree.nodes[f"{MATERIAL} Place"].outputs[0]
-    plate = show_plate(material.node_tree, shader, lambda: placed, take, tables.get("background") or {})
-    if plate is not None:
-        synchronize_plate(plate.image, plate.image_user, smoke.smokelift.clip, "matrices" in tables["camera"])
+    show_plate(smoke, material.node_tree, material.node_tree.nodes[MATERIAL], lambda: placed)
     if CARD not in scene.objects:
-        _add_card(smoke, projector, tables, material)
+        _add_card(smoke, tables, material)
 
 
 def show_card(scene: bpy.types.Scene, shown: bool) -> None:
@@ -78,9 +66,9 @@ def _poses(smoke: bpy.types.Object, table: dict[str, Any]) -> list[Matrix]:
     return [engine_to_world(smoke) @ Matrix(pose) for pose in table.get("matrices") or [table["matrix"]]]
 
 
-def _projector(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object:
+def _projector(smoke: bpy.types.Object, table: dict[str, Any]) -> bpy.types.Object:
     """The camera that projects, made or moved; its place stays where the artist changed it."""
-    scene, table = scene_of(smoke), index["scene"]["camera"]
+    scene = scene_of(smoke)
     projector = scene.objects.get(PROJECTOR)
     if projector is None or projector.type != "CAMERA":
         projector = bpy.data.objects.new(PROJECTOR, bpy.data.cameras.new(PROJECTOR))
@@ -95,7 +83,7 @@ def _projector(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Obje
     if len(poses) == 1:
         set_unless_changed(projector, "place", projector, "matrix_basis", poses[0])
     else:
-        first = smoke.smokelift.clip.frame_start + frames_before(smoke.smokelift, index)
+        first = smoke.smokelift.clip.frame_start + frames_before(smoke.smokelift, shown_index(smoke))
         _animate(projector, poses, first)
     return projector
 
@@ -116,9 +104,7 @@ def _animate(obj: bpy.types.Object, poses: list[Matrix], first: int) -> None:
             obj.keyframe_insert(path, frame=frame)
 
 
-def _add_card(
-    smoke: bpy.types.Object, projector: bpy.types.Object, tables: dict[str, Any], material: bpy.types.Material
-) -> None:
+def _add_card(smoke: bpy.types.Object, tables: dict[str, Any], material: bpy.types.Material) -> None:
     """A plane behind the smoke's box, across the view of the clip's first frame and beyond its edges."""
     table, domain = tables["camera"], tables["domain"]
     pose = _poses(smoke, table)[0]

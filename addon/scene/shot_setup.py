@@ -11,12 +11,11 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix, Vector
 
-from ..core.take import Take
 from . import volume
 from .blender import set_and_remember, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
-from .plate import show_plate, synchronize_plate
+from .plate import show_plate
 from .projection import project, show_card
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
@@ -68,28 +67,21 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
         set_value(scene, "frame_start", scene, "frame_start", min(firsts))
 
 
-def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> list[str]:
-    """Make a render from the camera match the clip, in the parts that are ticked.
-
-    Parameters
-    ----------
-    smoke
-        Shows its take already.
-    take, index
-        The take on show, and its `sequence.json`.
+def set_up(smoke: bpy.types.Object) -> list[str]:
+    """Make a render of the result on show match the clip from the camera, in the parts that are ticked.
 
     Returns
     -------
     What an artist should know of it, a sentence each.
     """
-    settings, scene = smoke.smokelift, scene_of(smoke)
+    settings, scene, index = smoke.smokelift, scene_of(smoke), volume.shown_index(smoke)
     said = []
     if settings.set_up_plate:
         _disable_other_plates(smoke)  # first: what it gives back may be set up anew
     if settings.set_up_range:
         match_clip(smoke)
     if settings.set_up_camera:
-        scene.camera = assumed_camera(smoke, index) or scene.camera
+        scene.camera = assumed_camera(smoke) or scene.camera
         show_clip_behind(scene.camera.data, settings.clip)
     if settings.set_up_light:
         scene.render.engine = "CYCLES"
@@ -115,7 +107,7 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> list[s
                 text = rpt_("Beside the clip's light the smoke has that of {:s}: hide it from renders for a match.")
                 said.append(text.format(", ".join(further)))
     if settings.set_up_plate:
-        _set_up_plate(smoke, take, index)
+        _set_up_plate(smoke)
     if settings.set_up_colors:
         scene.view_settings.view_transform = "Standard"
         scene.view_settings.look = "None"
@@ -134,20 +126,18 @@ def _disable_other_plates(smoke: bpy.types.Object) -> None:
         tree.nodes[NAME].mute = place != "WORLD"  # a muted Mix Shader shows what the world was before
 
 
-def _set_up_plate(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
+def _set_up_plate(smoke: bpy.types.Object) -> None:
     """Show the clean plate where it was chosen to be."""
-    settings, scene = smoke.smokelift, scene_of(smoke)
-    place = settings.plate_place
+    place = smoke.smokelift.plate_place
     if place == "COMPOSITE":
-        composite(smoke, take, index)
+        composite(smoke)
     elif place == "PROJECTION":
-        project(smoke, take, index)
+        project(smoke)
     else:
-        scene.render.film_transparent = False
-        _set_world(scene, settings.clip, take, index["scene"])
+        _set_world(smoke)
 
 
-def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object | None:
+def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     """The camera that the engine assumed, made or moved; None if the engine used the scene's own.
 
     Its place and its lens stay where the artist changed them.
@@ -155,7 +145,7 @@ def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.
     settings, scene = smoke.smokelift, scene_of(smoke)
     if settings.camera_mode != "ESTIMATE":
         return None
-    table = index["scene"]["camera"]
+    table = volume.shown_index(smoke)["scene"]["camera"]
     camera = settings.assumed_camera
     if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
         camera = bpy.data.objects.new(ASSUMED_CAMERA, bpy.data.cameras.new(ASSUMED_CAMERA))
@@ -237,8 +227,10 @@ def _is_estimated(obj: bpy.types.Object) -> bool:
     return f"{obj.name} ".startswith(f"{NAME} Light ")
 
 
-def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, tables: dict[str, Any]) -> None:
+def _set_world(smoke: bpy.types.Object) -> None:
     """A world that shows the camera the clean plate, and lights the smoke as the scene's own world does."""
+    scene = scene_of(smoke)
+    scene.render.film_transparent = False
     world = scene.world
     if world is None or not world.name.startswith(NAME):
         _remove_unused_worlds()
@@ -268,11 +260,8 @@ def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, ta
         links.new(background.outputs[0], mix.inputs[2])
         for node, left in ((rays, 400.0), (background, 200.0)):
             node.location = mix.location - Vector((left, 200.0))
-    background = mix.inputs[2].links[0].from_node
-    tree = world.node_tree
-    plate = show_plate(tree, background, lambda: _window(tree), take, tables.get("background") or {})
-    if plate is not None:
-        synchronize_plate(plate.image, plate.image_user, clip, "matrices" in tables["camera"])
+    tree, background = world.node_tree, mix.inputs[2].links[0].from_node
+    show_plate(smoke, tree, background, lambda: tree.nodes.new("ShaderNodeTexCoord").outputs["Window"])
 
 
 def _remove_unused_worlds() -> None:
@@ -280,8 +269,3 @@ def _remove_unused_worlds() -> None:
     for world in list(bpy.data.worlds):
         if world.users == 0 and world.node_tree is not None and NAME in world.node_tree.nodes:
             bpy.data.worlds.remove(world)
-
-
-def _window(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
-    """Coordinates in the picture that is rendered."""
-    return tree.nodes.new("ShaderNodeTexCoord").outputs["Window"]

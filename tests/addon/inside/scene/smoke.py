@@ -74,7 +74,7 @@ def test_light_that_casts_no_shadow_says_how_it_lights_from_a_side(scene, clip, 
     volume.show(obj, take)
     for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
         setattr(obj.smokelift, name, False)
-    said = shot_setup.set_up(obj, take, take.read().index)
+    said = shot_setup.set_up(obj)
     assert [sentence for sentence in said if "give Smokelift Light a shadow" in sentence] == said[: int(even)]
     assert scene.objects["Smokelift Light"].data.use_shadow != even
 
@@ -101,7 +101,7 @@ def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(scene, c
     with changed(take) as index:
         index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
     volume.show(obj, take)
-    said = " ".join(shot_setup.set_up(obj, take, take.read().index))
+    said = " ".join(shot_setup.set_up(obj))
     assert ("lamp of the new file is hidden" in said) == (change is None)
     assert lamp.hide_viewport == (change is None)
     assert lamp.hide_render == (change in (None, "hidden"))

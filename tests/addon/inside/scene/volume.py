@@ -81,11 +81,11 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
         for number, plate in enumerate(plates, 101):
             write_image(tmp_path / f"plate_{number:04d}.png", plate)
     take = made(tmp_path)
-    index = tracked(take, background={"image": str(path)})
+    tracked(take, background={"image": str(path)})
     obj = volume.show(smoke(shot), take)
     places = []
     for _ in range(2):
-        shot_setup.set_up(smoke(shot), take, index)
+        shot_setup.set_up(smoke(shot))
     shot.render.resolution_x, shot.render.resolution_y = 16, 24
     shot.cycles.samples, shot.cycles.use_denoising = 1, False
     for frame in (2, 5):
@@ -103,11 +103,11 @@ def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model
     index = take.read().index
     index["scene"]["medium"]["scattering"] = model
     shot.cycles.volume_bounces, shot.cycles.max_bounces = 3, 4
-    shot_setup.set_up(smoke(shot), take, index)
+    shot_setup.set_up(smoke(shot))
     assert shot.cycles.volume_bounces == bounces
     assert shot.cycles.max_bounces == max(4, bounces)
     shot.cycles.volume_bounces = shot.cycles.max_bounces = 7
-    shot_setup.set_up(smoke(shot), take, index)
+    shot_setup.set_up(smoke(shot))
     assert (shot.cycles.volume_bounces, shot.cycles.max_bounces) == (7, 7)
 
 
@@ -118,7 +118,7 @@ def test_a_set_up_needs_no_denoiser_that_is_not_there(shot, tmp_path, monkeypatc
     shot.cycles.use_denoising = True
     take = made(tmp_path)
     volume.show(smoke(shot), take)
-    said = shot_setup.set_up(smoke(shot), take, take.read().index)
+    said = shot_setup.set_up(smoke(shot))
     assert shot.cycles.use_denoising == there
     assert any("no denoiser" in sentence for sentence in said) == (not there)
 
@@ -343,12 +343,12 @@ def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tm
     write_image(plate, np.full((16, 16, 3), 0.2, np.float32))
     shot = reopened(tmp_path / "shot")
     take = made(tmp_path / "out")
-    index = tracked(take, background={"image": str(plate)})
+    tracked(take, background={"image": str(plate)})
     volume.show(smoke(shot), take)
     own = shot.world
     for _ in range(3):
         shot.world = own
-        shot_setup.set_up(smoke(shot), take, index)
+        shot_setup.set_up(smoke(shot))
     (image,) = (image for image in bpy.data.images if image.name == "plate.png")
     assert image.filepath == "//../plate.png"
     assert sorted(world.name for world in bpy.data.worlds) == ["Smokelift", "World"]
