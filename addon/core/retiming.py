@@ -18,35 +18,27 @@ class Retiming:
 
     Attributes
     ----------
-    parts
-        First place, speed there and change of the speed for each frame, of every ramp in turn.
-    times
-        When each of them begins.
+    ramps
+        When each ramp begins; first place, speed there, and change of the speed for each frame.
     duration
         Until the last frame has been shown for its time, in frames.
-    speeds
-        As they were given.
     """
 
-    parts: tuple[tuple[float, float, float], ...]
-    times: tuple[float, ...]
+    ramps: tuple[tuple[float, float, float, float], ...]
     duration: float
-    speeds: tuple[float, ...]
 
     def place(self, time: str) -> str:
         """The place in the take, from 0, as an expression for a driver, of an expression for the time."""
-        return self._chosen(time, [_place(*part, f"({time}-{begin:.9g})") for part, begin in self._begun()])
+        return self._chosen(time, [_place(*ramp[1:], f"({time}-{ramp[0]:.9g})") for ramp in self.ramps])
 
     def speed(self, time: str) -> str:
         """The speed, likewise."""
-        return self._chosen(time, [_speed(*part[1:], f"({time}-{begin:.9g})") for part, begin in self._begun()])
-
-    def _begun(self) -> list[tuple[tuple[float, float, float], float]]:
-        return list(zip(self.parts, self.times, strict=True))
+        return self._chosen(time, [_speed(*ramp[2:], f"({time}-{ramp[0]:.9g})") for ramp in self.ramps])
 
     def _chosen(self, time: str, values: list[str]) -> str:
+        """The value of the ramp that a time is in."""
         text = values[-1]
-        for value, end in zip(values[-2::-1], self.times[:0:-1], strict=True):
+        for value, (end, *_) in zip(values[-2::-1], self.ramps[:0:-1], strict=True):
             text = f"({value} if {time}<{end:.9g} else {text})"
         return text
 
@@ -54,18 +46,15 @@ class Retiming:
 def retiming(count: int, speeds: Sequence[float]) -> Retiming:
     """The pace of a take of so many frames, with one speed or more."""
     if len(speeds) == 1:
-        return Retiming(((0.0, speeds[0], 0.0),), (0.0,), count / speeds[0], tuple(speeds))
-    length = (count - 1) / (len(speeds) - 1)
-    parts: list[tuple[float, float, float]] = []
-    times: list[float] = []
-    time = 0.0
+        return Retiming(((0.0, 0.0, speeds[0], 0.0),), count / speeds[0])
+    length, time = (count - 1) / (len(speeds) - 1), 0.0
+    ramps: list[tuple[float, float, float, float]] = []
     for number, (before, after) in enumerate(pairwise(speeds)):
         change = (after - before) / length if length else 0.0
         even = math.isclose(before, after, rel_tol=1e-6)
-        parts.append((number * length, before, 0.0 if even else change))
-        times.append(time)
+        ramps.append((time, number * length, before, 0.0 if even else change))
         time += length / before if even else math.log(after / before) / change
-    return Retiming(tuple(parts), tuple(times), time + 1 / speeds[-1], tuple(speeds))
+    return Retiming(tuple(ramps), time + 1 / speeds[-1])
 
 
 def _place(first: float, speed: float, change: float, time: str) -> str:

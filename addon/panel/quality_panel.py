@@ -121,7 +121,7 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
     if state.error or not (checked or reading):
         layout.operator("smokelift.check", icon="VIEWZOOM")
     elif reading:
-        seconds = shot_check.check_job.seconds
+        seconds = shot_check.check_job.seconds if shot_check.check_job.job is not None else 0
         text = iface_("Reading the clip: {:s}").format(duration(seconds)) if seconds else iface_("Reading the clip")
         row = layout.row(align=True)
         row.label(text=text, translate=False, icon="TIME")

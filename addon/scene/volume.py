@@ -284,7 +284,8 @@ def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, 
     direction = index.get("settings", {}).get("direct", {}).get("job")
     live = settings.directing.live and direction != "retime" and not _tracked(index)
     steps = ratio if real else 1.0
-    timing = retiming(len(numbers), settings.directing.speeds() if live else (1.0,))
+    speeds = settings.directing.speeds() if live else (1.0,)
+    timing = retiming(len(numbers), speeds)
     before = frames_before(settings, index)
     first = (settings.clip.frame_start if settings.clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(smoke.data, "start", smoke.data, "frame_start", first)
@@ -300,12 +301,12 @@ def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, 
         for name in ("frame_offset", "velocity_scale"):
             volume.driver_remove(name)
         volume.frame_duration = max(1, math.ceil(steps * timing.duration - EARLY))
-        volume.velocity_scale = (1.0 if real else ratio) * timing.speeds[0]
+        volume.velocity_scale = (1.0 if real else ratio) * speeds[0]
         if real or live:
             # Blender shows one file in each frame of the scene; the driven offset selects another
             file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
             _drive(volume, "frame_offset", f"{file}-(frame-{start})+{numbers[0] - 1}")
-        if live and len(timing.speeds) > 1:
+        if live and len(speeds) > 1:
             _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({timing.speed(time)})")
     drive_interpolation(smoke, place, 1.0 / index["scene"]["clip"]["fps"])
 
