@@ -93,7 +93,7 @@ class ShotCheck:
 
 
 state = ShotCheck()
-"""That of this session, which is never saved."""
+"""The check of this session, which is never saved."""
 
 
 def settings_text(smoke: bpy.types.Object) -> str:

@@ -97,6 +97,7 @@ def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]
     yield from picture("qualities")
     settings.longest_side = chosen
     region(area, "UI").active_panel_category = "View"
+    area.tag_redraw()
     yield 1.0
 
 
