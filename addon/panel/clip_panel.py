@@ -297,18 +297,15 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
             "INFO",
         )
         column.operator("smokelift.undistort")
-    size = (scene.render.resolution_x, scene.render.resolution_y)
-    other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
-    if size != tuple(clip.size) or other_rate:
+    said, size = [], (scene.render.resolution_x, scene.render.resolution_y)
+    if size != tuple(clip.size):
+        said.append(iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size))
+    if clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01:  # pictures have no rate of their own
+        text = iface_("The clip has {:g} frames a second, the scene {:g}.")
+        said.append(text.format(clip.fps, frame_rate(scene)))
+    if said:
         column = layout.column(align=True)
-        if clip.source == "MOVIE":
-            text = iface_("The clip has {:d} x {:d} pixels at {:g} frames a second, the scene {:d} x {:d} at {:g}.")
-            text = text.format(*clip.size, clip.fps, *size, frame_rate(scene))
-            if size == tuple(clip.size):
-                text = iface_("The clip has {:g} frames a second, the scene {:g}.").format(clip.fps, frame_rate(scene))
-        else:  # pictures have no frame rate of their own
-            text = iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size)
-        draw_text(column, context, text, "INFO")
+        draw_text(column, context, " ".join(said), "INFO")
         column.operator("smokelift.match_clip")
 
 
