@@ -51,18 +51,12 @@ for message in (
 """Stands in for an engine whose frames are there already."""
 
 
-def finished_before(obj: bpy.types.Object) -> Take:
-    """A take that waits, with all its frames."""
-    (take,) = queued(obj, 1, FRAMES)
-    made(take.directory.parent, number=int(take.directory.name[-4:]))
-    return take
-
-
 def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, tmp_path) -> None:
     other, active = new_smoke(scene, clip), new_smoke(scene, clip)
     for obj, frame in ((other, 40), (active, 2)):
         obj.smokelift.output = str(tmp_path / obj.name)
-        take = finished_before(obj)
+        (take,) = queued(obj, 1, FRAMES)
+        made(take.directory.parent)
         obj.smokelift.camera_mode = "SCENE"  # of which these files have none
         scene.frame_set(40)
         run_queue.work(bpy.context)

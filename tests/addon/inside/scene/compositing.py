@@ -6,6 +6,7 @@ import pytest
 
 from addon.scene import compositing, projection, volume
 from conftest import changed, made, pixels, rendered
+from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
 from tests.example_shot import add, smoke
 
@@ -80,13 +81,7 @@ def test_grain_is_the_clips(filmed, tmp_path) -> None:
 
 def test_the_clip_is_in_front_where_the_mask_says_so(filmed, tmp_path) -> None:
     found = shown(filmed, tmp_path, Foreground=1.0)
-    assert found == pytest.approx(pixels_linear(tmp_path / "clip_0003.png"), abs=0.01)
-
-
-def pixels_linear(path) -> np.ndarray:
-    """An 8-bit picture in linear light."""
-    values = pixels(path)
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    assert found == pytest.approx(srgb_to_linear(pixels(tmp_path / "clip_0003.png")), abs=0.01)
 
 
 def test_what_is_held_out_hides_the_smoke(filmed, tmp_path) -> None:

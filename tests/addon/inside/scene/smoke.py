@@ -119,16 +119,11 @@ def test_samples_that_the_artist_chose_stay(shot, tmp_path) -> None:
         assert shot.cycles.samples == wanted
 
 
-def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
-    smoke(scene).smokelift.output = str(folder)
-    written = [smoke_takes.write_take(smoke(scene)) for _ in range(count)]
-    for number, _ in enumerate(written, 1):
-        made(folder, number=number)
-    return written
-
-
 def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
-    first, second = with_takes(shot, tmp_path / "out", 2)
+    smoke(shot).smokelift.output = str(tmp_path / "out")
+    first, second = (smoke_takes.write_take(smoke(shot)) for _ in range(2))
+    for number in (1, 2):
+        made(tmp_path / "out", number=number)
     assert bpy.ops.smokelift.show_take(take=str(first.directory)) == {"FINISHED"}
     assert volume.shown_take(smoke(shot)) == first
     assert first.read().title == "Take 1"
