@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import DensityPair, VelocityEstimate, checked, motion_weight, predict_velocity
-from smokelift.velocity.linearisation import Regularisation, least_squares, linearise
+from smokelift.velocity.estimator import DensityPair, checked, in_metres, motion_weight, predict_velocity
+from smokelift.velocity.linearisation import least_squares, linearise
 from smokelift.velocity.preparation import without_noise
 from smokelift.velocity.solver import PrimalDual, Solver
 
@@ -46,10 +46,10 @@ class PaperVelocity:
         linear = linearise(first, second, motion_weight(first.shape, pair.inflow), rest)
         if linear is None:
             return Velocity.zero(first.shape, pair.voxel_size, pair.closed)
-        terms = Regularisation(first_order=self.smoothness, kinetic=self.kinetic)
-        u, figures = self.solver.solve(least_squares(linear, rest, terms), rest)
+        problem = least_squares(linear, rest, first_order=self.smoothness, kinetic=self.kinetic)
+        u, figures = self.solver.solve(problem, rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
-        return VelocityEstimate(u, measures, np.ones_like(second)).velocity(pair.dt, pair.voxel_size)
+        return in_metres(u, pair, measures, np.ones_like(second))
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""

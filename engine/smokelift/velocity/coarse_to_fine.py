@@ -13,15 +13,15 @@ from smokelift.scene.checks import integer
 from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, require_same_shape, without_divergence
 from smokelift.velocity.estimator import (
     DensityPair,
-    VelocityEstimate,
     checked,
     coarsened,
+    in_metres,
     motion_weight,
     predict_velocity,
     refined_to,
 )
-from smokelift.velocity.linearisation import SMOKE_THRESHOLD, Regularisation, least_squares, linearise
-from smokelift.velocity.momentum import Prediction, fit_centre
+from smokelift.velocity.linearisation import SMOKE_THRESHOLD, least_squares, linearise
+from smokelift.velocity.momentum import fit_centre
 from smokelift.velocity.preparation import PreparedPair, prepare
 from smokelift.velocity.pyramid import coarsen, smoothed
 from smokelift.velocity.solver import ProjectedCG, Solver
@@ -130,14 +130,12 @@ class CoarseToFine:
         """
         x, y, z = shape = pair.before.shape
         prepared, weight = prepare(pair.before, pair.after), motion_weight(shape, pair.inflow)
-        prediction = _serving(given, pair, prepared, weight)
-        start = None if prediction is None else prediction.velocity
+        start = prediction = _serving(given, pair, prepared, weight)
         if start is None and max(shape) > COARSEST_SIDE and min(shape) >= 2 * MIN_SIDE:
             coarse = self._found(_half(pair), None)
-            start = None if coarse is None else refined_to(coarse, (x, y, z))
-        u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start.displacement(pair.dt)
-        estimate = _solved(prepared, weight, u, prediction, self.settings)
-        return None if estimate is None else estimate.velocity(pair.dt, pair.voxel_size)
+            start = None if coarse is None else refined_to(coarse, (x, y, z)).displacement(pair.dt)
+        u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
+        return _solved(pair, prepared, weight, u, prediction, self.settings)
 
 
 def _half(pair: DensityPair) -> DensityPair:
@@ -147,12 +145,11 @@ def _half(pair: DensityPair) -> DensityPair:
     return replace(pair, before=before, after=after, voxel_size=2 * pair.voxel_size, inflow=inflow)
 
 
-def _serving(given: Velocity | None, pair: DensityPair, prepared: PreparedPair, weight: Array) -> Prediction | None:
-    """The prediction, if as it stands it explains the change well enough, and better than no motion."""
+def _serving(given: Velocity | None, pair: DensityPair, prepared: PreparedPair, weight: Array) -> StaggeredGrid | None:
+    """The prediction in voxels a frame, if it explains the change well enough as it is, and better than no motion."""
     if given is None or not any(component.any() for component in given.faces):
         return None
-    prediction = Prediction(replace(given, closed=pair.closed), pair.dt)
-    u = prediction.displacement()
+    u = replace(given, closed=pair.closed).displacement(pair.dt)
     linear = linearise(prepared.before, prepared.after, weight, u)
     if linear is None:
         return None
@@ -160,29 +157,38 @@ def _serving(given: Velocity | None, pair: DensityPair, prepared: PreparedPair, 
     # The linearised change grows with the prediction, however wrong that is, so that long runs would run away.
     change = (prepared.after - prepared.before) / np.float32(linear.scale)
     serves = unexplained < WORTHLESS and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
-    return prediction if serves else None
+    return u if serves else None
 
 
 def _solved(
-    pair: PreparedPair, weight: Array, u: StaggeredGrid, prediction: Prediction | None, settings: VelocitySettings
-) -> VelocityEstimate | None:
+    pair: DensityPair,
+    prepared: PreparedPair,
+    weight: Array,
+    u: StaggeredGrid,
+    prediction: StaggeredGrid | None,
+    settings: VelocitySettings,
+) -> Velocity | None:
     """The estimate on one grid, linearised around `u` first; None where there is no structure to follow."""
     effort: Counter[str] = Counter()
     for _ in range(settings.linearisations):
-        linear = linearise(pair.before, pair.after, weight, u)
+        linear = linearise(prepared.before, prepared.after, weight, u)
         if linear is None:
             return None
-        centre = fit_centre(prediction, pair.after, linear, u)
-        around = centre.velocity(prediction, pair.after, u)
+        centre = fit_centre(prediction, prepared.after, linear, u)
         linear = linear.with_dissipation(centre.dissipation)
-        unexplained, _ = linear.unexplained(around, pair.noise)
+        unexplained, _ = linear.unexplained(centre.motion, prepared.noise)
         stiffness = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
         smoothness = stiffness * settings.smoothness
-        terms = Regularisation(second_order=smoothness, kinetic=stiffness * KINETIC, irrotational=IRROTATIONAL)
-        problem, direction = least_squares(linear, around, terms), linear.direction
-        start = u if any(component.any() for component in u.faces) else around
-        # The solver takes most of the memory: free the linearisation before it.
-        del linear, around
+        problem = least_squares(
+            linear,
+            centre.motion,
+            second_order=smoothness,
+            kinetic=stiffness * KINETIC,
+            irrotational=IRROTATIONAL,
+        )
+        direction = linear.direction
+        start = u if any(component.any() for component in u.faces) else centre.motion
+        del linear  # the solver takes most of the memory
         solution, solved = settings.solver.solve(problem, start)
         effort.update({name: solved[name] for name in ("iterations", "products", "projections")})
         u = _clamped(solution, u)
@@ -191,9 +197,9 @@ def _solved(
         "residual": solved["residual"],
         "unexplained": unexplained,
         "trust": centre.trust,
-        "dissipation": pair.density_dissipation(centre.dissipation),
+        "dissipation": prepared.density_dissipation(centre.dissipation),
     }
-    return VelocityEstimate(u, figures, _confidence(direction, weight, smoothness))
+    return in_metres(u, pair, figures, _confidence(direction, weight, smoothness))
 
 
 def _clamped(solution: StaggeredGrid, u: StaggeredGrid) -> StaggeredGrid:

@@ -142,26 +142,13 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     return part_of(fine, (i, j, k))
 
 
-@dataclass(frozen=True, eq=False)
-class VelocityEstimate:
-    """A velocity `u` in voxels a frame, how it was found, and what is known of it, as in `Velocity`."""
-
-    u: StaggeredGrid
-    figures: Mapping[str, float]
-    confidence: Array
-
-    def velocity(self, dt: float, voxel_size: float) -> Velocity:
-        """The velocity in m/s, projected a last time."""
-        u, largest = without_divergence(self.u)
-        for component in u.faces:
-            component *= np.float32(voxel_size / dt)
-        return Velocity(
-            u.faces,
-            voxel_size,
-            u.closed,
-            figures={**self.figures, "divergence": largest},
-            confidence=self.confidence,
-        )
+def in_metres(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float], confidence: Array) -> Velocity:
+    """The velocity (m/s) of an estimate u in voxels a frame, projected a last time, and what is known of it."""
+    u, largest = without_divergence(u)
+    for component in u.faces:
+        component *= np.float32(pair.voxel_size / pair.dt)
+    figures = {**figures, "divergence": largest}
+    return Velocity(u.faces, pair.voxel_size, u.closed, figures=figures, confidence=confidence)
 
 
 def checked(pair: DensityPair) -> DensityPair:

@@ -53,19 +53,6 @@ class Linearisation:
         return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
 
 
-@dataclass(frozen=True)
-class Regularisation:
-    """Weights of what a velocity u costs beside the data term.
-
-    With v = u - centre they weigh |grad v|^2, |grad curl v|^2, |v|^2, and |curl u|^2 outside the smoke, in this order.
-    """
-
-    first_order: float = 0.0
-    second_order: float = 0.0
-    kinetic: float = 0.0
-    irrotational: float = 0.0
-
-
 def linearise(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> Linearisation | None:
     """The change between densities around `u` (voxels per frame); None where there is no structure to follow."""
     carried = advect_cells(before, u)
@@ -104,16 +91,27 @@ def directional_derivative(direction: Faces, faces: Faces) -> Array:
     return x
 
 
-def least_squares(linear: Linearisation, centre: StaggeredGrid, terms: Regularisation) -> _core.LeastSquares:
-    """The quadratic function of a velocity: data term and regularisation around a centre."""
+def least_squares(
+    linear: Linearisation,
+    centre: StaggeredGrid,
+    *,
+    kinetic: float,
+    first_order: float = 0.0,
+    second_order: float = 0.0,
+    irrotational: float = 0.0,
+) -> _core.LeastSquares:
+    """The quadratic function of a velocity u: data term and regularisation around a centre.
+
+    With v = u - centre the weights are those of |v|^2, |grad v|^2, |grad curl v|^2, and |curl u|^2 outside the smoke.
+    """
     return _core.LeastSquares(
         direction=linear.direction,
         offset=linear.offset,
         weight=linear.weight,
-        irrotational=np.where(linear.smoke, np.float32(0), np.float32(terms.irrotational)),
+        irrotational=np.where(linear.smoke, np.float32(0), np.float32(irrotational)),
         centre=centre.faces,
-        first_order=terms.first_order,
-        second_order=terms.second_order,
-        kinetic=terms.kinetic,
+        first_order=first_order,
+        second_order=second_order,
+        kinetic=kinetic,
         closed=centre.walls,
     )

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.transport import Array, StaggeredGrid, Velocity, without_divergence
+from smokelift.transport import Array, StaggeredGrid, without_divergence
 from smokelift.velocity.linearisation import Linearisation, directional_derivative
 
 MOMENTUM = 0.8
@@ -38,50 +38,23 @@ RIDGE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
-    """What the velocity should be near, and the time between frames in seconds."""
-
-    velocity: Velocity
-    dt: float
-
-    @property
-    def scale(self) -> float:
-        """Voxels a frame in 1 m/s."""
-        return self.dt / self.velocity.voxel_size
-
-    def displacement(self) -> StaggeredGrid:
-        """The prediction in voxels a frame."""
-        return self.velocity.displacement(self.dt)
-
-
-@dataclass(frozen=True, eq=False)
 class Centre:
-    """The motion around which the velocity is regularised: t u_p + P(m).
+    """The motion around which the velocity is regularised: t u_p + P(m), in voxels a frame.
 
     `trust` is t, from 0 to 1. `dissipation` is the share of the smoke that dissolves in a frame, at most 1, and below
-    zero where all of it gets denser. `momentum` (1 or 4, 3) is in voxels a frame at density 1: constant, and along x,
-    y, z, for each component.
+    zero where all of it gets denser.
     """
 
+    motion: StaggeredGrid
     trust: float
     dissipation: float
-    momentum: npt.NDArray[np.float64]
-
-    def velocity(self, prediction: Prediction | None, density: Array, grid: StaggeredGrid) -> StaggeredGrid:
-        """The motion in voxels a frame, on the grid given."""
-        motion = _set_in_motion(density, self.momentum, grid)
-        if prediction is None:
-            return motion
-        weight = np.float32(self.trust * prediction.scale)
-        return grid.with_faces(
-            own + weight * predicted for own, predicted in zip(motion.faces, prediction.velocity.faces, strict=True)
-        )
 
 
-def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisation, grid: StaggeredGrid) -> Centre:
+def fit_centre(prediction: StaggeredGrid | None, density: Array, linear: Linearisation, grid: StaggeredGrid) -> Centre:
     """Fit trust, momentum and dissipation to a linearised change.
 
-    The density (nx, ny, nz) is what momentum goes with. ``grid`` is any field on the estimate's grid.
+    The prediction is in voxels a frame, and the density (nx, ny, nz) is what momentum goes with. ``grid`` is any field
+    on the estimate's grid.
     """
     rows = 4 if prediction is None else 1
     columns = [
@@ -89,7 +62,7 @@ def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisat
         for momentum in np.eye(3 * rows).reshape(-1, rows, 3)
     ]
     if prediction is not None:
-        columns.append(directional_derivative(linear.direction, prediction.velocity.faces))
+        columns.append(directional_derivative(linear.direction, prediction.faces))
     products = _weighted_products([*columns, linear.carried, linear.offset], linear.weight)
     found, rest = _least_squares(products)
     dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearised change may ask for more than all
@@ -98,13 +71,20 @@ def fit_centre(prediction: Prediction | None, density: Array, linear: Linearisat
         steady, without = _least_squares(products[np.ix_(kept, kept)])
         if rest > BRIGHTENING * without:
             dissipation, found = 0.0, steady
-    trust = 0.0 if prediction is None else float(np.clip(found[3 * rows] / prediction.scale, 0, 1))
-    share = MOMENTUM if prediction is None else 1.0
-    return Centre(trust, dissipation, share * found[: 3 * rows].reshape(rows, 3))
+    momentum = found[: 3 * rows].reshape(rows, 3)
+    if prediction is None:
+        return Centre(_set_in_motion(density, MOMENTUM * momentum, grid), 0.0, dissipation)
+    trust = float(np.clip(found[3], 0, 1))
+    gained = _set_in_motion(density, momentum, grid)
+    faces = zip(gained.faces, prediction.faces, strict=True)
+    return Centre(grid.with_faces(own + np.float32(trust) * before for own, before in faces), trust, dissipation)
 
 
 def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:
-    """The motion P(m) in voxels a frame that a momentum (1 or 4, 3) in the smoke sets off; see `Centre`."""
+    """The motion P(m) in voxels a frame that a momentum (1 or 4, 3) in the smoke sets off.
+
+    It is in voxels a frame at density 1: constant, and along x, y, z, for each component.
+    """
     axes = np.meshgrid(*(np.linspace(-1, 1, n, dtype=np.float32) for n in density.shape), indexing="ij", sparse=True)
     faces = StaggeredGrid.zero(density.shape, 1.0).faces
     for along, (constant, *slopes) in enumerate(momentum.T.astype(np.float32)):
