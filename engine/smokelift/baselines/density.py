@@ -17,15 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smokelift.density import (
-    DepthEstimate,
-    FittedDensity,
-    ObservedClip,
-    Smoke,
-    Start,
-    ViewSet,
-    empty_density,
-)
+from smokelift.density import DepthEstimate, FittedDensity, ObservedClip, Start, ViewSet, empty_density
 from smokelift.density.fit import fit_figures, without_traces
 from smokelift.density.hull import project_voxels
 from smokelift.render import DeviceError, Image, Volume, device
@@ -133,9 +125,9 @@ class FixedRateDescent:
 class AllCarried:
     """The paper's temporal prior: each fit starts from the carried density as it is."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Smoke) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume) -> Start:
         """The carried density; see `smokelift.density.TemporalPrior`."""
-        return Start(carried.density, {})
+        return Start(carried, {})
 
 
 def _squares(images: Sequence[Image]) -> float:

@@ -21,17 +21,14 @@ from smokelift.density.fit import (
 from smokelift.density.observation import Observation, ObservedClip, ObservedView, ViewSet
 from smokelift.density.synthesis import DetailedDepth
 from smokelift.density.temporal_prior import (
-    BlendCarried,
     GuidedSimulation,
     NothingCarried,
-    Smoke,
     Start,
     TemporalPrior,
 )
 
 __all__ = [
     "AxisEstimate",
-    "BlendCarried",
     "DensityFit",
     "DensitySettings",
     "DepthEstimate",
@@ -46,7 +43,6 @@ __all__ = [
     "ObservedClip",
     "ObservedView",
     "RoundDepth",
-    "Smoke",
     "Start",
     "TemporalPrior",
     "ViewSet",

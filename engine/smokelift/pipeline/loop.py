@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.density import FittedDensity, Smoke, ViewSet
+from smokelift.density import FittedDensity, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
 from smokelift.footage.images import Picture
@@ -174,11 +174,11 @@ def _density(
     initial: Volume | None = None
     unseen: Volume | None = None
     figures: Mapping[str, float] = {}
-    if before is not None and carried is not None:
+    if carried is not None:
         start = method.temporal_prior.start(depth.views, depth, carried)
         initial, figures = start.density, start.figures
         # what a moving camera does not see now it may have seen before
-        unseen = carried.density if shot.moves else None
+        unseen = carried if shot.moves else None
         del start
     priors, starts = [depth], [initial]
     del carried, depth, initial  # the fit needs the memory, and frees what it has read unless others hold it
@@ -189,20 +189,13 @@ def _density(
     return fitted, figures
 
 
-def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> Smoke | None:
-    """The smoke of the frame before, carried along; None where there is none or no prediction."""
+def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> Volume | None:
+    """The density of the frame before, carried along; None where there is none or no prediction."""
     if before is None or predicted is None:
         return None
-    steady = before.density if before.steady is None else before.steady
+    density = before.density if before.steady is None else before.steady
     # what a moving camera does not see no picture corrects, so that its mass has to be kept
-    density, *smooth = carry(
-        [steady] if before.smooth is None else [steady, before.smooth],
-        predicted,
-        1.0 / shot.clip.fps,
-        shot.optics.domain.voxel_size,
-        conserve=shot.moves,
-    )
-    return Smoke(density, *smooth)
+    return carry(density, predicted, 1.0 / shot.clip.fps, shot.optics.domain.voxel_size, conserve=shot.moves)
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
@@ -216,8 +209,8 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
     return flame_emission(seen.image @ colour / (colour @ colour), seen.camera, density, shot.optics)
 
 
-def _unseen(domain: Domain, carried: Smoke | None) -> FittedDensity:
+def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:
     """The density of a frame whose picture shows nothing of the domain: what was carried along."""
     nothing: Array = np.zeros(domain.resolution, np.float32)
     figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
-    return FittedDensity(nothing if carried is None else carried.density, nothing > 0, figures)
+    return FittedDensity(nothing if carried is None else carried, nothing > 0, figures)

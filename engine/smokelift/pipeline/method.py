@@ -11,7 +11,6 @@ from smokelift.baselines.density import AllCarried, FixedRateDescent, Orthogonal
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.checks import require_kind
 from smokelift.density import (
-    BlendCarried,
     DensityFit,
     DepthPrior,
     DetailedDepth,
@@ -72,19 +71,13 @@ def _default(settings: Settings) -> Method:
         density_fit=GradientFit(settings.density),
         depth_prior=_depth_prior(settings),
         velocity_estimator=CoarseToFine(settings.velocity),
-        temporal_prior=_temporal_prior(settings),
+        temporal_prior=GuidedSimulation(settings.transport) if settings.transport > 0 else NothingCarried(),
     )
 
 
 def _depth_prior(settings: Settings) -> DepthPrior:
     smooth = RoundDepth()
     return DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
-
-
-def _temporal_prior(settings: Settings) -> TemporalPrior:
-    if settings.transport == 0:
-        return NothingCarried()
-    return GuidedSimulation(settings.transport) if settings.detail > 0 else BlendCarried(settings.transport)
 
 
 def _paper(settings: Settings) -> Method:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,29 +19,24 @@ SLAB = 64
 """Voxels across a slab: many more than smoke moves in a step."""
 
 
-def carry(
-    densities: Sequence[Array], velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False
-) -> tuple[Array, ...]:
-    """Carry densities (nx, ny, nz), not negative, along by a velocity of their grid or of one that was halved from it.
+def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False) -> Array:
+    """Carry a density (nx, ny, nz), not negative, along by a velocity of its grid or of one that was halved from it.
 
-    It gives what `advect` makes of each with `refined_to`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of
-    the densities in metres; ``conserve`` is that of `advect`.
+    It gives what `advect` makes of it with `refined_to`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of the
+    density in metres; ``conserve`` is that of `advect`.
     """
-    results = tuple(np.zeros(density.shape, np.float32) for density in densities)
-    smoke = functools.reduce(np.logical_or, (density > 0 for density in densities))
-    x, y, z = smoke.shape
-    for box, source in _boxes(smoke, _reach(velocity, dt / voxel_size), whole=conserve):
+    x, y, z = density.shape
+    result = np.zeros(density.shape, np.float32)
+    for box, source in _boxes(density > 0, _reach(velocity, dt / voxel_size), whole=conserve):
         along = refined_in(velocity, (x, y, z), source)
-        way = along.displacement(dt).faces
-        inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))
-        for density, result in zip(densities, results, strict=True):
-            if conserve:
-                moved = advect(density[source], along, dt, conserve=True)
-            else:
-                moved = _core.advect_cells(density[source], way, True)
-            # memory is given where something is written: where the smoke is, not all over its box
-            np.copyto(result[box], moved[inner], where=moved[inner] > 0)
-    return results
+        if conserve:
+            moved = advect(density[source], along, dt, conserve=True)
+        else:
+            moved = _core.advect_cells(density[source], along.displacement(dt).faces, True)
+        inner = moved[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))]
+        # memory is given where something is written: where the smoke is, not all over its box
+        np.copyto(result[box], inner, where=inner > 0)
+    return result
 
 
 def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) -> Velocity:

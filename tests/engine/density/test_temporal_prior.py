@@ -7,16 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density import (
-    BlendCarried,
-    DepthEstimate,
-    GuidedSimulation,
-    Observation,
-    RoundDepth,
-    Smoke,
-    Start,
-    ViewSet,
-)
+from smokelift.density import DepthEstimate, GuidedSimulation, Observation, RoundDepth, Start, ViewSet
 from smokelift.density.objective import Term
 from smokelift.density.temporal_prior import LARGEST_GAIN
 from smokelift.footage.noise import lasting_noise
@@ -42,7 +33,7 @@ class Moment:
 
     def start(self, carried: Volume) -> Start:
         """Where the fit starts with a carried density."""
-        return BlendCarried(SHARE).start(self.views, self.depth, Smoke(carried))
+        return GuidedSimulation(SHARE).start(self.views, self.depth, carried)
 
 
 @pytest.fixture(scope="module")
@@ -105,9 +96,9 @@ def prior_start(moment) -> DepthEstimate:
     return replace(moment.depth, density=density, detail=Lobes(moment.views, moment.prior))
 
 
-def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume, smooth: Volume | None = None) -> Start:
+def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume) -> Start:
     """Where a guided simulation starts, with all of what is carried."""
-    return GuidedSimulation(SHARE, kept=1.0).start(moment.views, prior_start, Smoke(carried, smooth))
+    return GuidedSimulation(SHARE, kept=1.0).start(moment.views, prior_start, carried)
 
 
 def test_a_simulation_is_guided_to_the_smooth_answers_low_pass(moment, prior_start) -> None:
@@ -129,25 +120,3 @@ def test_detail_is_born_where_nothing_is_carried(moment, prior_start) -> None:
     little = guided(moment, prior_start, np.float32(0.01) * moment.prior)
     assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
     np.testing.assert_allclose(little.density.sum(), prior_start.density[hull].sum(), rtol=0.02)
-
-
-def test_a_hole_that_smoke_entered_through_is_filled(moment, prior_start) -> None:
-    """It is narrower than the blur; where the smooth answer came along, a gap is detail and stays."""
-    smooth, holed = moment.prior, moment.true.copy()
-    entrance = np.zeros_like(moment.views.hull)
-    row = int(smooth.sum((0, 1)).argmax())
-    entrance[:, :, row] = moment.views.hull[:, :, row]
-    holed[entrance] = 0
-    gap, hole = (
-        guided(moment, prior_start, holed, came).density for came in (smooth, np.where(entrance, np.float32(0), smooth))
-    )
-    np.testing.assert_array_equal(gap, guided(moment, prior_start, holed).density)
-    dense = entrance & (smooth > smooth[moment.views.hull].mean())
-    np.testing.assert_allclose(hole[dense], prior_start.density[dense], rtol=0.1)
-    assert gap[dense].sum() < 0.5 * hole[dense].sum()
-    np.testing.assert_array_equal(hole[~entrance], gap[~entrance])
-
-
-def test_without_anything_made_up_a_share_is_taken_over(moment) -> None:
-    found = GuidedSimulation(SHARE).start(moment.views, moment.depth, Smoke(moment.true))
-    np.testing.assert_array_equal(found.density, moment.start(moment.true).density)

@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift.baselines.density import FixedRateDescent
-from smokelift.density import GradientFit, RoundDepth, Smoke, Start, ViewSet
+from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels
 from smokelift.density.upright_plane import view_frame
@@ -482,7 +482,7 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     always = np.full_like(plume.densities[0], 0.5)
 
     class Stubborn:
-        def start(self, views: Any, depth: Any, carried: Smoke) -> Start:
+        def start(self, views: Any, depth: Any, carried: np.ndarray) -> Start:
             return Start(always, {"stubborn": 1.0})
 
     class Idle:
