@@ -62,7 +62,6 @@ def descend(
     patience: int,
     *,
     bound: float = np.inf,
-    recorded: tuple[Image, ...] = (),
     expected: Volume | None = None,
 ) -> Fit:
     """Minimise the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
@@ -70,25 +69,17 @@ def descend(
     The result takes the start's place, which is zero outside the hull.
     It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
     share of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to it.
-    ``recorded`` is what is left of each term's picture at the start, L - I, if the renderers hold the records of these
-    pictures. ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects
-    none.
+    ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects none.
     """
     where = hull if expected is None else hull.above_zero(density, expected)
     current = where.take(density)
-    beyond = bool(current.max(initial=0) > bound)
-    if beyond:
-        np.minimum(current, np.float32(bound), out=current)
+    np.minimum(current, np.float32(bound), out=current)
     floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)
     if expected is not None:
         np.minimum(floor, where.take(expected), out=floor)
     problem = _Problem(terms, where, density, np.zeros(density.shape, np.float32), floor)
     problem.scale += current
-    if recorded and not beyond:
-        problem.show(current)
-        residuals = recorded
-    else:
-        residuals = problem.residuals(current)
+    residuals = problem.residuals(current)
     loss, enough = objective(terms, residuals), noise_floor(terms)
     room = _Room(current.size)
     curvature = _Curvature(where, room)

@@ -145,9 +145,7 @@ class GradientFit:
             plausible, smooth = depth.density, depth.detail.smooth
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
-        scaled = fit_multiplicative(
-            cameras, start, iterations, settings.tolerance, within=views, plausible=plausible, recorded=True
-        )
+        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, within=views, plausible=plausible)
         expected, started = (float(where.take(values).max()) for values in (depth.density, start))
         prior = depth.density if smooth is None else smooth
         began = where.take(scaled.density)
@@ -160,7 +158,6 @@ class GradientFit:
             settings.tolerance,
             settings.patience,
             bound=max(settings.bound * expected, started),
-            recorded=scaled.recorded,
             expected=prior,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import world_to_pixel
 
@@ -38,11 +37,11 @@ class Places:
 class Projection:
     """Where the voxels of a grid lie in a picture, computed for the voxels that are asked for.
 
-    `footprint` is the largest width of a voxel in the picture, in pixels.
+    `footprint` is the largest width of a voxel in the picture, in pixels, and `map` the compiled projection.
     """
 
     footprint: float
-    _map: _core.PictureMap
+    map: _core.PictureMap
     _size: tuple[int, int]
 
     @cached_property
@@ -52,27 +51,11 @@ class Projection:
 
     def places(self, voxels: NDArray[np.bool_]) -> Places:
         """Where the marked voxels lie, in the order of `numpy.flatnonzero`."""
-        return Places(*self._map.places(voxels))
+        return Places(*self.map.places(voxels))
 
     def shown(self, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Visible voxels (nx, ny, nz) whose nearest pixel is marked (rows, columns)."""
-        return self._map.shown(marked)
-
-    def scale_along_rays(
-        self,
-        voxels: _core.MarkedVoxels,
-        values: Array,
-        logarithm: NDArray[np.float32],
-        plausible: Array | None,
-        *,
-        faint: float,
-        most: float,
-        share: float,
-        out: Array,
-    ) -> Array:
-        """Values (n,) scaled along the rays of the picture; see `smokelift._core.MarkedVoxels.scale_along_rays`."""
-        voxels.scale_along_rays(self._map, values, plausible, logarithm, faint, most, share, out)
-        return out
+        return self.map.shown(marked)
 
     def read(self, picture: NDArray[np.floating[Any]], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """The picture (rows, columns) read at the marked voxels (n,); see `Places.read`."""

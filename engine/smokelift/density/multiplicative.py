@@ -62,25 +62,22 @@ def fit_multiplicative(
     *,
     within: ViewSet | None = None,
     plausible: Volume | None = None,
-    recorded: bool = False,
 ) -> Fit:
     """Scale the smoke of every ray until the pictures match, and return the best density.
 
     In each iteration every term has a turn; where a pixel counts less, its steps are shorter. Voxels of the start
     (nx, ny, nz) at zero stay there. It stops when an iteration lowers the objective by less than the share
     ``tolerance``. Outside the hull of ``within``, the views of the terms, the start is known to be zero. The steps lead
-    towards the distribution of ``plausible`` (nx, ny, nz) along the rays; without it they are even. ``recorded`` keeps
-    the renderers' records of the last iteration's pictures, for a descent that goes on from there.
+    towards the distribution of ``plausible`` (nx, ny, nz) along the rays; without it they are even.
     """
     smoke, enough = _Smoke(terms, density, within, plausible), noise_floor(terms)
     current = best = smoke.values()
     spare = np.empty_like(current)  # the best is kept, the others are overwritten: new memory takes as long
-    least, done, last = np.inf, 0, False
+    least, done = np.inf, 0
     left: tuple[Image, ...] = ()
     for done in range(iterations + 1):
         volume = smoke.volume_of(current)
-        last = done == iterations
-        images = [term.renderer.image(volume, keep_record=recorded and last) for term in terms]
+        images = [term.renderer.image(volume) for term in terms]
         residuals = tuple(image - term.view.image for term, image in zip(terms, images, strict=True))
         loss = objective(terms, residuals)
         gained = least - loss
@@ -88,13 +85,12 @@ def fit_multiplicative(
             if best is not current:
                 spare = best
             best, least, left = current, loss, residuals
-        if last or loss <= enough or (done > 2 and gained < tolerance * loss):
+        if done == iterations or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
         for turn, term in enumerate(terms):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
             current = _scaled(smoke, current, turn, term, image, spare if current is best else current)
-    kept = left if recorded and last and best is current else ()
-    return Fit(smoke.volume_of(best), least, left, done, kept)
+    return Fit(smoke.volume_of(best), least, left, done)
 
 
 def take_turns(terms: Sequence[Term], density: Volume, rounds: int, *, within: ViewSet | None = None) -> Volume:
@@ -121,7 +117,7 @@ class _Smoke:
         self, terms: Sequence[Term], density: Volume, within: ViewSet | None, plausible: Volume | None = None
     ) -> None:
         self._where = _core.MarkedVoxels(density > 0) if within is None else within.where
-        self._projections = [term.view.projection for term in terms]
+        self._maps = [term.view.projection.map for term in terms]
         self._values = self._where.take(density)
         self._volume = np.zeros(density.shape, np.float32)
         self._plausible = None if plausible is None else self._where.take(plausible)
@@ -140,16 +136,10 @@ class _Smoke:
 
     def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32], out: Array) -> Array:
         """Values scaled along a term's rays by a share (`RELAXATION`) of the logarithmic steps (rows, columns)."""
-        return self._projections[turn].scale_along_rays(
-            self._where,
-            values,
-            logarithm,
-            self._plausible,
-            faint=self._faint,
-            most=MAX_UNEVENNESS,
-            share=RELAXATION,
-            out=out,
+        self._where.scale_along_rays(
+            self._maps[turn], values, self._plausible, logarithm, self._faint, MAX_UNEVENNESS, RELAXATION, out
         )
+        return out
 
 
 def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image, out: Array) -> Array:

@@ -74,15 +74,12 @@ class Fit:
     """A density (nx, ny, nz) that an optimiser found in so many iterations.
 
     `loss` is the objective. `residuals` are what is left of each term's picture (rows, columns, channels), L - I.
-    `recorded` are the same if the terms' renderers hold the records of this density's pictures, ready for their
-    gradients; else none.
     """
 
     density: Volume
     loss: float
     residuals: tuple[Image, ...]
     iterations: int
-    recorded: tuple[Image, ...] = ()
 
 
 def objective(terms: Sequence[Term], residuals: Sequence[Image]) -> float:

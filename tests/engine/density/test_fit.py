@@ -275,16 +275,8 @@ def test_compiled_steps_are_those_of_the_formula(even) -> None:
     if not even:
         gain = (plausible + 0.1) / (values * np.exp(step) + 0.1)
         step *= np.minimum(np.where(step < 0, 1 / gain, gain), 2)
-    found = projection.scale_along_rays(
-        voxels,
-        values,
-        picture,
-        None if even else plausible,
-        faint=0.1,
-        most=2.0,
-        share=0.9,
-        out=np.empty_like(values),
-    )
+    found = np.empty_like(values)
+    voxels.scale_along_rays(projection.map, values, None if even else plausible, picture, 0.1, 2.0, 0.9, found)
     np.testing.assert_allclose(found, values * np.exp(0.9 * step), rtol=1e-5)
     np.testing.assert_array_equal(found[~visible], values[~visible])
 
