@@ -19,13 +19,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places, centres_of, project_voxels
-from smokelift.density.levels import (
-    MIN_COARSENED_VOXELS,
-    any_of_two,
-    every_second,
-    spread_to_two,
-    with_neighbours,
-)
+from smokelift.density.levels import any_of_two, with_neighbours
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
@@ -146,26 +140,14 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
     A profile decides along each ray by itself, so that a thin veil beside thick smoke stays.
     """
     hull = views.hull
-    box = box_around(hull, 1)
-    if np.count_nonzero(hull) > MIN_COARSENED_VOXELS:
-        # where every second voxel and its neighbours expect none, those between them expect none either
-        sampled = every_second(any_of_two(hull), hull.shape)
-        coarse = _marked(sampled, views, profiles)[::2, ::2, ::2]
-        hull = spread_to_two(with_neighbours(coarse, corners=True), hull.shape) & hull
-    near = _marked(hull, views, profiles)[box]
-    expected = np.zeros(hull.shape, np.bool_)
-    expected[box] = with_neighbours(near) & views.hull[box]
-    return expected
-
-
-def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
-    """Mark the given voxels (nx, ny, nz) where any profile expects smoke."""
-    found = np.zeros(np.count_nonzero(voxels), np.bool_)
+    found = np.zeros(np.count_nonzero(hull), np.bool_)
     for view, profile in zip(views.views, profiles, strict=True):
-        places = view.projection.places(voxels)
-        found |= places.visible & (profile.shape(places, voxels) > PROFILE_CUT)
-    expected = np.zeros(voxels.shape, np.bool_)
-    expected[voxels] = found
+        places = view.projection.places(hull)
+        found |= places.visible & (profile.shape(places, hull) > PROFILE_CUT)
+    expected = np.zeros(hull.shape, np.bool_)
+    expected[hull] = found
+    box = box_around(hull, 1)
+    expected[box] = with_neighbours(expected[box]) & hull[box]
     return expected
 
 

@@ -8,9 +8,8 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.density import DetailedDepth, GradientFit, RoundDepth, ViewSet
-from smokelift.density import depth_prior as expecting
 from smokelift.density import levels as module
-from smokelift.density.levels import Level, any_of_two, every_second, spread_to_two, with_neighbours
+from smokelift.density.levels import Level, any_of_two, with_neighbours
 from smokelift.footage.clip import Clip
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
@@ -35,7 +34,6 @@ def shot(plume, tmp_path_factory) -> Iterator[Shot]:
 def large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every grid of this size count as large, and one half as fine as small."""
     monkeypatch.setattr(module, "MIN_COARSENED_VOXELS", 2500)
-    monkeypatch.setattr(expecting, "MIN_COARSENED_VOXELS", 2500)
 
 
 def level(shot: Shot) -> Level:
@@ -99,16 +97,10 @@ def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -
     assert density.sum() == pytest.approx(plain.sum(), rel=0.1)
 
 
-def test_a_mark_is_kept_and_spread_to_its_block() -> None:
+def test_a_mark_is_kept_on_a_coarser_grid() -> None:
     voxels = np.zeros(ODD, np.bool_)
     voxels[4, 1, 6] = voxels[1, 2, 3] = True
-    coarse = any_of_two(voxels)
-    assert coarse.shape == (3, 2, 4)
-    assert sorted(zip(*np.nonzero(coarse), strict=True)) == [(0, 1, 1), (2, 0, 3)]
-    block = spread_to_two(coarse, ODD)
-    assert block[voxels].all()
-    assert np.count_nonzero(block) == 8 + 2
-    np.testing.assert_array_equal(np.argwhere(every_second(coarse, ODD)), [[0, 2, 2], [4, 0, 6]])
+    np.testing.assert_array_equal(np.argwhere(any_of_two(voxels)), [[0, 1, 1], [2, 0, 3]])
 
 
 def test_means_keep_the_sum_and_prolonged_values_their_mean() -> None:
@@ -137,5 +129,3 @@ def test_values_scale_as_coarse_ones_do_where_they_are_marked_alone() -> None:
 def test_neighbours_are_those_of_a_dilation() -> None:
     voxels = np.random.default_rng(0).random((6, 7, 9)) > 0.95
     np.testing.assert_array_equal(with_neighbours(voxels), ndimage.binary_dilation(voxels))
-    everywhere = ndimage.binary_dilation(voxels, np.ones((3, 3, 3)))
-    np.testing.assert_array_equal(with_neighbours(voxels, corners=True), everywhere)
