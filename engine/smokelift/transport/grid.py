@@ -6,7 +6,7 @@ Harlow and Welch 1965), where its divergence and the pressure projection are exa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
 from typing import Self, TypeVar
 
@@ -84,11 +84,7 @@ class StaggeredGrid:
 
     def centres(self) -> Array:
         """The vectors at voxel centres, shape (nx, ny, nz, 3): the mean of opposite faces."""
-        result = np.empty((*self.shape, 3), np.float32)
-        for axis, (low, high) in enumerate(_opposite_sides(self.faces)):
-            np.add(high, low, out=result[..., axis])
-        result *= np.float32(0.5)
-        return result
+        return np.stack(at_centres(self.faces), -1)
 
     def with_faces(self, faces: Iterable[Array]) -> Self:
         """Other values on the same grid."""
@@ -203,16 +199,9 @@ def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
 
 def at_centres(faces: Faces) -> Faces:
     """The three components of a field on faces at voxel centres: the mean of opposite faces."""
-    x, y, z = (np.float32(0.5) * (high + low) for low, high in _opposite_sides(faces))
-    return x, y, z
-
-
-def _opposite_sides(faces: Faces) -> Iterator[tuple[Array, Array]]:
-    """For each axis views (nx, ny, nz) of the components on the low and on the high side of every voxel."""
     x, y, z = faces
-    yield x[:-1], x[1:]
-    yield y[:, :-1], y[:, 1:]
-    yield z[:, :, :-1], z[:, :, 1:]
+    half = np.float32(0.5)
+    return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
 
 
 def on_faces(centres: Array) -> Faces:
@@ -221,8 +210,7 @@ def on_faces(centres: Array) -> Faces:
         np.pad(centres[..., axis], [(1, 1) if d == axis else (0, 0) for d in range(3)], mode="edge")
         for axis in range(3)
     )
-    half = np.float32(0.5)
-    return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
+    return at_centres((x, y, z))
 
 
 def require_positive(name: str, value: float) -> None:

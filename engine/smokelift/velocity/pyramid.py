@@ -61,24 +61,15 @@ def coarsen(a: Array) -> Array:
 
 def coarsen_faces(field: StaggeredGrid) -> StaggeredGrid:
     """A field on the next coarser grid, in the same unit: what goes in and out of eight voxels together."""
-    x, y, z = (_every_second(component, along) for along, component in enumerate(field.faces))
+    faces = []
+    for along, component in enumerate(field.faces):
+        # the side of an odd last voxel stands for one beyond it
+        last = component.shape[along] - 1
+        component = component.take(np.minimum(2 * np.arange((last + 1) // 2 + 1), last), along)
+        for axis in {0, 1, 2} - {along}:
+            even = 2 * np.arange((component.shape[axis] + 1) // 2)
+            odd = np.minimum(even + 1, component.shape[axis] - 1)
+            component = np.float32(0.5) * (component.take(even, axis) + component.take(odd, axis))
+        faces.append(component)
+    x, y, z = faces
     return StaggeredGrid((x, y, z), 2 * field.voxel_size, field.closed)
-
-
-def _every_second(component: Array, along: int) -> Array:
-    last = component.shape[along] - 1  # the side of an odd last voxel stands for one beyond it
-    places = np.minimum(2 * np.arange(last // 2 + 1 + last % 2), last)
-    component = component.take(places, along)
-    for axis in range(3):
-        if axis != along:
-            component = _means_of_two(component, axis)
-    return np.ascontiguousarray(component)
-
-
-def _means_of_two(a: Array, axis: int) -> Array:
-    if a.shape[axis] % 2:
-        a = np.concatenate([a, a.take([-1], axis)], axis)
-    lead = (slice(None),) * axis
-    means: Array = a[(*lead, slice(0, None, 2))] + a[(*lead, slice(1, None, 2))]
-    means *= np.float32(0.5)
-    return means
