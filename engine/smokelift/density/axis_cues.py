@@ -122,9 +122,9 @@ def estimate_axis(
     if not pictures:
         return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, BOX_DEVIATION * reach)
     mean = replace(pictures[0], values=np.mean([picture.values for picture in pictures], 0))
-    total = mean.values.sum(1)
+    total = mean.total
     smoky = total > 0.02 * total.max()
-    middle = np.interp(mean.heights, mean.heights[smoky], mean.rows().mean[smoky])
+    middle = np.interp(mean.heights, mean.heights[smoky], mean.mean[smoky])
     offset = np.average(middle**2, weights=total)
     box = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + offset) / (BOX_COUNT + 1))
     if base is not None:
@@ -206,12 +206,11 @@ def _floor_contact(
     pixel = distance**2 / (above * camera.fy)
     if pixel > reach / 2:
         return None
-    rows = picture.rows()
-    heights, total = rows.heights, rows.total
+    heights, total = picture.heights, picture.total
     smoky = total > 0.05 * np.percentile(total[total > 0], 75)
     begins = heights[np.argmax(smoky)]
     near = smoky & (heights <= begins + 12 * (heights[1] - heights[0]))
-    width = 2 * np.sqrt(3) * np.average(rows.spread[near], weights=total[near])
+    width = 2 * np.sqrt(3) * np.average(picture.spread[near], weights=total[near])
     level = np.median(total[smoky & (heights <= begins + width)])
     # where the rows first hold so much of their level
     edges = np.interp(np.array([0.2, 0.5, 0.8]) * level, np.maximum.accumulate(total), heights)

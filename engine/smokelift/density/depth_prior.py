@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import Places, centres_of, project_voxels
+from smokelift.density.hull import Places, project_voxels
 from smokelift.density.levels import any_of_two, with_neighbours
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
@@ -153,7 +153,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
 
 def _density(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
     """A density (nx, ny, nz) that has the profiles' shape and the pictures' amounts."""
-    hull, density = views.hull, np.zeros(views.optics.domain.resolution, np.float32)
+    hull = views.hull
     seen_at = [view.projection.places(hull) for view in views.views]
     single = [
         places.read(view.optical_depth) * profile.at(places, hull)
@@ -161,8 +161,7 @@ def _density(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
     ]
     spread = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
     spread /= np.float32(views.optics.medium.extinction)
-    views.where.put(spread, density)
-    return density
+    return views.volume(spread)
 
 
 def _common(
@@ -193,7 +192,8 @@ def _common_axis(view: ObservedView, views: ViewSet) -> SmokeAxis:
     """How far behind the domain's centre all pictures together put the middle of the smoke, by height in one view."""
     domain, hull = views.optics.domain, views.hull
     _, depth, height = view_frame(view.camera)
-    offset = centres_of(hull, domain) - np.array(domain.centre)
+    places = domain.offsets(domain.centre)
+    offset = np.stack([np.broadcast_to(place, hull.shape)[hull] for place in places], -1)
     if not offset.size:
         return SmokeAxis.upright()
     level = np.rint(offset @ height / domain.voxel_size).astype(int)

@@ -62,37 +62,15 @@ class Projection:
         return self.places(voxels).read(picture)
 
 
-def centres_of(voxels: NDArray[np.bool_], domain: Domain) -> NDArray[np.float64]:
-    """World positions (n, 3) of the centres of the marked voxels."""
-    places = [axis[index] for axis, index in zip(voxel_axes(domain), np.nonzero(voxels), strict=True)]
-    return np.stack(places, -1)
-
-
-def voxel_axes(domain: Domain) -> list[NDArray[np.float64]]:
-    """World coordinates of the voxel centres along x, y and z."""
-    h = domain.voxel_size
-    return [low + (np.arange(n) + 0.5) * h for low, n in zip(domain.min, domain.resolution, strict=True)]
-
-
 @lru_cache(maxsize=8)
 def project_voxels(camera: Camera, domain: Domain) -> Projection:
     """Project every voxel centre of a domain."""
-    projected = _core.PictureMap(world_to_pixel(camera), voxel_axes(domain), camera.size)
+    axes = [axis.ravel() for axis in domain.offsets((0, 0, 0))]
+    projected = _core.PictureMap(world_to_pixel(camera), axes, camera.size)
     near = projected.nearest if camera.type == "perspective" else 1.0
     # the diagonal of a voxel is its largest width from any side
     footprint = max(camera.fx, camera.fy) * domain.voxel_size * np.sqrt(3) / near
     return Projection(float(footprint), projected, camera.size)
-
-
-def inside(voxels: NDArray[np.bool_], values: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """The values (nx, ny, nz) at the marked voxels, zero elsewhere.
-
-    Only pages of memory with marked voxels are allocated; reading zeros allocates none. So the memory of a density
-    follows the smoke, not the box.
-    """
-    result = np.zeros(voxels.shape, np.float32)
-    np.copyto(result, values, where=voxels)
-    return result
 
 
 def reached(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:

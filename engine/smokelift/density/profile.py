@@ -29,7 +29,7 @@ from scipy.special import gamma, gammainc
 
 import smokelift._core as _core
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import Places, voxel_axes
+from smokelift.density.hull import Places
 from smokelift.density.upright_plane import on_upright_plane, view_frame
 from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
@@ -80,12 +80,13 @@ def lateral_spread(
     ``amount`` (rows, columns) is the optical depth, or proportional to it. Heights are above the domain's centre, along
     `view_frame`'s height. Where there is no smoke the neighbours fill the spread; it is smoothed over two voxels.
     """
-    rows = on_upright_plane(amount, camera, domain, 1).rows()
+    rows = on_upright_plane(amount, camera, domain, 1)
     # normalised convolution: heights count by the smoke that they hold
-    most = rows.total.max(initial=0.0)
-    weight = ndimage.gaussian_filter1d(rows.total, 2.0) + 1e-6 * max(most, 1e-30)
-    smooth = ndimage.gaussian_filter1d(rows.total * rows.spread**2, 2.0) / weight
-    known = rows.total > 1e-3 * most
+    total = rows.total
+    most = total.max(initial=0.0)
+    weight = ndimage.gaussian_filter1d(total, 2.0) + 1e-6 * max(most, 1e-30)
+    smooth = ndimage.gaussian_filter1d(total * rows.spread**2, 2.0) / weight
+    known = total > 1e-3 * most
     if known.any():
         smooth = np.interp(rows.heights, rows.heights[known], smooth[known])
     return rows.heights, np.sqrt(np.maximum(smooth, domain.voxel_size**2))
@@ -221,10 +222,9 @@ class DepthProfile:
         self, places: Places, voxels: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """The profile g and its A (m) at the marked voxels (n,); compiled, as a large grid has millions."""
-        offsets = zip(voxel_axes(self._domain), self._domain.centre, strict=True)
         return _core.depth_profile(
             voxels,
-            [along - middle for along, middle in offsets],
+            [axis.ravel() for axis in self._domain.offsets(self._domain.centre)],
             self._depth,
             at=[places.rows, places.columns],
             middle=self._middle,

@@ -13,6 +13,9 @@ from smokelift.scene import Camera, Domain
 from smokelift.scene.checks import Vector
 from smokelift.scene.projection import project_points, ray_through_pixels
 
+TINY = np.finfo(np.float64).tiny
+"""Smallest normal number, for divisions."""
+
 
 def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Lateral, depth and height directions (unit, world) in which one picture is understood.
@@ -45,40 +48,31 @@ def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneRows:
-    """A picture on the upright plane through the domain's centre, row by row.
-
-    The rows are at `heights` (n,), in metres above the centre. `total` (n,) is the amount in each, times metres, `mean`
-    and `spread` (n,) its mean lateral position and standard deviation (m): 0 where there is nothing.
-    """
-
-    heights: NDArray[np.float64]
-    total: NDArray[np.float64]
-    mean: NDArray[np.float64]
-    spread: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
 class PlanePicture:
     """A picture on the upright plane through the domain's centre.
 
-    Its `values` (n, m) are at `heights` (n,) above the centre and `laterals` (m,) from it, in metres. A column is
-    `width` metres wide.
+    Its `values` (n, m) are at `heights` (n,) above the centre and `laterals` (m,) from it, in metres.
     """
 
     heights: NDArray[np.float64]
     laterals: NDArray[np.float64]
     values: NDArray[np.float64]
-    width: float
 
-    def rows(self, part: slice = slice(None)) -> PlaneRows:
-        """Sums along the rows, over some of the columns."""
-        across, values = self.laterals[part], self.values[:, part]
-        total = values.sum(1)
-        safe = np.where(total > 0, total, 1.0)
-        mean = (values * across).sum(1) / safe
-        variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
-        return PlaneRows(self.heights, total * self.width, mean, np.sqrt(variance))
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """The amount (n,) in each row, in columns."""
+        return np.asarray(self.values.sum(1))
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Mean lateral position (n,) in each row (m): 0 where there is nothing."""
+        return np.asarray(self.values @ self.laterals / np.maximum(self.total, TINY))
+
+    @property
+    def spread(self) -> NDArray[np.float64]:
+        """Lateral standard deviation (n,) in each row (m): 0 where there is nothing."""
+        squares = (self.laterals - self.mean[:, None]) ** 2
+        return np.asarray(np.sqrt((self.values * squares).sum(1) / np.maximum(self.total, TINY)))
 
 
 def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
@@ -92,7 +86,7 @@ def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain
     ends = reach_along(domain, height) + reach_along(domain, depth) / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
     points = centre + across[None, :, None] * lateral + up[:, None, None] * height
-    return PlanePicture(up, across, seen_at(points, amount, camera), h)
+    return PlanePicture(up, across, seen_at(points, amount, camera))
 
 
 def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
