@@ -29,8 +29,7 @@ from smokelift.direct.simulation import Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Array, advect, at_centres
-from smokelift.velocity.estimator import coarsened
-from smokelift.velocity.pyramid import coarsen
+from smokelift.velocity.pyramid import coarsen, coarsened
 
 COARSE = 64
 """Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a mean motion needs no more."""

@@ -1,7 +1,7 @@
 """Staggered grids and what is carried on them: advection and pressure projection."""
 
 from smokelift.checks.array_types import Array
-from smokelift.transport.advection import advect, advect_cells
+from smokelift.transport.advection import advect
 from smokelift.transport.grid import (
     Faces,
     StaggeredGrid,
@@ -26,7 +26,6 @@ __all__ = [
     "Velocity",
     "VoxelBox",
     "advect",
-    "advect_cells",
     "at_centres",
     "block_means",
     "divergence",

@@ -100,14 +100,6 @@ def advect(
     return _with_mass(moved, np.abs(moved - other), mass)
 
 
-def advect_cells(field: Array, displacement: StaggeredGrid) -> Array:
-    """Values (nx, ny, nz) at x - displacement(x), in voxels, interpolated linearly.
-
-    Beyond the box the field continues as on its side.
-    """
-    return _core.advect_cells(field, displacement.faces, False, True)
-
-
 def _moved(field: Array, displacement: StaggeredGrid, corrected: bool) -> Array:
     """Carry a density along, computed where it can arrive alone."""
     # what arrives was a step away, and the correction looks a step further

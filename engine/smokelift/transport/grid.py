@@ -7,7 +7,7 @@ Harlow and Welch 1965), where its divergence and the pressure projection are exa
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import InitVar, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Self, TypeVar
 
 import numpy as np
@@ -107,8 +107,6 @@ class Velocity(StaggeredGrid):
     confidence
         Of an estimate, shape (nx, ny, nz), 0 to 1: how far the densities show the motion there. Smoothness and
         incompressibility fill in the rest.
-    known_finite
-        Whether the faces are known to be finite; they are not read then, which takes long on a large grid.
 
     Raises
     ------
@@ -119,11 +117,10 @@ class Velocity(StaggeredGrid):
 
     figures: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     confidence: Array | None = field(default=None, kw_only=True)
-    known_finite: InitVar[bool] = field(default=False, kw_only=True)
 
-    def __post_init__(self, known_finite: bool) -> None:
+    def __post_init__(self) -> None:
         super().__post_init__()
-        if not known_finite and not all(map(finite, self.faces)):
+        if not all(map(finite, self.faces)):
             raise ValueError("the velocity holds values that are not finite; set them to 0.")
 
     def displacement(self, dt: float) -> StaggeredGrid:
@@ -193,7 +190,6 @@ def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
         closed,
         figures=velocity.figures,
         confidence=None if velocity.confidence is None else velocity.confidence[box],
-        known_finite=True,
     )
 
 

@@ -14,7 +14,6 @@ from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, require_s
 from smokelift.velocity.estimator import (
     DensityPair,
     checked,
-    coarsened,
     in_metres,
     motion_weight,
     predict_velocity,
@@ -23,7 +22,7 @@ from smokelift.velocity.estimator import (
 from smokelift.velocity.linearisation import SMOKE_THRESHOLD, least_squares, linearise
 from smokelift.velocity.momentum import fit_centre
 from smokelift.velocity.preparation import PreparedPair, prepare
-from smokelift.velocity.pyramid import coarsen, smoothed
+from smokelift.velocity.pyramid import coarsen, coarsened, smoothed
 from smokelift.velocity.solver import ProjectedCG, Solver
 
 ONE_VIEW_SMOOTHNESS = 10.0

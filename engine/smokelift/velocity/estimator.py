@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-import smokelift._core as _core
 from smokelift.checks import numbers, require_kind
 from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
@@ -28,7 +27,7 @@ from smokelift.transport import (
     require_same_shape,
     without_divergence,
 )
-from smokelift.velocity.pyramid import coarsen_faces, prolonged
+from smokelift.velocity.pyramid import prolonged
 
 Density = npt.NDArray[np.floating[Any]]
 
@@ -89,12 +88,6 @@ def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
     return project(advect(velocity, velocity, dt))
 
 
-def coarsened(velocity: Velocity) -> Velocity:
-    """A velocity on a grid half as fine."""
-    coarse = coarsen_faces(velocity)
-    return Velocity(coarse.faces, coarse.voxel_size, coarse.closed)
-
-
 def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     """A velocity refined to the grid (shape) that its own was halved from; itself if it is on that already.
 
@@ -103,15 +96,7 @@ def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     if coarse.shape == shape:
         return coarse
     x, y, z = (slice(0, count) for count in shape)
-    fine = refined_in(coarse, shape, (x, y, z))
-    return replace(fine, figures=refined_figures(coarse, fine))
-
-
-def refined_figures(coarse: Velocity, fine: Velocity) -> dict[str, float]:
-    """The figures of a velocity on a finer grid, with the divergence there."""
-    if not coarse.figures:
-        return {}
-    return {**coarse.figures, "divergence": _core.relative_divergence(fine.faces)}
+    return refined_in(coarse, shape, (x, y, z))
 
 
 def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
@@ -129,11 +114,7 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     if confidence is not None:
         confidence = confidence.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]
     fine = Velocity(
-        prolonged(part, counts),
-        part.voxel_size / 2,
-        part.closed,
-        confidence=confidence,
-        known_finite=True,
+        prolonged(part, counts), part.voxel_size / 2, part.closed, figures=part.figures, confidence=confidence
     )
     i, j, k = (
         slice(inner.start - 2 * outer.start, inner.stop - 2 * outer.start)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
-from smokelift.transport import Array, Faces, StaggeredGrid, advect_cells, at_centres
+from smokelift.transport import Array, Faces, StaggeredGrid, at_centres
 
 SMOKE_THRESHOLD = 0.01
 """Fraction of the largest density from which a voxel counts as smoke."""
@@ -55,7 +55,7 @@ class Linearisation:
 
 def linearise(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> Linearisation | None:
     """The change between densities around `u` (voxels per frame); None where there is no structure to follow."""
-    carried = advect_cells(before, u)
+    carried = _core.advect_cells(before, u.faces, False, True)
     density = np.maximum(carried, after)
     smoke = density > np.float32(SMOKE_THRESHOLD) * density.max()
     direction = gradient(np.float32(0.5) * (carried + after))

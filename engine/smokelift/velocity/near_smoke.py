@@ -10,7 +10,7 @@ import smokelift._core as _core
 from smokelift.checks.array_types import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
-from smokelift.velocity.estimator import refined_figures, refined_in
+from smokelift.velocity.estimator import refined_in
 
 MIN_SLAB_VOXELS = 4_000_000
 """Voxels of a box around smoke above which it is cut into slabs, each as narrow as the smoke is there."""
@@ -49,24 +49,11 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
     if velocity.shape == smoke.shape:
         return velocity
     i, j, k = (np.zeros(shape, np.float32) for shape in face_shapes(smoke.shape))
-    confidence = None if velocity.confidence is None else np.zeros(smoke.shape, np.float32)
-    figures: dict[str, float] = {}
     for box, _ in _boxes(smoke, _reach(velocity, dt / voxel_size)):
         part = refined_in(velocity, (x, y, z), box)
         for component, found in zip(faces_in((i, j, k), box), part.faces, strict=True):
             component[...] = found
-        if confidence is not None and part.confidence is not None:
-            np.copyto(confidence[box], part.confidence, where=part.confidence != 0)
-        found_figures = refined_figures(velocity, part)
-        figures = {name: max(value, figures.get(name, value)) for name, value in found_figures.items()}
-    return Velocity(
-        (i, j, k),
-        voxel_size,
-        velocity.closed,
-        figures=figures,
-        confidence=confidence,
-        known_finite=True,
-    )
+    return Velocity((i, j, k), voxel_size, velocity.closed, figures=velocity.figures)
 
 
 def _reach(velocity: Velocity, voxels_at_one: float) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, faces_in, without_divergence
@@ -32,25 +33,16 @@ def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
 
 def smoothed(velocity: Velocity) -> Velocity:
     """A velocity with every component smoothed alike along all axes, which keeps a divergence of zero."""
-    return velocity.with_faces(
-        _smoothed_along(_smoothed_along(_smoothed_along(component, 0, along), 1, along), 2, along)
-        for along, component in enumerate(velocity.faces)
-    )
-
-
-def _smoothed_along(component: Array, axis: int, along: int) -> Array:
-    """A component smoothed along an axis; it goes on beyond the box such that its divergence does, too."""
-    values = np.moveaxis(component, axis, 0)
-    result = np.float32(1 - 2 * SMOOTHING) * component
-    near, drawn = np.moveaxis(result, axis, 0), np.float32(SMOOTHING) * values
-    near[1:] += drawn[:-1]
-    near[:-1] += drawn[1:]
-    for end in (0, -1):
-        if axis == along:  # linearly
-            near[end] = values[end]
-        else:  # as on the side
-            near[end] += drawn[end]
-    return result
+    faces = []
+    for along, component in enumerate(velocity.faces):
+        for axis in range(3):
+            mean = ndimage.correlate1d(component, (SMOOTHING, 1 - 2 * SMOOTHING, SMOOTHING), axis, mode="nearest")
+            if axis == along:  # beyond the box it goes on linearly, and so does its divergence
+                ends = np.moveaxis(mean, axis, 0)
+                ends[[0, -1]] = np.moveaxis(component, axis, 0)[[0, -1]]
+            component = mean
+        faces.append(component)
+    return velocity.with_faces(faces)
 
 
 def coarsen(a: Array) -> Array:
@@ -59,10 +51,10 @@ def coarsen(a: Array) -> Array:
     return _core.means_of_two(np.pad(a, odd, mode="edge") if np.any(odd) else np.ascontiguousarray(a))
 
 
-def coarsen_faces(field: StaggeredGrid) -> StaggeredGrid:
-    """A field on the next coarser grid, in the same unit: what goes in and out of eight voxels together."""
+def coarsened(velocity: Velocity) -> Velocity:
+    """A velocity on a grid half as fine: what goes in and out of eight voxels together."""
     faces = []
-    for along, component in enumerate(field.faces):
+    for along, component in enumerate(velocity.faces):
         # the side of an odd last voxel stands for one beyond it
         last = component.shape[along] - 1
         component = component.take(np.minimum(2 * np.arange((last + 1) // 2 + 1), last), along)
@@ -72,4 +64,4 @@ def coarsen_faces(field: StaggeredGrid) -> StaggeredGrid:
             component = np.float32(0.5) * (component.take(even, axis) + component.take(odd, axis))
         faces.append(component)
     x, y, z = faces
-    return StaggeredGrid((x, y, z), 2 * field.voxel_size, field.closed)
+    return Velocity((x, y, z), 2 * velocity.voxel_size, velocity.closed)
