@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import saxpy
@@ -98,7 +98,7 @@ def descend(
         if not slope > 0:
             break
         length = 1.0 if curvature.known else min(0.1 * loss / slope, MAX_FIRST_STEP)
-        step = _step(problem, current, loss, gradient, direction, length, bound, room)
+        step = problem.step(current, loss, gradient, direction, length, bound, room)
         if step is None:
             problem.show(current)
             break
@@ -159,40 +159,31 @@ class _Problem:
         out *= self.scale
         return out
 
+    def step(
+        self, current: Array, loss: float, gradient: Array, direction: Array, length: float, bound: float, room: _Room
+    ) -> _Step | None:
+        """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
+        density, moved = room.take(), room.take()
+        for _ in range(SHORTENINGS):
+            _core.descend(
+                current, direction, self.scale, self.floor, length, MAX_CHANGE, bound, arrived=density, moved=moved
+            )
+            residuals = self.residuals(density)
+            found = objective(self.terms, residuals)
+            # what the bounds leave of a long step need not lead down
+            if found <= loss + SUFFICIENT * min(_dot(gradient, moved), 0.0):
+                return _Step(density, moved, residuals, found)
+            length *= SHORTEN
+        return None
 
-@dataclass(frozen=True, eq=False)
-class _Step:
+
+class _Step(NamedTuple):
     """Where a step arrives: the density, the way there in units of the scale, the residuals, and the objective."""
 
     density: Array
     moved: Array
     residuals: tuple[Image, ...]
     loss: float
-
-
-def _step(
-    problem: _Problem,
-    current: Array,
-    loss: float,
-    gradient: Array,
-    direction: Array,
-    length: float,
-    bound: float,
-    room: _Room,
-) -> _Step | None:
-    """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
-    density, moved = room.take(), room.take()
-    for _ in range(SHORTENINGS):
-        _core.descend(
-            current, direction, problem.scale, problem.floor, length, MAX_CHANGE, bound, arrived=density, moved=moved
-        )
-        residuals = problem.residuals(density)
-        found = objective(problem.terms, residuals)
-        # what the bounds leave of a long step need not lead down
-        if found <= loss + SUFFICIENT * min(_dot(gradient, moved), 0.0):
-            return _Step(density, moved, residuals, found)
-        length *= SHORTEN
-    return None
 
 
 class _Curvature:

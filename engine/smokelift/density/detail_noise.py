@@ -53,20 +53,22 @@ class StretchedNoise:
     def at(self, level: Level) -> NDArray[np.float32]:
         """Noise (n,) at the voxels that may hold smoke."""
         # an octave's noise, and three more for the motion that draws out the next
-        return self._sum(level, iter(_lattices(self.seed, 4 * len(self.strengths) - 3))).noise
+        return self._sum(level, iter(_lattices(self.seed, 4 * len(self.strengths) - 3)))[0]
 
-    def _sum(self, level: Level, lattices: Iterator[_Lattice]) -> _Octaves:
-        """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
+    def _sum(self, level: Level, lattices: Iterator[_Lattice]) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+        """The sum (n,) of the octaves that a grid holds, and their number.
+
+        Between them is the motion (3, n) in voxels that draws out the next, whose nodes are half as far apart.
+        """
         hull, size, octaves = level.views.hull, level.coarseness, 0
         places = np.array(np.nonzero(hull), np.float32)
         places *= size
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
         if level.coarser is not None:
-            coarse = self._sum(level.coarser, lattices)
-            octaves = coarse.number
-            noise, *motions = (_finer(values, level.coarser, level) for values in (coarse.noise, *coarse.motion))
-            motion = np.stack(motions)
+            coarse, motions, octaves = self._sum(level.coarser, lattices)
+            for found, values in zip((noise, *motion), (coarse, *motions), strict=True):
+                found[...] = level.coarser.finer(level.coarser.views.volume(values), level)
         moved = np.empty_like(places)
         while octaves < len(self.strengths):
             spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
@@ -82,22 +84,7 @@ class StretchedNoise:
                 for along, octave in zip(motion, drawn, strict=True):
                     octave *= reach
                     along += octave
-        return _Octaves(noise, motion, octaves)
-
-
-class _Octaves(NamedTuple):
-    """The sum (n,) of some octaves of noise, the motion (3, n) in voxels that draws out the next, and their number."""
-
-    noise: NDArray[np.float32]
-    motion: NDArray[np.float32]
-    number: int
-
-
-def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:
-    """Values at the voxels of one grid that may hold smoke, at those of the next finer one."""
-    field = np.zeros(coarser.views.hull.shape, np.float32)
-    coarser.views.where.put(values, field)
-    return coarser.finer(field, level)
+        return noise, motion, octaves
 
 
 class _Lattice(NamedTuple):

@@ -18,9 +18,8 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import listed, numbers, require_kind
-from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
+from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
-from smokelift.density.hull import inside
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
@@ -137,7 +136,7 @@ class GradientFit:
         if not where.count:
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
-        start, fresh = inside(hull, depth.density if initial is None else initial), initial is None
+        start, fresh = views.volume(where.take(depth.density if initial is None else initial)), initial is None
         # The terms take turns, so several cameras need as many times more iterations.
         iterations = settings.fit_iterations * len(cameras)
         plausible = smooth = None
@@ -145,7 +144,7 @@ class GradientFit:
             plausible, smooth = depth.density, depth.detail.smooth
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
-        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, within=views, plausible=plausible)
+        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, where, plausible)
         expected, started = (float(where.take(values).max()) for values in (depth.density, start))
         prior = depth.density if smooth is None else smooth
         began = where.take(scaled.density)
@@ -163,8 +162,7 @@ class GradientFit:
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
         steady = None
         if smooth is not None:
-            steady = np.zeros(hull.shape, np.float32)
-            where.put(began, steady)
+            steady = views.volume(began)
             if final.iterations:
                 steady = _without_single_voxels(steady, final.density, hull)
         return FittedDensity(without_traces(final.density, where), hull, figures, smooth, steady)
@@ -178,7 +176,6 @@ def reconstruct_density(
     *,
     plate: Plate | None = None,
     views: Sequence[Observation] = (),
-    depth_prior: DepthPrior | None = None,
 ) -> FittedDensity:
     """Find a density that renders to a picture, or to several (algorithm 3).
 
@@ -189,15 +186,13 @@ def reconstruct_density(
     scene
         Needs camera and domain.
     initial : (nx, ny, nz), optional
-        Where to start; by default the prior's density.
+        Where to start; by default the density of `RoundDepth` about the middle of the domain.
     settings
         How to fit.
     plate
         Background with its noise; by default the scene's background and the noise of 8 bits.
     views
         The same smoke at the same moment as other cameras saw it. What a picture does not show it says nothing about.
-    depth_prior
-        What is assumed of the depth; by default `RoundDepth` about the middle of the domain.
 
     Returns
     -------
@@ -234,7 +229,7 @@ def reconstruct_density(
     if initial is not None:
         initial = _checked_initial(initial, optics.domain)
     with products_on_one_thread():
-        estimate = (depth_prior or RoundDepth()).estimate(seen)
+        estimate = RoundDepth().estimate(seen)
         return GradientFit(settings or DensitySettings()).fit(seen, estimate, initial)
 
 

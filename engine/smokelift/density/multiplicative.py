@@ -28,7 +28,6 @@ from scipy import ndimage
 import smokelift._core as _core
 from smokelift.checks.array_types import Array
 from smokelift.density.objective import Fit, Term, noise_floor, objective
-from smokelift.density.observation import ViewSet
 from smokelift.render import Image, Volume
 
 STEP_RANGE = (0.4, 2.5)
@@ -59,18 +58,17 @@ def fit_multiplicative(
     density: Volume,
     iterations: int,
     tolerance: float,
-    *,
-    within: ViewSet | None = None,
+    where: _core.MarkedVoxels,
     plausible: Volume | None = None,
 ) -> Fit:
     """Scale the smoke of every ray until the pictures match, and return the best density.
 
     In each iteration every term has a turn; where a pixel counts less, its steps are shorter. Voxels of the start
-    (nx, ny, nz) at zero stay there. It stops when an iteration lowers the objective by less than the share
-    ``tolerance``. Outside the hull of ``within``, the views of the terms, the start is known to be zero. The steps lead
-    towards the distribution of ``plausible`` (nx, ny, nz) along the rays; without it they are even.
+    (nx, ny, nz) at zero stay there, and it is zero outside ``where``. It stops when an iteration lowers the objective
+    by less than the share ``tolerance``. The steps lead towards the distribution of ``plausible`` (nx, ny, nz) along
+    the rays; without it they are even.
     """
-    smoke, enough = _Smoke(terms, density, within, plausible), noise_floor(terms)
+    smoke, enough = _Smoke(terms, density, where, plausible), noise_floor(terms)
     current = best = smoke.values()
     spare = np.empty_like(current)  # the best is kept, the others are overwritten: new memory takes as long
     least, done = np.inf, 0
@@ -93,13 +91,13 @@ def fit_multiplicative(
     return Fit(smoke.volume_of(best), least, left, done)
 
 
-def take_turns(terms: Sequence[Term], density: Volume, rounds: int, *, within: ViewSet | None = None) -> Volume:
+def take_turns(terms: Sequence[Term], density: Volume, rounds: int, where: _core.MarkedVoxels) -> Volume:
     """Scale the smoke of every ray towards each picture in turn, whatever the others lose by it.
 
-    Each term has as many turns as there are rounds; the last one is fitted best. Voxels of the start (nx, ny, nz) at
-    zero stay there. ``within`` is that of `fit_multiplicative`.
+    Each term has as many turns as there are rounds; the last one is fitted best. Only voxels of ``where`` that are not
+    zero at the start (nx, ny, nz) change.
     """
-    smoke = _Smoke(terms, density, within)
+    smoke = _Smoke(terms, density, where)
     values = smoke.values()
     for _ in range(rounds):
         for turn, term in enumerate(terms):
@@ -114,16 +112,16 @@ class _Smoke:
     """
 
     def __init__(
-        self, terms: Sequence[Term], density: Volume, within: ViewSet | None, plausible: Volume | None = None
+        self, terms: Sequence[Term], density: Volume, where: _core.MarkedVoxels, plausible: Volume | None = None
     ) -> None:
-        self._where = _core.MarkedVoxels(density > 0) if within is None else within.where
+        self._where = where
         self._maps = [term.view.projection.map for term in terms]
         self._values = self._where.take(density)
         self._volume = np.zeros(density.shape, np.float32)
-        self._plausible = None if plausible is None else self._where.take(plausible)
-        self._faint = (
-            0.0 if self._plausible is None else MIN_DENSITY_SHARE * float(self._plausible.max(initial=MIN_SCALE))
-        )
+        self._plausible = None if plausible is None else where.take(plausible)
+        self._faint = 0.0
+        if self._plausible is not None:
+            self._faint = MIN_DENSITY_SHARE * float(self._plausible.max(initial=MIN_SCALE))
 
     def values(self) -> Array:
         """Values (n,) of the density."""

@@ -51,11 +51,6 @@ class Term:
         """Derivative of the term's part by the rendered picture (rows, columns, channels)."""
         return 2 * self.weight[..., None] * residual
 
-    def noise_floor(self) -> float:
-        """What the picture's noise leaves of the objective at the true density."""
-        power = np.square(self.view.noise_left, dtype=np.float64)
-        return float(np.sum(self.weight[..., None] * power))
-
 
 def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
     """A term for every camera's picture.
@@ -89,4 +84,4 @@ def objective(terms: Sequence[Term], residuals: Sequence[Image]) -> float:
 
 def noise_floor(terms: Sequence[Term]) -> float:
     """What noise leaves of the objective at the true density: where a fit stops."""
-    return sum(term.noise_floor() for term in terms)
+    return objective(terms, [term.view.noise_left for term in terms])

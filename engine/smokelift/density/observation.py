@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from smokelift.footage.images import area_average, channel_mean
 from smokelift.footage.matte import certainty, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
-from smokelift.render import Image, Optics, Renderer
+from smokelift.render import Image, Optics, Renderer, Volume
 from smokelift.scene import SHADOWED, Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
 from smokelift.scene.projection import voxel_width
@@ -231,6 +231,15 @@ class ViewSet:
     def where(self) -> _core.MarkedVoxels:
         """The hull's voxels: reading a volume at them leaves the memory between untouched."""
         return _core.MarkedVoxels(self.hull)
+
+    def volume(self, values: NDArray[np.floating[Any]]) -> Volume:
+        """A volume (nx, ny, nz) of values (n,) at the hull's voxels, zero elsewhere.
+
+        Memory is taken where something is written, so that of a density follows the smoke, not the box.
+        """
+        result = np.zeros(self.hull.shape, np.float32)
+        self.where.put(values, result)
+        return result
 
     @cached_property
     def renderers(self) -> tuple[Renderer, ...]:

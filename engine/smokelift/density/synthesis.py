@@ -99,9 +99,9 @@ class DetailedDepth:
         texture = ClipTexture.of(clip) if self.detail > 0 else None
         smooth = self.smooth.of_clip(clip)
         if texture is not None:
+            texture = replace(texture, roughness=tuple(self.detail * each for each in texture.roughness))
             velocity = texture.drift * texture.turntable.height
-            roughness = tuple(self.detail * each for each in texture.roughness)
-            smooth = replace(smooth, wander=Wander(velocity, texture.width, roughness, self.seed))
+            smooth = replace(smooth, wander=Wander(velocity, texture.width, texture.roughness, self.seed))
         return replace(self, smooth=smooth, texture=texture)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
@@ -122,20 +122,17 @@ class DetailedDepth:
     def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke; its low pass stays."""
         moved = texture.turntable.height * texture.drift * level.views.frame
-        strengths = tuple(self.detail * each for each in texture.roughness)
-        noise = StretchedNoise(moved, texture.width, strengths, self.seed)
-        noisy = np.zeros(smooth.shape, np.float32)
-        where = level.views.where
+        noise = StretchedNoise(moved, texture.width, texture.roughness, self.seed)
         values = noise.at(level)
         np.exp(values, out=values)
-        values *= where.take(smooth)
-        where.put(values, noisy)
+        values *= level.views.where.take(smooth)
+        noisy = level.views.volume(values)
         gain, now = (level.blurred(each, LOW_PASS * texture.width) for each in (smooth, noisy))
         gain += TINY
         now += TINY
         gain /= now
         values *= np.minimum(gain, np.float32(LARGEST_GAIN), out=gain)
-        where.put(values, noisy)
+        level.views.where.put(values, noisy)
         return noisy
 
 
@@ -143,7 +140,7 @@ def _smooth_answer(level: Level, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show, found on the coarsest grid."""
     coarser = level.coarser
     if coarser is None:
-        fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, within=level.views)
+        fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, level.views.where)
         return fitted.density
     return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
 
@@ -182,7 +179,7 @@ class EveryView:
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
-        return self._rounds(density, cameras, self.texture.exemplars, self.azimuths(), fresh)
+        return self._rounds(density, cameras, self.azimuths(), fresh)
 
     def low_pass(self, density: Volume) -> NDArray[np.float32]:
         """The density (n,) blurred over lobes of smoke; see `Detail`."""
@@ -192,19 +189,18 @@ class EveryView:
         self,
         density: Volume,
         cameras: Sequence[Term],
-        exemplars: Sequence[Exemplar],
         azimuths: Iterator[tuple[int, float]],
         fresh: bool,
     ) -> Volume:
-        """The rounds of some scales; those that a coarser grid holds are done there."""
-        coarser = self.coarser
+        """The rounds of all scales; those that a coarser grid holds are done there."""
+        coarser, exemplars = self.coarser, self.texture.exemplars
         if coarser is not None:
             density = coarser.level.changed(
                 density,
                 self.level,
-                lambda means: coarser._rounds(means, coarser.level.terms(), coarser.texture.exemplars, azimuths, fresh),
+                lambda means: coarser._rounds(means, coarser.level.terms(), azimuths, fresh),
             )
-            exemplars = [exemplar for exemplar in exemplars if exemplar.scale == 1]
+            exemplars = tuple(exemplar for exemplar in exemplars if exemplar.scale == 1)
         if not exemplars:
             return density
         table, hull = self.texture.turntable, self.level.views.hull
@@ -221,7 +217,7 @@ class EveryView:
                     self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[kept], table.lying(turned.values), where=hull[kept])
-                density = take_turns(cameras, changed, 1, within=self.level.views)
+                density = take_turns(cameras, changed, 1, self.level.views.where)
         return density
 
     def _step(
@@ -249,8 +245,7 @@ class EveryView:
         faint = 1e-3 * wanted.max()
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
         step = np.float32(relaxation) * isotropic_filter(step)
-        step = np.ascontiguousarray(enlarged(step, scale, whole.shape))
-        table.scale(now.values, step, degrees, corner, now.spans)
+        table.scale(now.values, enlarged(step, scale, table.shape), degrees, corner, now.spans)
 
     def azimuths(self) -> Iterator[tuple[int, float]]:
         """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""
@@ -290,9 +285,5 @@ def unseen_sides(turntable: Turntable, cameras: Sequence[Camera]) -> bool:
 
 def _unseen(degrees: float, cameras: Sequence[float], near: float = OWN_PICTURE_DEGREES) -> bool:
     """Whether no camera (degrees) is near to an azimuth."""
-    return all(_apart(degrees, camera) >= near for camera in cameras)
-
-
-def _apart(a: float, b: float) -> float:
-    """Degrees between two directions; the back shows what the front shows."""
-    return abs((a - b + 90) % 180 - 90)
+    # the back shows what the front shows
+    return all(abs((degrees - camera + 90) % 180 - 90) >= near for camera in cameras)

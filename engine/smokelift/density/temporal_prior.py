@@ -94,6 +94,4 @@ class GuidedSimulation:
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * where.take(prior)
         total = float(started.sum(dtype=np.float64))
         share = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
-        density = np.zeros(prior.shape, np.float32)
-        where.put(started, density)
-        return Start(density, {"share": share})
+        return Start(views.volume(started), {"share": share})

@@ -1,20 +1,16 @@
 """Where voxels lie in pictures, computed for those that are asked for, against NumPy's and SciPy's own."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density.hull import common_hull, inside, project_voxels, visual_hull
+from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (10, 10, 15))
 CENTRES = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)
 SIZE = (21, 17)
-STATM = Path("/proc/self/statm")
 
 CAMERAS = {
     "in front": Camera.look_at((0.3, -6.0, 1.0), (0.0, 0.0, 1.5), fov_y_degrees=25, size=SIZE),
@@ -79,24 +75,3 @@ def test_one_pictures_hull_is_the_common_one():
     assert 0 < hull.sum() < projection.visible.sum()
     np.testing.assert_array_equal(common_hull([mask], [projection]), hull)
     np.testing.assert_array_equal(common_hull([mask, mask], [projection, projection]), hull)
-
-
-def test_what_is_outside_the_marked_voxels_is_zero() -> None:
-    marked = np.random.default_rng(1).random((5, 6, 7)) < 0.4
-    values = np.random.default_rng(2).random(marked.shape)
-    found = inside(marked, values)
-    assert found.dtype == np.float32
-    np.testing.assert_array_equal(found, np.where(marked, values.astype(np.float32), 0))
-
-
-@pytest.mark.skipif(not STATM.exists(), reason="the system does not say how much memory is in use")
-def test_memory_follows_the_marked_voxels() -> None:
-    """An array of 256 MB with smoke in a hundredth of the box takes a tenth of that at most, read or not."""
-    values = np.broadcast_to(np.float32(1), (256, 512, 512))
-    marked = np.zeros(values.shape, np.bool_)
-    marked[100:112, 100:230, 100:230] = True
-    before = int(STATM.read_text().split()[1])
-    found = inside(marked, values)
-    assert found.max() == 1
-    taken = (int(STATM.read_text().split()[1]) - before) * os.sysconf("SC_PAGE_SIZE")
-    assert taken < 0.1 * found.nbytes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.density import Observation
-from smokelift.density.objective import camera_terms
+from smokelift.density.objective import camera_terms, noise_floor
 from smokelift.density.observation import ViewSet
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.noise import Noise, linear_per_srgb
@@ -30,4 +30,4 @@ def test_noise_that_has_faded_with_the_picture_is_not_expected() -> None:
     )
     views = ViewSet.of([Observation(camera, (truth + noise).astype(np.float32), plate)], scene_optics(scene))
     (term,) = camera_terms(views, [one])
-    assert term.noise_floor() == pytest.approx(term.loss(truth - views.views[0].image), rel=0.2)
+    assert noise_floor([term]) == pytest.approx(term.loss(truth - views.views[0].image), rel=0.2)

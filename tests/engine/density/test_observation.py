@@ -1,10 +1,14 @@
 """An observation against the grid: an element's four channels, and fits of it whatever the plate behind it."""
 
+import os
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from smokelift import _core
 from smokelift.density import DensitySettings, Observation, ObservedView, RoundDepth, ViewSet, reconstruct_density
 from smokelift.density.fit import GradientFit
 from smokelift.density.observation import USEFUL_DEVIATION, WHITE, eight_bit_plate
@@ -136,3 +140,19 @@ def test_smoke_before_a_wall_is_extracted_and_fitted(plume, small, wall) -> None
     contrast = np.abs(element.over(gray) - gray).mean()
     assert np.abs(shown - element.over(gray)).mean() < 0.1 * contrast
     assert found.sum() == pytest.approx(plume.densities[1].sum(), rel=0.2)
+
+
+STATM = Path("/proc/self/statm")
+
+
+@pytest.mark.skipif(not STATM.exists(), reason="the system does not say how much memory is in use")
+def test_memory_of_a_volume_follows_the_hull() -> None:
+    """An array of 256 MB with smoke in a hundredth of the box takes a tenth of that at most, read or not."""
+    hull = np.zeros((256, 512, 512), np.bool_)
+    hull[100:112, 100:230, 100:230] = True
+    views = SimpleNamespace(hull=hull, where=_core.MarkedVoxels(hull))
+    before = int(STATM.read_text().split()[1])
+    found = ViewSet.volume(views, np.ones(np.count_nonzero(hull), np.float32))
+    assert found.sum(dtype=np.float64) == np.count_nonzero(hull)
+    taken = (int(STATM.read_text().split()[1]) - before) * os.sysconf("SC_PAGE_SIZE")
+    assert taken < 0.1 * found.nbytes
