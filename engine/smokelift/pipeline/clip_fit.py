@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.matte import matte
-from smokelift.footage.working_picture import WorkingPicture
 from smokelift.render import Image, Optics, Volume
 from smokelift.setup.shot import Shot, ShotView
 
@@ -33,15 +32,14 @@ class BesideClip:
 
     Attributes
     ----------
-    seen, shown, behind : (rows, columns, 3)
-        The clip's, the density's and the clean plate's; linear radiance.
+    seen, shown : (rows, columns, 3)
+        The clip's and the density's; linear radiance.
     inside : (rows, columns) bool
         Which of them show smoke in the clip.
     """
 
     seen: Image
     shown: Image
-    behind: Image
     inside: NDArray[np.bool_]
 
     @property
@@ -62,7 +60,9 @@ def beside_clip(
     working = view.working_at(frame, optics.domain)
     if working is None:
         return None
-    step = min(step or _step(working), _odd(min(working.width, working.height)))
+    side = min(working.width, working.height)
+    wanted = step or 2 * round((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1
+    step = max(1, min(wanted, side - 1 + side % 2))
     columns, rows = working.width // step, working.height // step
     # what is left over of a step is left out on both sides
     left, top = (working.width - columns * step) // 2, (working.height - rows * step) // 2
@@ -83,7 +83,7 @@ def beside_clip(
     small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
     smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask
     inside = smoke[np.ix_(down * smoke.shape[0] // working.height, across * smoke.shape[1] // working.width)]
-    return BesideClip(seen, shown, behind, inside)
+    return BesideClip(seen, shown, inside)
 
 
 def clip_psnr(shot: Shot, frame: int, density: Volume) -> dict[str, float]:
@@ -99,13 +99,3 @@ def clip_psnr(shot: Shot, frame: int, density: Volume) -> dict[str, float]:
         if psnr is not None:
             figures[f"psnr_view_{number}" if number else "psnr"] = psnr
     return figures
-
-
-def _step(working: WorkingPicture) -> int:
-    """The odd number of pixels that leaves about `RAYS_A_VOXEL` rays along a voxel, 1 at least."""
-    return max(1, 2 * round((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1)
-
-
-def _odd(pixels: int) -> int:
-    """The largest odd number up to so many pixels."""
-    return pixels - 1 + pixels % 2

@@ -11,8 +11,7 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift.baselines.density import FixedRateDescent
-from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
-from smokelift.density.axis import SmokeAxis
+from smokelift.density import GradientFit, Start, ViewSet
 from smokelift.density.hull import project_voxels
 from smokelift.density.upright_plane import view_frame
 from smokelift.evaluation.metrics import psnr
@@ -22,16 +21,12 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
-from smokelift.pipeline.loop import frames_after
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine, DensityPair
-from smokelift.velocity.seen_motion import with_seen_motion
-from tests.engine.conftest import Plume
 from tests.engine.setup.shots import burning
 
 
@@ -62,12 +57,6 @@ def cut_off(scene: Scene, settings: Settings, out: Path, count: int) -> None:
         reconstruct(clip, scene, settings).write(out, npz=True, on_frame=cancel)
 
 
-def axis_of(shot: Shot) -> SmokeAxis:
-    """Where the default depth prior puts the smoke of a clip."""
-    axis = RoundDepth().of_clip(shot).axis
-    return axis or SmokeAxis.upright()
-
-
 def saved(directory: Path) -> Iterator[tuple[str, np.ndarray]]:
     """Every array of every NumPy file, by name."""
     for path in sorted(directory.glob("*.npz")):
@@ -84,28 +73,33 @@ def run(plume, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
 
 
 @pytest.fixture(scope="module")
-def by_themselves(plume, draft) -> list[Frame]:
-    """The frames of a run that carries nothing along."""
-    return frames_of(plume.scene, replace(draft, transport=0.0))
-
-
-@pytest.fixture(scope="module")
-def all_carried(plume, draft) -> list[Frame]:
-    """The frames of a run that carries everything along."""
-    return frames_of(plume.scene, replace(draft, transport=1.0))
-
-
-@pytest.fixture(scope="module")
 def along_the_path(tracked, draft) -> list[Frame]:
     """The frames from a camera that moves."""
     return frames_of(tracked, draft)
 
 
-def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) -> None:
-    """The carried density is a part of the initial density, so its share matters once there is a velocity."""
-    for alone, carried in zip(by_themselves, all_carried, strict=True):
-        same = np.array_equal(alone.density, carried.density)
-        assert same == (alone.number <= 2)
+def test_density_is_carried_from_the_third_frame_on(run, plume, draft) -> None:
+    """It is most of the start, since detail is made up once, and a frame says how much it took over."""
+    for alone, carried in zip(frames_of(plume.scene, replace(draft, transport=0.0)), run[0], strict=True):
+        assert np.array_equal(alone.density, carried.density) == (alone.number <= 2)
+    taken = [Sequence.open(run[1]).figures(frame.number)["transport"] for frame in run[0]]
+    assert taken[:2] == [{}, {}]
+    assert all(0.5 < figures["share"] < 1 for figures in taken[2:])
+
+
+def test_picture_mass_and_motion_are_about_right(run, plume) -> None:
+    """One picture bounds the smoke's mass within a factor of two, and the figure says the volume's."""
+    cell = plume.scene.domain.voxel_size**3
+    with Clip.open(plume.scene.clip) as clip:
+        speed = 0.075 * clip.fps
+        for frame, truth in zip(run[0], plume.densities, strict=True):
+            assert psnr(render(frame.density, plume.scene), clip.frame(frame.number - 1)) >= 35
+            assert frame.figures["psnr"] >= 35
+            assert frame.density.sum() == pytest.approx(truth.sum(), rel=0.5)
+            assert frame.figures["mass"] == pytest.approx(float(frame.density.sum()) * cell, rel=1e-4)
+            mean = np.average(frame.velocity.centres().reshape(-1, 3), axis=0, weights=frame.density.ravel())
+            assert 0.5 * speed < mean[2] < 1.5 * speed
+            assert np.abs(mean[:2]).max() < 0.3 * speed
 
 
 def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
@@ -118,51 +112,6 @@ def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
         first = frames_of(plume.scene.with_frames(0, 1), settings)[0].density
         places.append(float((first * offset).sum() / first.sum()))
     assert places[1] - places[0] == pytest.approx(shift, rel=0.2)
-
-
-def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path) -> None:
-    x, y, z = plume.scene.domain.offsets((0, 0, 0))
-    column = (np.hypot(x, y + 0.1) < 0.15) & (z < 1.2)
-    scene = plume.write(tmp_path, [column.astype(np.float32)] * 2)
-    with Clip.open(scene.clip) as clip:
-        axis = axis_of(prepare_shot(clip, scene, draft))
-    np.testing.assert_allclose(axis.at(np.array([-0.6, 0.0])), -0.1, atol=0.05)
-
-
-def test_the_example_stands_upright() -> None:
-    """Its inlet is 0.1 m behind the middle and 0.14 m above the floor, where its picture could as well be far back."""
-    scene = Scene.load(Path(__file__).parents[2] / "plume" / "scene.toml")
-    assert scene.clip is not None
-    with Clip.open(scene.clip) as clip:
-        axis = axis_of(prepare_shot(clip, scene, Settings.preset()))
-    np.testing.assert_allclose(axis.at(np.linspace(-1.4, 1.2, 14)), 0.1, atol=0.2)
-
-
-def test_the_picture_is_met(run, plume) -> None:
-    frames, _ = run
-    with Clip.open(plume.scene.clip) as clip:
-        for index, frame in enumerate(frames):
-            assert psnr(render(frame.density, plume.scene), clip.frame(index)) >= 35
-            assert frame.figures["psnr"] >= 35
-
-
-def test_the_amount_of_smoke_is_about_right(run, plume) -> None:
-    """One picture bounds the smoke's mass within a factor of two, and the figure says the volume's."""
-    frames, _ = run
-    cell = plume.scene.domain.voxel_size**3
-    for frame, truth in zip(frames, plume.densities, strict=True):
-        assert frame.density.sum() == pytest.approx(truth.sum(), rel=0.5)
-        assert frame.figures["mass"] == pytest.approx(float(frame.density.sum()) * cell, rel=1e-4)
-
-
-def test_rising_smoke_has_upward_velocity(run, plume) -> None:
-    frames, _ = run
-    with Clip.open(plume.scene.clip) as clip:
-        speed = 0.075 * clip.fps
-    for frame in frames:
-        mean = np.average(frame.velocity.centres().reshape(-1, 3), axis=0, weights=frame.density.ravel())
-        assert 0.5 * speed < mean[2] < 1.5 * speed
-        assert np.abs(mean[:2]).max() < 0.3 * speed
 
 
 def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
@@ -319,50 +268,6 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     np.testing.assert_array_equal(rest[-1].density, both[-1].density)
 
 
-def test_where_no_picture_is_followed_a_run_goes_on_without_the_frame_before(two_views, draft, monkeypatch) -> None:
-    observed: list[int] = []
-    observe = Shot.observe
-    with Clip.open(two_views.clip) as clip:
-        shot = prepare_shot(clip, two_views, replace(draft, detail=0.0))
-        method = compose(shot.settings)
-        first = next(frames_after(None, shot, method))
-        monkeypatch.setattr(Shot, "observe", lambda shot, frame: observed.append(frame) or observe(shot, frame))
-        next(frames_after(first, shot, method))
-    assert observed == [1]
-
-
-def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
-    settings = replace(draft, transport=0.0, detail=0.0)
-    scene = two_views.with_frames(0, 2)
-    frames = frames_of(scene, settings)
-    with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, settings)
-        views = ViewSet.of(shot.observe(2), shot.optics)
-        alone = GradientFit(settings.density).fit(views, RoundDepth().estimate(views), None)
-    np.testing.assert_array_equal(frames[2].density, alone.density)
-
-
-def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> None:
-    """The first velocity is that between the densities without it, to the bit, as the pictures correct it."""
-    settings = replace(draft, transport=0.0)
-    with Clip.open(plume.scene.clip) as clip:
-        shot = prepare_shot(clip, plume.scene, settings)
-        camera = shot.observe(1)[0].camera
-    estimator, domain = compose(shot.settings).velocity_estimator.of_one_view(), shot.optics.domain
-    first, second = by_themselves[:2]
-    assert first.smooth is not None and second.smooth is not None
-    assert first.followed is not None and second.followed is not None
-
-    def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
-        dt = 1 / plume.scene.clip.fps
-        pair = DensityPair(before, after, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
-        found = estimator.estimate(pair)
-        return with_seen_motion(found, first.followed, second.followed, camera, domain, after, dt)
-
-    np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())
-    assert not np.array_equal(second.estimated.centres(), velocity(first.density, second.density).centres())
-
-
 def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
     paper = Settings.preset("draft", "paper")
     starts, density_fit = [], FixedRateDescent(iterations=1)
@@ -467,19 +372,12 @@ def test_a_clip_of_one_frame_works(plume, draft, tmp_path) -> None:
     assert Sequence.open(tmp_path / "out").frames == (1,)
 
 
-def test_what_is_taken_over_is_on_record(run) -> None:
-    """From the third frame on a frame says which share it took over: most, since detail is made up once."""
-    _, out = run
-    sequence = Sequence.open(out)
-    taken = [sequence.figures(number)["transport"] for number in sequence.frames]
-    assert taken[:2] == [{}, {}]
-    assert all(0.5 < figures["share"] < 1 for figures in taken[2:])
-
-
 def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
-    """The loop asks each part for what it is for: here the temporal prior, which starts every frame alike."""
+    """The loop asks each part for what it is for: here the temporal prior, which starts every frame alike.
 
-    always = np.full_like(plume.densities[0], 0.5)
+    Parts compute on one thread of BLAS.
+    """
+    always, threads = np.full_like(plume.densities[0], 0.5), []
 
     class Stubborn:
         def start(self, views: Any, depth: Any, carried: np.ndarray) -> Start:
@@ -487,12 +385,17 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
 
     class Idle:
         def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
+            threads.append(blas_threads())
             found = GradientFit(draft.density).fit(views, depth, initial)
             return found if initial is None else replace(found, density=initial)
 
     default = compose(draft)
     method = Method(Idle(), default.depth_prior, default.velocity_estimator, Stubborn())
-    frames = frames_of(plume.scene, draft, method=method)
+    with threadpool_limits(2, user_api="blas"):
+        before = blas_threads()
+        frames = frames_of(plume.scene, draft, method=method)
+        assert blas_threads() == before
+    assert all(number == {1} for number in threads)
     assert frames[1].figures["transport"] == {}
     for frame in frames[2:]:
         assert frame.figures["transport"] == {"stubborn": 1.0}
@@ -518,13 +421,6 @@ def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
     assert alive == [0, 0, 0]
 
 
-def test_transport_keeps_the_mass_of_every_height(by_themselves, all_carried) -> None:
-    """What is taken over moves smoke along the rays: per height it stays within an eighth of what the picture says."""
-    for one, other in zip(by_themselves, all_carried, strict=True):
-        expected, found = one.density.sum((0, 1)), other.density.sum((0, 1))
-        assert np.abs(found - expected).sum() < 0.125 * expected.sum()
-
-
 def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
     scene = replace(plume.write(tmp_path / "clip", plume.densities[:2], dim), lights=())
@@ -539,25 +435,6 @@ def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
             assert error.mean() < 0.1 * burnt.frame(frame.number - 1)[fire].mean()
         assert all(part.flame is None for part in reconstruct(clip, scene, draft))
     assert any(part["what"] == "emission of fire" for part in sequence.provenance)
-
-
-def test_a_frame_is_computed_on_one_thread_of_blas_which_gets_its_own_back(plume: Plume) -> None:
-    seen = []
-
-    class Noting:
-        def fit(self, *given: Any) -> Any:
-            seen.append(blas_threads())
-            return GradientFit().fit(*given)
-
-    with threadpool_limits(2, user_api="blas"):
-        before = blas_threads()
-        method = replace(compose(Settings.preset("draft")), density_fit=Noting())
-        assert plume.scene.clip is not None
-        with Clip.open(plume.scene.clip) as clip:
-            for _ in reconstruct(clip, plume.scene, Settings.preset("draft"), method=method):
-                assert blas_threads() == before
-    assert seen
-    assert all(threads == {1} for threads in seen)
 
 
 def blas_threads() -> set[int]:
