@@ -79,19 +79,6 @@ def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_contact(height) -
     assert not axis_of(seen(column(0.3), camera=low), low, BOX).depths.any()
 
 
-def test_smoke_that_goes_on_below_the_box_has_no_contact() -> None:
-    deep = Domain((-1, -1, -1), (1, 1, 3), (32, 32, 64))
-    z = -1 + (np.arange(64) + 0.5) / 16
-    inside = (X[:, None, None] ** 2 + (Y[None, :, None] - 0.3) ** 2 < 0.06) & (z < 2)
-    renderer = Renderer(FRONT, deep, Medium(extinction=1.0), (), np.ones(3), "absorption")
-    amount = -np.log(renderer.image(inside.astype(np.float32))[..., 0])
-    assert not axis_of([amount], FRONT, BOX).depths.any()
-
-
-CORNER = np.zeros((113, 75), np.float32)
-CORNER[0, 0] = 1
-
-
 def test_known_inlets_need_no_contact() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))

@@ -7,9 +7,7 @@ import pytest
 
 from smokelift import Camera, Domain, Scene
 from smokelift.density import Observation, RoundDepth, ViewSet
-from smokelift.density.axis import SmokeAxis
 from smokelift.density.observation import eight_bit_plate
-from smokelift.density.profile import DepthProfile
 from smokelift.density.wander import DEVIATION, Wander
 from smokelift.render import render, scene_optics
 from smokelift.scene import Background, Medium, completed
@@ -78,19 +76,6 @@ def test_wandering_smoke_is_as_deep_as_smoke_that_stands_on_the_axis() -> None:
     assert np.mean([depth(each) for each in found]) == pytest.approx(depth(round_smoke), rel=0.1)
 
 
-def test_its_picture_is_the_same() -> None:
-    wandering = render(spread_by(RoundDepth(wander=WANDER)), SCENE)
-    assert np.abs(wandering - render(column(), SCENE)).mean() < 0.01
-
-
 def test_smoke_that_two_cameras_see_stands_where_they_show_it() -> None:
     both = (SCENE.camera, Camera.look_at((8, 0, 0.75), (0, 0, 0.75), fov_y_degrees=14, size=(32, 48)))
     np.testing.assert_array_equal(spread_by(RoundDepth(wander=WANDER), both), spread_by(RoundDepth(), both))
-
-
-def test_what_wanders_out_of_the_box_is_not_inside() -> None:
-    amount, behind = np.ones((48, 32), np.float32), SmokeAxis.upright(0.3)
-    scatter = WANDER.scatter(SCENE.camera, SCENE.domain, 0)
-    profiles = [DepthProfile(amount, SCENE.camera, SCENE.domain, behind, each) for each in (None, scatter)]
-    straight, wandering = (profile.share_inside()[8:40, 8:24].std() for profile in profiles)
-    assert wandering > 5 * straight

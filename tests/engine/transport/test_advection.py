@@ -27,21 +27,6 @@ def test_results_do_not_depend_on_threads(threads, set_threads):
         np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("speed", [3e38, -3e38, 1e9])
-def test_a_way_beyond_all_measure_is_refused(speed):
-    velocity = uniform((speed,) * 3, voxel_size=0.1)
-    for carried in (np.ones(SHAPE, np.float32), velocity):
-        with pytest.raises(ValueError, match=r"moves smoke by more than 1e\+09 voxels in 1 s"):
-            advect(carried, velocity, 1)
-
-
-def test_a_time_step_or_a_voxel_beyond_all_measure_is_refused():
-    with pytest.raises(ValueError, match="dt must be positive and finite, from 1e-09"):
-        advect(np.ones(SHAPE, np.float32), uniform((0, 0, 0)), 1e300)
-    with pytest.raises(ValueError, match="voxel_size must be positive and finite, from 1e-09"):
-        uniform((1, 1, 1), voxel_size=1e-44)
-
-
 def test_where_the_system_gives_no_thread_one_does_all_the_work():
     code = """
 import os, resource
@@ -121,17 +106,6 @@ def test_no_mass_leaves_through_walls():
     assert advect(full, flow, 1.0, conserve=True).sum(dtype=float) == pytest.approx(full.size, rel=1e-5)
     half = project(random_velocity(3), SIDES[:5])
     assert advect(full, half, 1.0, conserve=True).sum(dtype=float) < 0.999 * full.size
-
-
-def test_mass_is_repaired_where_smoke_moves():
-    density = np.concatenate([structured_blob(), structured_blob()], axis=2)
-    flow = swirl(3.0, density.shape)
-    for component in flow.faces:
-        component[:, :, 16:] = 0
-    plain, kept = advect(density, flow, 1.0), advect(density, flow, 1.0, conserve=True)
-    assert abs(plain.sum(dtype=float) / density.sum(dtype=float) - 1) > 1e-3
-    assert kept.sum(dtype=float) == pytest.approx(density.sum(dtype=float), rel=1e-5)
-    np.testing.assert_allclose(kept[:, :, 17:], density[:, :, 17:], rtol=1e-5)
 
 
 def test_maccormack_keeps_more_detail():

@@ -22,8 +22,12 @@ def test_bad_input_is_refused():
     density = np.zeros(SHAPE, np.float32)
     with pytest.raises(ValueError, match="shape"):
         advect(density[1:], velocity, 1.0)
-    with pytest.raises(ValueError, match="dt must be positive"):
-        advect(density, velocity, 0.0)
+    for dt in (0.0, 1e300):
+        with pytest.raises(ValueError, match="dt must be positive and finite, from 1e-09"):
+            advect(density, velocity, dt)
+    for carried in (density, velocity):
+        with pytest.raises(ValueError, match=r"moves smoke by more than 1e\+09 voxels in 1 s"):
+            advect(carried, uniform((-3e38,) * 3), 1)
     with pytest.raises(ValueError, match="unknown scheme"):
         advect(density, velocity, 1.0, scheme="cubic")
     with pytest.raises(ValueError, match="not finite"):
@@ -34,8 +38,9 @@ def test_bad_input_is_refused():
         advect(velocity, velocity, 1.0, conserve=True)
     with pytest.raises(ValueError, match="closed must be a list of sides"):
         project(velocity, ("up",))
-    with pytest.raises(ValueError, match="voxel_size must be positive"):
-        Velocity.zero(SHAPE, 0.0)
+    for size in (0.0, 1e-44):
+        with pytest.raises(ValueError, match="voxel_size must be positive and finite, from 1e-09"):
+            Velocity.zero(SHAPE, size)
     with pytest.raises(ValueError, match="do not belong to one box"):
         Velocity((density, density, density), 1.0)
     with pytest.raises(ValueError, match="not finite"):

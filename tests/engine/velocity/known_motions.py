@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from smokelift.transport import Velocity, face_shapes
+
 SHAPE = (32, 28, 40)
 DT, VOXEL = 1 / 24, 0.03
 
-
-# For what moves as a whole and without noise: the default weights are those of turbulent smoke.
 LARGE = {"shape": (48, 48, 48), "radius": 10.5}
+"""For what moves as a whole and without noise: the default weights are those of turbulent smoke."""
 
 
 def structured_density(x, y, z, radius=6.0):
@@ -27,22 +28,44 @@ def positions(shape):
 
 
 def translation(motion, shape=SHAPE, radius=6.0):
-    """Two densities and the displacement between them, in voxels."""
+    """Two densities about the middle of the box, and the displacement between them, in voxels."""
+    motion, where = np.array(motion), positions(shape)
+    before, after = (
+        structured_density(*(a - half * m for a, m in zip(where, motion, strict=True)), radius) for half in (-0.5, 0.5)
+    )
+    return before, after, np.broadcast_to(motion, (*shape, 3))
+
+
+def rotation(angle, shape=SHAPE, radius=6.0, before=0.0):
+    """A turn about the middle, after one of another angle; displacement at arrival."""
     x, y, z = positions(shape)
-    after = structured_density(x - motion[0], y - motion[1], z - motion[2], radius)
-    return structured_density(x, y, z, radius), after, np.broadcast_to(motion, (*shape, 3))
+
+    def turned(by):
+        c, s = np.cos(by), np.sin(by)
+        return c * x + s * z, c * z - s * x
+
+    densities = [structured_density(a, y, b, radius) for a, b in (turned(before), turned(before + angle))]
+    from_x, from_z = turned(angle)
+    return *densities, np.stack([x - from_x, 0 * y, z - from_z], axis=-1)
 
 
-def rotation(angle, shape=SHAPE, radius=6.0):
-    """A turn about the middle, displacement at arrival."""
-    x, y, z = positions(shape)
-    c, s = np.cos(angle), np.sin(angle)
-    from_x, from_z = c * x + s * z, c * z - s * x
-    after = structured_density(from_x, y, from_z, radius)
-    return structured_density(x, y, z, radius), after, np.stack([x - from_x, 0 * y, z - from_z], axis=-1)
+def uniform(motion, shape=SHAPE):
+    """The same velocity everywhere, in voxels a frame."""
+    return Velocity([np.full(n, v * VOXEL / DT) for n, v in zip(face_shapes(shape), motion, strict=True)], VOXEL)
 
 
-def error_in_smoke(velocity, density, displacement, dt=DT, voxel_size=VOXEL):
+def voxels_a_frame(velocity):
+    """At voxel centres."""
+    return velocity.centres() * (DT / VOXEL)
+
+
+def mean_motion(velocity, density):
+    """Voxels a frame of the smoke as a whole."""
+    return np.average(voxels_a_frame(velocity).reshape(-1, 3), axis=0, weights=density.ravel())
+
+
+def error_in_smoke(velocity, density, displacement):
+    """Relative, inside the smoke."""
     inside = density > 0.1 * density.max()
-    found = velocity.centres()[inside] * dt / voxel_size
-    return np.linalg.norm(found - displacement[inside]) / np.linalg.norm(displacement[inside])
+    wanted = np.broadcast_to(displacement, (*density.shape, 3))[inside]
+    return np.linalg.norm(voxels_a_frame(velocity)[inside] - wanted) / np.linalg.norm(wanted)

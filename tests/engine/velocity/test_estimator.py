@@ -1,18 +1,20 @@
 """What every estimator has in common."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from smokelift.transport import divergence, face_shapes, part_of
-from smokelift.velocity import Velocity, estimate_velocity, predict_velocity
+from smokelift.transport import divergence, part_of
+from smokelift.velocity import estimate_velocity, predict_velocity
 from smokelift.velocity.estimator import refined_in, refined_to
-from tests.engine.velocity.known_motions import DT, SHAPE, VOXEL, rotation
+from tests.engine.transport.random_fields import random_velocity
+from tests.engine.velocity.known_motions import DT, VOXEL, rotation, uniform
 
 
 def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
-    zero = Velocity.zero(SHAPE, VOXEL).faces
-    uniform = Velocity([np.full_like(a, v) for a, v in zip(zero, (0.3, -0.2, 0.5), strict=True)], VOXEL)
-    for a, b in zip(predict_velocity(uniform, DT).faces, uniform.faces, strict=True):
+    steady = uniform((0.3, -0.2, 0.5))
+    for a, b in zip(predict_velocity(steady, DT).faces, steady.faces, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-5)
     turning = estimate_velocity(*rotation(0.2)[:2], DT, VOXEL)
     predicted = predict_velocity(turning, DT)
@@ -25,14 +27,9 @@ def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
 )
 def test_part_of_a_finer_velocity_is_what_the_whole_has_there(shape, box):
     """Computed around the box alone, on a grid coarsened twice, with what is known of the estimate."""
-    rng = np.random.default_rng(2)
     coarse_shape = tuple(-(-n // 4) for n in shape)
-    coarse = Velocity(
-        tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(coarse_shape)),
-        4.0,
-        ("y-",),
-        confidence=rng.random(coarse_shape, np.float32),
-    )
+    known = {"closed": ("y-",), "confidence": np.random.default_rng(2).random(coarse_shape, np.float32)}
+    coarse = replace(random_velocity(2, voxel_size=4.0, shape=coarse_shape), **known)
     found, expected = refined_in(coarse, shape, box), part_of(refined_to(coarse, shape), box)
     assert found.voxel_size == 1.0
     assert found.closed == expected.closed == (("y-",) if box[1].start == 0 else ())

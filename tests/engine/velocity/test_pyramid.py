@@ -5,14 +5,13 @@ import pytest
 
 from smokelift.transport import divergence, face_shapes, project
 from smokelift.velocity import Velocity
-from smokelift.velocity.pyramid import coarsen_faces, prolonged
+from smokelift.velocity.pyramid import coarsened, prolonged
+from tests.engine.transport.random_fields import random_velocity
 
 
 @pytest.mark.parametrize("shape", [(8, 6, 10), (7, 9, 5)])
 def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
-    rng = np.random.default_rng(0)
-    rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(shape)), 1.0)
-    coarse = coarsen_faces(project(rough))
+    coarse = coarsened(project(random_velocity(0, shape=shape)))
     assert coarse.shape == tuple((n + 1) // 2 for n in shape)
     inner = tuple(slice(0, n // 2) for n in shape)  # an odd last voxel is continued outwards
     assert np.abs(divergence(coarse)[inner]).max() < 1e-5
@@ -21,10 +20,8 @@ def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
 @pytest.mark.parametrize("closed", [(), ("z-",), ("x+", "y-", "z+")])
 @pytest.mark.parametrize("shape", [(12, 8, 10), (11, 9, 7)])
 def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed):
-    rng = np.random.default_rng(1)
-    coarse_shape = tuple((n + 1) // 2 for n in shape)
-    rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(coarse_shape)), 2.0, closed)
-    fine = Velocity(prolonged(project(rough), shape), 1.0, closed)
+    rough = random_velocity(1, voxel_size=2.0, shape=tuple((n + 1) // 2 for n in shape))
+    fine = Velocity(prolonged(project(rough, closed), shape), 1.0, closed)
     assert fine.shape == shape
     assert np.abs(divergence(fine)).max() < 1e-5
     for wall in closed:

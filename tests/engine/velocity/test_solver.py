@@ -8,7 +8,9 @@ from scipy import ndimage
 
 from smokelift import _core
 from smokelift.baselines.velocity import PaperVelocity
+from smokelift.transport import face_shapes
 from smokelift.velocity import DensityPair, PrimalDual
+from tests.engine.transport.random_fields import random_faces
 from tests.engine.velocity.known_motions import DT, VOXEL, translation
 
 OPEN = [False] * 6
@@ -16,9 +18,7 @@ TINY = (5, 4, 6)
 
 
 def tiny_faces(rng):
-    nx, ny, nz = TINY
-    shapes = [(nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)]
-    return [rng.standard_normal(shape).astype(np.float32) for shape in shapes]
+    return list(random_faces(rng, TINY))
 
 
 def problem_of(shape, centre, **given):
@@ -41,8 +41,7 @@ def flat(faces):
 
 
 def split(vector):
-    nx, ny, nz = TINY
-    shapes = [(nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)]
+    shapes = face_shapes(TINY)
     ends = np.cumsum([np.prod(s) for s in shapes])[:-1]
     return [a.reshape(s).astype(np.float32) for a, s in zip(np.split(vector, ends), shapes, strict=True)]
 
@@ -112,7 +111,7 @@ def test_the_preconditioner_knows_long_lines(closed):
     """
     shape = (72, 66, 100)
     rng = np.random.default_rng(4)
-    faces = [rng.standard_normal([n + (d == axis) for d, n in enumerate(shape)], np.float32) for axis in range(3)]
+    faces = list(random_faces(rng, shape))
     problem = problem_of(shape, faces, kinetic=0.5, closed=closed)
     u, figures = problem.projected_cg([np.zeros_like(a) for a in faces], tolerance=1e-4, limit=20)
     assert figures["iterations"] < 10
