@@ -63,31 +63,12 @@ def _names(method: Method) -> dict[str, str | bool]:
 def compose(settings: Settings) -> Method:
     """The method that settings ask for."""
     require_kind(settings, Settings, "settings", "Settings (Settings.preset makes them)")
-    return _METHODS[settings.method](settings)
-
-
-def _default(settings: Settings) -> Method:
+    if settings.method == "paper":
+        return Method(FixedRateDescent(), OrthogonalCopy(), PaperVelocity(), AllCarried(), follows_picture=False)
+    smooth = RoundDepth()
     return Method(
         density_fit=GradientFit(settings.density),
-        depth_prior=_depth_prior(settings),
+        depth_prior=DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth,
         velocity_estimator=CoarseToFine(settings.velocity),
         temporal_prior=GuidedSimulation(settings.transport) if settings.transport > 0 else NothingCarried(),
     )
-
-
-def _depth_prior(settings: Settings) -> DepthPrior:
-    smooth = RoundDepth()
-    return DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
-
-
-def _paper(settings: Settings) -> Method:
-    return Method(
-        density_fit=FixedRateDescent(),
-        depth_prior=OrthogonalCopy(),
-        velocity_estimator=PaperVelocity(),
-        temporal_prior=AllCarried(),
-        follows_picture=False,
-    )
-
-
-_METHODS = {"default": _default, "paper": _paper}
