@@ -20,8 +20,6 @@ density can have, so a ray's middle is moved along it until most of the profile 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -30,10 +28,9 @@ from scipy.special import gamma, gammainc
 import smokelift._core as _core
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places
-from smokelift.density.upright_plane import on_upright_plane, view_frame
+from smokelift.density.upright_plane import PlaneRays, on_upright_plane, view_frame
 from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import ray_through_pixels
 
 FLATNESS = 3.5
 """q: between a Gaussian (2) and a box. 3 to 4 were equally good over four scenes
@@ -64,9 +61,6 @@ DISTANCE_SHARE = 0.5
 STEPS_TO_AXIS = 3
 """Fixed-point steps from a ray's place in the middle of the domain to where it meets the axis. A step leaves of the
 distance the lean of the axis times that of the ray, mostly under a tenth."""
-
-MIN_ALONG = 1e-3
-"""Smallest cosine between a ray and the depth: a ray across it meets no depth."""
 
 SMOOTHING = 1.5
 """Standard deviation (pixels) of the Gaussian that smooths the thickness (docs/experiments/density-profile.md)."""
@@ -129,44 +123,6 @@ def _pixel_size(camera: Camera, domain: Domain) -> float:
     return float(max(distance, domain.voxel_size) / camera.fx)
 
 
-class _Rays(NamedTuple):
-    """Where the rays of pixels meet the domain (rows, columns), by depth: metres behind its centre.
-
-    A ray enters at `near` and leaves at `far`, both 0 where `missed` marks that it does not meet the domain. Over the
-    centre's depth it is at `height` and `lateral`, and each changes by `rise` and `drift` a metre of depth.
-    """
-
-    near: NDArray[np.float64]
-    far: NDArray[np.float64]
-    missed: NDArray[np.bool_]
-    height: NDArray[np.float64]
-    lateral: NDArray[np.float64]
-    rise: NDArray[np.float64]
-    drift: NDArray[np.float64]
-
-    @staticmethod
-    def of(camera: Camera, domain: Domain) -> _Rays:
-        lateral, depth, height = view_frame(camera)
-        origin, direction = ray_through_pixels(camera)
-        start = origin - np.array(domain.centre)
-        half = np.array(domain.max) - np.array(domain.centre)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sides = np.stack([(-half - start) / direction, (half - start) / direction])
-            near, far = np.nanmax(sides.min(0), -1), np.nanmin(sides.max(0), -1)
-        near = np.maximum(near, 0)
-        along, here = direction @ depth, start @ depth
-        missed = (far <= near) | (along < MIN_ALONG)
-        along = np.maximum(along, MIN_ALONG)
-        near, far = (np.where(missed, 0, here + end * along) for end in (near, far))
-        rise, drift = ((direction @ axis) / along for axis in (height, lateral))
-        return _Rays(near, far, missed, start @ height - here * rise, start @ lateral - here * drift, rise, drift)
-
-    def at(self, depth: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Heights and laterals of the rays at some depths (rows, columns), or where they are nearest in the domain."""
-        inside = np.clip(depth, self.near, self.far)
-        return self.height + inside * self.rise, self.lateral + inside * self.drift
-
-
 class DepthProfile:
     """The profile that a picture suggests.
 
@@ -183,7 +139,7 @@ class DepthProfile:
         scatter: Scatter | None = None,
     ) -> None:
         self._domain, self._depth = domain, view_frame(camera)[1]
-        self._rays = rays = _Rays.of(camera, domain)
+        self._rays = rays = PlaneRays.of(camera, domain)
         middle = np.zeros(amount.shape)
         for _ in range(STEPS_TO_AXIS):
             middle = axis.at(*rays.at(middle))

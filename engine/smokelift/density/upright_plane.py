@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.scene import Camera, Domain
-from smokelift.scene.checks import Vector
 from smokelift.scene.projection import project_points, ray_through_pixels
 
 TINY = np.finfo(np.float64).tiny
 """Smallest normal number, for divisions."""
+
+MIN_ALONG = 1e-3
+"""Smallest cosine between a ray and the depth: a ray across it meets no depth."""
 
 
 def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -32,14 +35,43 @@ def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
     return np.cross(depth, height), depth, height
 
 
-@lru_cache(maxsize=4)
-def crossings(camera: Camera, centre: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Heights and laterals (rows, columns), in meters, at which pixels' rays cross the upright plane at a point."""
-    lateral, depth, height = view_frame(camera)
-    origin, direction = ray_through_pixels(camera)
-    start = origin - np.array(centre)
-    place = start - (start @ depth)[..., None] / (direction @ depth)[..., None] * direction
-    return place @ height, place @ lateral
+class PlaneRays(NamedTuple):
+    """Where the rays of pixels meet the domain (rows, columns), by depth: metres behind its centre.
+
+    A ray enters at `near` and leaves at `far`, both 0 where `missed` marks that it does not meet the domain. Over the
+    centre's depth it is at `height` and `lateral`, and each changes by `rise` and `drift` a metre of depth.
+    """
+
+    near: NDArray[np.float64]
+    far: NDArray[np.float64]
+    missed: NDArray[np.bool_]
+    height: NDArray[np.float64]
+    lateral: NDArray[np.float64]
+    rise: NDArray[np.float64]
+    drift: NDArray[np.float64]
+
+    @staticmethod
+    @lru_cache(maxsize=2)
+    def of(camera: Camera, domain: Domain) -> PlaneRays:
+        lateral, depth, height = view_frame(camera)
+        origin, direction = ray_through_pixels(camera)
+        start = origin - np.array(domain.centre)
+        half = np.array(domain.max) - np.array(domain.centre)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sides = np.stack([(-half - start) / direction, (half - start) / direction])
+            near, far = np.nanmax(sides.min(0), -1), np.nanmin(sides.max(0), -1)
+        near = np.maximum(near, 0)
+        along, here = direction @ depth, start @ depth
+        missed = (far <= near) | (along < MIN_ALONG)
+        along = np.maximum(along, MIN_ALONG)
+        near, far = (np.where(missed, 0, here + end * along) for end in (near, far))
+        rise, drift = ((direction @ axis) / along for axis in (height, lateral))
+        return PlaneRays(near, far, missed, start @ height - here * rise, start @ lateral - here * drift, rise, drift)
+
+    def at(self, depth: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Heights and laterals of the rays at some depths (rows, columns), or where they are nearest in the domain."""
+        inside = np.clip(depth, self.near, self.far)
+        return self.height + inside * self.rise, self.lateral + inside * self.drift
 
 
 def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
-from smokelift.density.upright_plane import crossings, view_frame
+from smokelift.density.upright_plane import PlaneRays, view_frame
 from smokelift.scene import Camera, Domain
 
 DEVIATION = 0.5
@@ -76,7 +76,8 @@ class Wander:
     def scatter(self, camera: Camera, domain: Domain, frame: int) -> Scatter:
         """How the rays of a camera's pixels scatter in a frame."""
         lateral, _, height = view_frame(camera)
-        up, right = (each[..., None] / domain.voxel_size for each in crossings(camera, domain.centre))
+        rays = PlaneRays.of(camera, domain)
+        up, right = (each[..., None] / domain.voxel_size for each in (rays.height, rays.lateral))
         offset = self.offset(up * height + right * lateral, frame)
         return Scatter(np.asarray(offset, np.float32), self.deviation, self.width * domain.voxel_size)
 
