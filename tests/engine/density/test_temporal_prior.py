@@ -9,9 +9,8 @@ from scipy import ndimage
 
 from smokelift.density import DepthEstimate, GuidedSimulation, Observation, RoundDepth, Start, ViewSet
 from smokelift.density.objective import Term
+from smokelift.density.observation import eight_bit_plate
 from smokelift.density.temporal_prior import LARGEST_GAIN
-from smokelift.footage.noise import lasting_noise
-from smokelift.footage.plate import Plate
 from smokelift.render import Volume, render, scene_optics
 from smokelift.scene import completed
 
@@ -20,9 +19,8 @@ SHARE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A frame of the plume: its picture, what the depth prior says, and the true density."""
+    """A frame of the plume: what the depth prior says of its picture, and the true density."""
 
-    views: ViewSet
     depth: DepthEstimate
     true: Volume
 
@@ -31,19 +29,18 @@ class Moment:
         """The depth prior's density."""
         return self.depth.density
 
-    def start(self, carried: Volume) -> Start:
+    def start(self, carried: Volume, kept: float = 1.0) -> Start:
         """Where the fit starts with a carried density."""
-        return GuidedSimulation(SHARE).start(self.views, self.depth, carried)
+        return GuidedSimulation(SHARE, kept).start(self.depth.views, self.depth, carried)
 
 
 @pytest.fixture(scope="module")
 def moment(plume) -> Moment:
     """The third frame, before black with the noise of 8 bits."""
     scene, true = plume.scene, plume.densities[2]
-    image = render(true, scene)
-    plate = Plate(np.zeros_like(image), np.ones(image.shape[:2], np.float32), lasting_noise(1e-4 * 12.92))
-    views = ViewSet.of([Observation(scene.camera, image, plate)], scene_optics(completed(scene)))
-    return Moment(views, RoundDepth().estimate(views), true)
+    plate = eight_bit_plate(np.zeros(3, np.float32), scene.camera.size)
+    views = ViewSet.of([Observation(scene.camera, render(true, scene), plate)], scene_optics(completed(scene)))
+    return Moment(RoundDepth().estimate(views), true)
 
 
 def test_a_share_is_taken_over(moment) -> None:
@@ -90,21 +87,17 @@ class Lobes:
 
 
 @pytest.fixture(scope="module")
-def prior_start(moment) -> DepthEstimate:
-    """What a depth prior says that has made something up: its smooth answer beside a density."""
+def detailed(moment) -> Moment:
+    """The same with a depth prior that has made something up: its smooth answer beside a density."""
     density = 0.9 * moment.prior + 0.1 * blurred(moment.prior)
-    return replace(moment.depth, density=density, detail=Lobes(moment.views, moment.prior))
+    detail = Lobes(moment.depth.views, moment.prior)
+    return replace(moment, depth=replace(moment.depth, density=density, detail=detail))
 
 
-def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume) -> Start:
-    """Where a guided simulation starts, with all of what is carried."""
-    return GuidedSimulation(SHARE, kept=1.0).start(moment.views, prior_start, carried)
-
-
-def test_a_simulation_is_guided_to_the_smooth_answers_low_pass(moment, prior_start) -> None:
+def test_a_simulation_is_guided_to_the_smooth_answers_low_pass(moment, detailed) -> None:
     """Coarsely the start is the smooth answer, finely it is what was carried, however much that was."""
-    hull = moment.views.hull
-    starts = [guided(moment, prior_start, np.float32(factor) * moment.true).density for factor in (1.0, 8.0)]
+    hull = moment.depth.views.hull
+    starts = [detailed.start(np.float32(factor) * moment.true).density for factor in (1.0, 8.0)]
     wanted, found = blurred(moment.prior)[hull], blurred(starts[0])[hull]
     assert np.linalg.norm(found - wanted) < 0.15 * np.linalg.norm(wanted)
     detail, carried = ((density - blurred(density))[hull] for density in (starts[0], moment.true))
@@ -112,11 +105,13 @@ def test_a_simulation_is_guided_to_the_smooth_answers_low_pass(moment, prior_sta
     np.testing.assert_allclose(starts[1], starts[0], rtol=1e-3, atol=1e-6)
 
 
-def test_detail_is_born_where_nothing_is_carried(moment, prior_start) -> None:
-    hull = moment.views.hull
-    empty = guided(moment, prior_start, np.zeros_like(moment.true))
-    np.testing.assert_array_equal(empty.density[hull], prior_start.density[hull])
+def test_detail_is_born_where_nothing_is_carried(moment, detailed) -> None:
+    hull = moment.depth.views.hull
+    empty = detailed.start(np.zeros_like(moment.true))
+    np.testing.assert_array_equal(empty.density[hull], detailed.prior[hull])
     assert empty.figures["share"] == 0
-    little = guided(moment, prior_start, np.float32(0.01) * moment.prior)
+    little = detailed.start(np.float32(0.01) * moment.prior)
     assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
-    np.testing.assert_allclose(little.density.sum(), prior_start.density[hull].sum(), rtol=0.02)
+    np.testing.assert_allclose(little.density.sum(), detailed.prior[hull].sum(), rtol=0.02)
+    some = detailed.start(moment.true, kept=0.6)
+    assert some.figures["share"] == pytest.approx(0.6 * detailed.start(moment.true).figures["share"], rel=0.02)
