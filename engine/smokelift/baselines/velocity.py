@@ -49,7 +49,7 @@ class PaperVelocity:
         problem = least_squares(linear, rest, first_order=self.smoothness, kinetic=self.kinetic)
         u, figures = self.solver.solve(problem, rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
-        return in_metres(u, pair, measures, np.ones_like(second))
+        return in_metres(u, pair, measures)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""

@@ -104,9 +104,6 @@ class Velocity(StaggeredGrid):
         See `StaggeredGrid`; the voxel size is in metres.
     figures
         How it was found, if it was estimated: see `smokelift.velocity.estimate_velocity`.
-    confidence
-        Of an estimate, shape (nx, ny, nz), 0 to 1: how far the densities show the motion there. Smoothness and
-        incompressibility fill in the rest.
 
     Raises
     ------
@@ -116,7 +113,6 @@ class Velocity(StaggeredGrid):
     """
 
     figures: Mapping[str, float] = field(default_factory=dict, kw_only=True)
-    confidence: Array | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -189,7 +185,6 @@ def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
         velocity.voxel_size,
         closed,
         figures=velocity.figures,
-        confidence=None if velocity.confidence is None else velocity.confidence[box],
     )
 
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-import smokelift._core as _core
 from smokelift.checks import require_kind
 from smokelift.scene.checks import integer
-from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, require_same_shape, without_divergence
+from smokelift.transport import Array, StaggeredGrid, Velocity, require_same_shape, without_divergence
 from smokelift.velocity.estimator import (
     DensityPair,
     checked,
@@ -51,9 +50,6 @@ WORTHLESS = 0.5
 MAX_INCREMENT = 1.0
 """Voxels of the grid at hand. A linearisation of the density holds no further, so the increment is clamped
 (docs/experiments/velocity-solver.md)."""
-
-CONFIDENCE_WIDTH = 2.0
-"""Standard deviation (voxels) over which gradients count: smoothness carries what they show about as far."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +105,7 @@ class CoarseToFine:
             require_same_shape("the prediction", prediction.shape, pair.before.shape)
         found = self._found(pair, prediction) if seen else None
         if found is None:
-            rest = Velocity.zero(pair.before.shape, pair.voxel_size, pair.closed)
-            return replace(rest, confidence=np.zeros_like(pair.before))
+            return Velocity.zero(pair.before.shape, pair.voxel_size, pair.closed)
         return smoothed(found) if self.settings.coarsening else found
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
@@ -177,15 +172,13 @@ def _solved(
         linear = linear.with_dissipation(centre.dissipation)
         unexplained, _ = linear.unexplained(centre.motion, prepared.noise)
         stiffness = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
-        smoothness = stiffness * settings.smoothness
         problem = least_squares(
             linear,
             centre.motion,
-            second_order=smoothness,
+            second_order=stiffness * settings.smoothness,
             kinetic=stiffness * KINETIC,
             irrotational=IRROTATIONAL,
         )
-        direction = linear.direction
         start = u if any(component.any() for component in u.faces) else centre.motion
         del linear  # the solver takes most of the memory
         solution, solved = settings.solver.solve(problem, start)
@@ -198,7 +191,7 @@ def _solved(
         "trust": centre.trust,
         "dissipation": prepared.density_dissipation(centre.dissipation),
     }
-    return in_metres(u, pair, figures, _confidence(direction, weight, smoothness))
+    return in_metres(u, pair, figures)
 
 
 def _clamped(solution: StaggeredGrid, u: StaggeredGrid) -> StaggeredGrid:
@@ -214,14 +207,3 @@ def _clamped(solution: StaggeredGrid, u: StaggeredGrid) -> StaggeredGrid:
         for before, increment in zip(u.faces, increments, strict=True)
     )
     return without_divergence(clamped)[0]
-
-
-def _confidence(direction: Faces, weight: Array, smoothness: float) -> Array:
-    """How much the densities show beside what the regulariser adds, from 0 to 1."""
-    shown = direction[0] ** 2
-    for g in direction[1:]:
-        shown += g**2
-    shown *= weight
-    shown = _core.blur(shown, CONFIDENCE_WIDTH, 3.0)
-    confidence: Array = shown / (shown + np.float32(smoothness))
-    return confidence

@@ -110,12 +110,7 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     )
     part = refined_in(coarse, half, (x, y, z))
     counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
-    confidence = part.confidence
-    if confidence is not None:
-        confidence = confidence.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]
-    fine = Velocity(
-        prolonged(part, counts), part.voxel_size / 2, part.closed, figures=part.figures, confidence=confidence
-    )
+    fine = Velocity(prolonged(part, counts), part.voxel_size / 2, part.closed, figures=part.figures)
     i, j, k = (
         slice(inner.start - 2 * outer.start, inner.stop - 2 * outer.start)
         for inner, outer in zip(box, (x, y, z), strict=True)
@@ -123,13 +118,12 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     return part_of(fine, (i, j, k))
 
 
-def in_metres(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float], confidence: Array) -> Velocity:
+def in_metres(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float]) -> Velocity:
     """The velocity (m/s) of an estimate u in voxels a frame, projected a last time, and what is known of it."""
     u, largest = without_divergence(u)
     for component in u.faces:
         component *= np.float32(pair.voxel_size / pair.dt)
-    figures = {**figures, "divergence": largest}
-    return Velocity(u.faces, pair.voxel_size, u.closed, figures=figures, confidence=confidence)
+    return Velocity(u.faces, pair.voxel_size, u.closed, figures={**figures, "divergence": largest})
 
 
 def checked(pair: DensityPair) -> DensityPair:
