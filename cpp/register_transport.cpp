@@ -43,11 +43,6 @@ void register_transport(py::module_ &module) {
                }),
                "faces"_a, "Net outflow of every cell.");
 
-    module.def("relative_divergence", unlocked([](Workers &workers, const StaggeredIn &faces) {
-                   return relative_divergence(faces, workers);
-               }),
-               "faces"_a, "max |div u| / max |u|; 0 of no motion.");
-
     module.def("advect_cells",
                unlocked([](Workers &workers, In field, const StaggeredIn &displacement, bool maccormack,
                            bool extend) {

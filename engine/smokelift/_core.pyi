@@ -58,9 +58,6 @@ def project(faces: Faces, closed: npt.ArrayLike, passes: int = 2) -> tuple[list[
 def divergence(faces: Faces) -> Array:
     """Net outflow of every cell."""
 
-def relative_divergence(faces: Faces) -> float:
-    """max |div u| / max |u|; 0 of no motion."""
-
 def advect_cells(field: Reals, displacement: Faces, maccormack: bool, extend: bool = False) -> Array:
     """Values at x - displacement(x), interpolated linearly.
 
