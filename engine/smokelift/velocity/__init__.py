@@ -73,9 +73,10 @@ def estimate_velocity(
     Velocity
         In m/s, without divergence, such that after(x) = before(x - u(x) dt). `figures` has ``iterations``, ``products``
         and ``projections`` of the whole estimate, the last ``residual`` of the solver, the ``divergence`` (max |div u|
-        voxel size / max |u|) on the estimate's grid, the ``unexplained`` share of the change that the centre of the regulariser leaves, the ``trust`` in the prediction
-        and the ``dissipation``, the share of the smoke that dissolves in `dt`, below zero where all of it gets denser.
-        Zero if there is no smoke, or none in one of the two, or no motion.
+        voxel size / max |u|) on the estimate's grid, the ``unexplained`` share of the change that the centre of the
+        regulariser leaves, the ``trust`` in the prediction and the ``dissipation``, the share of the smoke that
+        dissolves in `dt`, below zero where all of it gets denser. Zero if there is no smoke, or none in one of the two,
+        or no motion.
 
     Raises
     ------
