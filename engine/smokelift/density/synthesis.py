@@ -85,8 +85,8 @@ OUTLINE_BLUR = 3.0
 class DetailedDepth:
     """Round smoke with detail; see the module.
 
-    `smooth` is the prior of the smooth answer, `detail` the strength from 0 (the smooth answer) to 1. Another `seed`
-    makes another plausible smoke of the same clip. Without a `texture` there is no detail.
+    `smooth` is the prior of the smooth answer, `detail` the strength, above 0 and up to 1. Another `seed` makes another
+    plausible smoke of the same clip. Without a `texture` there is no detail.
     """
 
     smooth: RoundDepth
@@ -95,9 +95,8 @@ class DetailedDepth:
     texture: ClipTexture | None = None
 
     def of_clip(self, clip: ObservedClip) -> DetailedDepth:
-        """Measure a clip's texture, unless there is no detail to make."""
-        texture = ClipTexture.of(clip) if self.detail > 0 else None
-        smooth = self.smooth.of_clip(clip)
+        """Measure a clip's texture."""
+        texture, smooth = ClipTexture.of(clip), self.smooth.of_clip(clip)
         if texture is not None:
             texture = replace(texture, roughness=tuple(self.detail * each for each in texture.roughness))
             velocity = texture.drift * texture.turntable.height

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-import smokelift._core as _core
 from smokelift.checks.array_types import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
@@ -29,10 +28,7 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
     result = np.zeros(density.shape, np.float32)
     for box, source in _boxes(density > 0, _reach(velocity, dt / voxel_size), whole=conserve):
         along = refined_in(velocity, (x, y, z), source)
-        if conserve:
-            moved = advect(density[source], along, dt, conserve=True)
-        else:
-            moved = _core.advect_cells(density[source], along.displacement(dt).faces, True)
+        moved = advect(density[source], along, dt, conserve=conserve)
         inner = moved[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))]
         # memory is given where something is written: where the smoke is, not all over its box
         np.copyto(result[box], inner, where=inner > 0)

@@ -93,12 +93,6 @@ def test_an_element_starts_with_its_optical_depth(plume, small, wall) -> None:
     assert (view.optical_depth[~view.mask] == 0).all()
 
 
-def fitted(observation: Observation, scene: Scene) -> np.ndarray:
-    """The density (nx, ny, nz) of one observation."""
-    seen = ViewSet.of([observation], scene_optics(completed(scene)))
-    return GradientFit(QUICK).fit(seen, RoundDepth().estimate(seen), None).density
-
-
 def test_what_an_element_leaves_out_is_a_fault_of_the_fit(plume, small, wall) -> None:
     """A hand before the smoke is an outlier of the extraction; nothing of it is fitted, and the figures say so."""
     element, plate = element_of(plume, small), eight_bit_plate(wall, small.camera.size)
@@ -114,21 +108,6 @@ def test_what_an_element_leaves_out_is_a_fault_of_the_fit(plume, small, wall) ->
         errors.append(figures["relative_error"])
     assert errors[0] < 0.1
     assert errors[1] > 0.3
-
-
-def test_a_fit_of_an_element_does_not_know_its_plate(plume, small, wall) -> None:
-    """Smoke that is known before a wall is what it is before the wall's mean color, to a thousandth, and has its
-    mass."""
-    element, size = element_of(plume, small), small.camera.size
-    gray = wall.mean((0, 1))
-    before_gray, before_wall = (
-        fitted(Observation(small.camera, element.over(plate), eight_bit_plate(plate, size), element), small)
-        for plate in (gray, wall)
-    )
-    assert np.linalg.norm(before_wall - before_gray) < 1e-3 * np.linalg.norm(before_gray)
-    assert before_wall.sum() == pytest.approx(plume.densities[1].sum(), rel=0.05)
-    columns, true = before_wall.sum(1), plume.densities[1].sum(1)
-    assert np.linalg.norm(columns - true) < 0.1 * np.linalg.norm(true)
 
 
 def test_smoke_before_a_wall_is_extracted_and_fitted(plume, small, wall) -> None:
