@@ -68,8 +68,8 @@ def fit_multiplicative(
     by less than the share ``tolerance``. The steps lead towards the distribution of ``plausible`` (nx, ny, nz) along
     the rays; without it they are even.
     """
-    smoke, enough = _Smoke(terms, density, where, plausible), noise_floor(terms)
-    current = best = smoke.values()
+    smoke, enough = _Smoke(density, where, plausible), noise_floor(terms)
+    current = best = smoke.values
     spare = np.empty_like(current)  # the best is kept, the others are overwritten: new memory takes as long
     least, done = np.inf, 0
     left: tuple[Image, ...] = ()
@@ -87,7 +87,7 @@ def fit_multiplicative(
             break
         for turn, term in enumerate(terms):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
-            current = _scaled(smoke, current, turn, term, image, spare if current is best else current)
+            current = _scaled(smoke, current, term, image, spare if current is best else current)
     return Fit(smoke.volume_of(best), least, left, done)
 
 
@@ -97,54 +97,47 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int, where: _core
     Each term has as many turns as there are rounds; the last one is fitted best. Only voxels of ``where`` that are not
     zero at the start (nx, ny, nz) change.
     """
-    smoke = _Smoke(terms, density, where)
-    values = smoke.values()
+    smoke = _Smoke(density, where)
+    values = smoke.values
     for _ in range(rounds):
-        for turn, term in enumerate(terms):
-            values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)), values)
+        for term in terms:
+            values = _scaled(smoke, values, term, term.renderer.image(smoke.volume_of(values)), values)
     return smoke.volume_of(values)
 
 
 class _Smoke:
     """The voxels of a density that may hold smoke; the others stay at zero.
 
-    Their values (n,) are what is computed with. One volume is filled with them again and again for the renderers.
+    Their `values` (n,) are what is computed with. One volume is filled with them again and again for the renderers.
     """
 
-    def __init__(
-        self, terms: Sequence[Term], density: Volume, where: _core.MarkedVoxels, plausible: Volume | None = None
-    ) -> None:
-        self._where = where
-        self._maps = [term.view.projection.map for term in terms]
-        self._values = self._where.take(density)
+    def __init__(self, density: Volume, where: _core.MarkedVoxels, plausible: Volume | None = None) -> None:
+        self._where, self.values = where, where.take(density)
         self._volume = np.zeros(density.shape, np.float32)
         self._plausible = None if plausible is None else where.take(plausible)
         self._faint = 0.0
         if self._plausible is not None:
             self._faint = MIN_DENSITY_SHARE * float(self._plausible.max(initial=MIN_SCALE))
 
-    def values(self) -> Array:
-        """Values (n,) of the density."""
-        return self._values
-
     def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
         """The volume (nx, ny, nz) with these values, times a factor; valid until the next call."""
         self._where.put(values, self._volume, factor)
         return self._volume
 
-    def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32], out: Array) -> Array:
+    def scaled(self, values: Array, term: Term, logarithm: NDArray[np.float32], out: Array) -> Array:
         """Values scaled along a term's rays by a share (`RELAXATION`) of the logarithmic steps (rows, columns)."""
+        rays = term.view.projection.map
         self._where.scale_along_rays(
-            self._maps[turn], values, self._plausible, logarithm, self._faint, MAX_UNEVENNESS, RELAXATION, out
+            rays, values, self._plausible, logarithm, self._faint, MAX_UNEVENNESS, RELAXATION, out
         )
         return out
 
 
-def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image, out: Array) -> Array:
+def _scaled(smoke: _Smoke, values: Array, term: Term, image: Image, out: Array) -> Array:
     """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
-    return smoke.scaled(values, turn, _log_scale(image, transmittance, slope, term), out)
+    return smoke.scaled(values, term, _log_scale(image, transmittance, slope, term), out)
 
 
 def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> Image:
