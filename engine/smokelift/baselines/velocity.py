@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import DensityPair, checked, in_metres, motion_weight, predict_velocity
+from smokelift.velocity.estimator import DensityPair, checked, in_meters, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import least_squares, linearise
 from smokelift.velocity.preparation import without_noise
 from smokelift.velocity.solver import PrimalDual, Solver
@@ -49,7 +49,7 @@ class PaperVelocity:
         problem = least_squares(linear, rest, first_order=self.smoothness, kinetic=self.kinetic)
         u, figures = self.solver.solve(problem, rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
-        return in_metres(u, pair, measures)
+        return in_meters(u, pair, measures)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""

@@ -13,7 +13,7 @@ from smokelift.transport import Array, StaggeredGrid, Velocity, require_same_sha
 from smokelift.velocity.estimator import (
     DensityPair,
     checked,
-    in_metres,
+    in_meters,
     motion_weight,
     predict_velocity,
     refined_to,
@@ -191,7 +191,7 @@ def _solved(
         "trust": centre.trust,
         "dissipation": prepared.density_dissipation(centre.dissipation),
     }
-    return in_metres(u, pair, figures)
+    return in_meters(u, pair, figures)
 
 
 def _clamped(solution: StaggeredGrid, u: StaggeredGrid) -> StaggeredGrid:

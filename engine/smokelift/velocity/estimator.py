@@ -118,7 +118,7 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     return part_of(fine, (i, j, k))
 
 
-def in_metres(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float]) -> Velocity:
+def in_meters(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float]) -> Velocity:
     """The velocity (m/s) of an estimate u in voxels a frame, projected a last time, and what is known of it."""
     u, largest = without_divergence(u)
     for component in u.faces:
