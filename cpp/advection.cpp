@@ -2,67 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <vector>
 
 namespace smokelift {
 namespace {
 
 using Point = std::array<float, 3>;
-
-// The eight values around a point given in the index space of the array, clamped to the array, and their
-// weights.
-struct Corners {
-    const float *base;
-    std::size_t step[3];
-    float t[3];
-
-    SMOKELIFT_INLINE Corners(const In &a, const Point &x) : base(a.data) {
-        const std::size_t stride[3] = {a.slab_size(), std::size_t(a.n[2]), 1};
-        for (int c = 0; c < 3; ++c) {
-            // in this order of the arguments NaN becomes 0
-            const float clamped = std::min(std::max(0.0f, x[c]), float(a.n[c] - 1));
-            const int i = int(clamped);
-            t[c] = clamped - float(i);
-            base += i * stride[c];
-            step[c] = i + 1 < a.n[c] ? stride[c] : 0;
-        }
-    }
-
-    SMOKELIFT_INLINE float value() const {
-        const float *b = base + step[0];
-        const auto [y, z] = std::array<std::size_t, 2>{step[1], step[2]};
-        const auto mix = [](float a, float c, float w) { return a + w * (c - a); };
-        const float near = mix(mix(base[0], base[z], t[2]), mix(base[y], base[y + z], t[2]), t[1]);
-        const float far = mix(mix(b[0], b[z], t[2]), mix(b[y], b[y + z], t[2]), t[1]);
-        return mix(near, far, t[0]);
-    }
-
-    SMOKELIFT_INLINE float limit(float v) const {
-        float low = base[0], high = base[0];
-        for (int c = 1; c < 8; ++c) {
-            const float corner = base[(c & 1) * step[2] + (c >> 1 & 1) * step[1] + (c >> 2) * step[0]];
-            low = std::min(low, corner);
-            high = std::max(high, corner);
-        }
-        return std::min(std::max(v, low), high);
-    }
-};
-
-SMOKELIFT_INLINE bool outside(const Shape &n, const Point &x) {
-    // Half a cell beyond the outermost centres is the side of the box.
-    bool result = false;
-    for (int c = 0; c < 3; ++c)
-        result = result || x[c] < -0.5f || x[c] > float(n[c]) - 0.5f;
-    return result;
-}
-
-SMOKELIFT_INLINE Point minus(int i, int j, int k, const Point &u) {
-    return {float(i) - u[0], float(j) - u[1], float(k) - u[2]};
-}
-
-SMOKELIFT_INLINE Point plus(int i, int j, int k, const Point &u) {
-    return {float(i) + u[0], float(j) + u[1], float(k) + u[2]};
-}
 
 SMOKELIFT_INLINE Point centre_velocity(const StaggeredIn &u, int i, int j, int k) {
     const float *z = u[2].row(i, j) + k;
@@ -92,14 +39,97 @@ SMOKELIFT_INLINE Point face_velocity(const StaggeredIn &u, int c, int i, int j, 
     return result;
 }
 
-// Calls at(i, j, k, index) for every element.
-template <class At> void everywhere(const Shape &n, Workers &workers, const At &at) {
-    workers.run(n[0], [&](int i) {
-        std::size_t index = std::size_t(i) * n[1] * n[2];
-        for (int j = 0; j < n[1]; ++j)
-            for (int k = 0; k < n[2]; ++k)
-                at(i, j, k, index++);
-    });
+// The eight values around a point, as places relative to a row of the array, and how near the upper ones are.
+struct Corners {
+    int low, x, y, z;
+    float f, g, h;
+};
+
+// Of a point (index space), clamped to the array, beside row (i, j).
+SMOKELIFT_INLINE Corners corners(const Shape &n, int i, int j, float x, float y, float z) {
+    // in this order of the arguments NaN becomes 0
+    x = std::min(std::max(0.0f, x), float(n[0] - 1));
+    y = std::min(std::max(0.0f, y), float(n[1] - 1));
+    z = std::min(std::max(0.0f, z), float(n[2] - 1));
+    const int a = int(x), b = int(y), c = int(z), slab = n[1] * n[2];
+    return {(a - i) * slab + (b - j) * n[2] + c,
+            a + 1 < n[0] ? slab : 0,
+            b + 1 < n[1] ? n[2] : 0,
+            c + 1 < n[2] ? 1 : 0,
+            x - float(a),
+            y - float(b),
+            z - float(c)};
+}
+
+SMOKELIFT_INLINE float mixed(const float *row, const Corners &at) {
+    const auto mix = [](float a, float b, float share)
+                         SMOKELIFT_INLINE_LAMBDA { return a + share * (b - a); };
+    const auto along_z = [&](int first)
+                             SMOKELIFT_INLINE_LAMBDA { return mix(row[first], row[first + at.z], at.h); };
+    const int high = at.low + at.x;
+    const float near = mix(along_z(at.low), along_z(at.low + at.y), at.g);
+    const float far = mix(along_z(high), along_z(high + at.y), at.g);
+    return mix(near, far, at.f);
+}
+
+// A value no lower and no higher than all of the corners.
+SMOKELIFT_INLINE float limited(const float *row, const Corners &at, float value) {
+    float low = row[at.low], high = low;
+    for (int corner = 1; corner < 8; ++corner) {
+        const float other =
+            row[at.low + (corner & 1) * at.z + (corner >> 1 & 1) * at.y + (corner >> 2) * at.x];
+        low = std::min(low, other);
+        high = std::max(high, other);
+    }
+    return std::min(std::max(value, low), high);
+}
+
+// 0 beyond the sides of the box, half a cell from the outermost centres; else 1. A condition in its place
+// would keep loops from vector code.
+SMOKELIFT_INLINE float inside(const Shape &n, float x, float y, float z) {
+    return float((x >= -0.5f) & (x <= float(n[0]) - 0.5f) & (y >= -0.5f) & (y <= float(n[1]) - 0.5f) &
+                 (z >= -0.5f) & (z <= float(n[2]) - 0.5f));
+}
+
+// The way, in cells, that each element of a row goes in a step.
+struct Way {
+    explicit Way(int n) : x(n), y(n), z(n) {}
+    std::vector<float> x, y, z;
+};
+
+// A row after a step: what was where the step began, or 0 if it comes from outside and nothing is there.
+SMOKELIFT_CLONES
+void carry_row(const In &from, const Way &way, bool extend, int i, int j, Span span,
+               float *__restrict result) {
+    const Shape n = from.n;
+    const float *const __restrict row = from.row(i, j);
+    const float *const x = way.x.data(), *const y = way.y.data(), *const z = way.z.data();
+    const int end = span[1];
+    for (int k = span[0]; k < end; ++k) {
+        const float a = float(i) - x[k], b = float(j) - y[k], c = float(k) - z[k];
+        const float kept = std::max(float(extend), inside(n, a, b, c));
+        result[k] = kept * mixed(row, corners(n, i, j, a, b, c));
+    }
+}
+
+// The row that carry_row made (in `once`), corrected by what a step back makes of it, within the values that
+// it came from. What leaves the box, or came from outside, has no error that could be estimated.
+SMOKELIFT_CLONES
+void correct_row(const In &from, const In &once, const Way &way, bool extend, int i, int j, Span span,
+                 float *__restrict result) {
+    const Shape n = from.n;
+    const float *const __restrict row = from.row(i, j);
+    const float *const __restrict carried = once.row(i, j);
+    const float *const x = way.x.data(), *const y = way.y.data(), *const z = way.z.data();
+    const int end = span[1];
+    for (int k = span[0]; k < end; ++k) {
+        const float a = float(i) - x[k], b = float(j) - y[k], c = float(k) - z[k];
+        const float to_a = float(i) + x[k], to_b = float(j) + y[k], to_c = float(k) + z[k];
+        const float known = inside(n, to_a, to_b, to_c) * std::max(float(extend), inside(n, a, b, c));
+        const float error = 0.5f * (row[k] - mixed(carried, corners(n, i, j, to_a, to_b, to_c)));
+        const float better = limited(row, corners(n, i, j, a, b, c), carried[k] + error);
+        result[k] = carried[k] + known * (better - carried[k]);
+    }
 }
 
 // For every row (i, j) the range outside which all values within `reach` are zero.
@@ -126,97 +156,88 @@ std::vector<Span> spans_within(In a, int reach, Workers &workers) {
     return result;
 }
 
+// The largest size of some numbers. Those of one sign are in the order of their bits, and compilers turn the
+// largest of integers into vector code.
+SMOKELIFT_CLONES
+float largest_size(const float *values, std::size_t count) {
+    std::int32_t most = 0;
+    for (std::size_t n = 0; n < count; ++n) {
+        std::int32_t bits;
+        std::memcpy(&bits, values + n, 4);
+        most = std::max(most, bits & 0x7fffffff);
+    }
+    float largest;
+    std::memcpy(&largest, &most, 4);
+    return largest;
+}
+
 // Voxels around one that its value after a step can come from.
 int reach_of(const StaggeredIn &displacement, Workers &workers) {
     float farthest = 0;
     for (int c = 0; c < 3; ++c) {
         const In u = displacement[c];
         std::vector<float> slabs(std::size_t(u.n[0]));
-        workers.run(u.n[0], [&](int i) {
-            const float *const values = u.row(i, 0);
-            float most = 0;
-            for (std::size_t at = 0; at < u.slab_size(); ++at)
-                most = std::max(most, std::abs(values[at]));
-            slabs[i] = most;
-        });
+        workers.run(u.n[0], [&](int i) { slabs[i] = largest_size(u.row(i, 0), u.slab_size()); });
         farthest = std::max(farthest, *std::max_element(slabs.begin(), slabs.end()));
     }
     const float longest =
         float(*std::max_element(displacement.box.cells.begin(), displacement.box.cells.end()));
-    return int(std::ceil(std::min(farthest, longest))) + 1;
+    return int(std::ceil(std::min(longest, farthest))) + 1; // NaN counts as the longest
 }
 
-// Calls at(i, j, k, index) for the elements in the spans of the rows (i, j), and clears the others of an
-// array.
-template <class At>
-void within_spans(const std::vector<Span> &spans, const Out &cleared, Workers &workers, const At &at) {
+// Calls at(i, j, span, way) for every row, with the part of it where there can be something and the ways
+// there; clears the rest of it in an array.
+template <class Velocity, class At>
+void each_row(const std::vector<Span> &spans, const Velocity &velocity, const Out &cleared, Workers &workers,
+              const At &at) {
     const auto [nx, ny, nz] = cleared.n;
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
+        Way way(nz);
         for (int j = 0; j < ny; ++j) {
-            const auto [first, end] = spans[std::size_t(i) * ny + j];
+            const Span &span = spans[std::size_t(i) * ny + j];
+            for (int k = span[0]; k < span[1]; ++k) {
+                const Point u = velocity(i, j, k);
+                way.x[k] = u[0], way.y[k] = u[1], way.z[k] = u[2];
+            }
             float *const row = cleared.row(i, j);
-            const std::size_t start = std::size_t(row - cleared.data);
-            std::fill(row, row + first, 0.0f);
-            for (int k = first; k < end; ++k)
-                at(i, j, k, start + k);
-            std::fill(row + std::max(first, end), row + nz, 0.0f);
+            std::fill(row, row + span[0], 0.0f);
+            at(i, j, span, way);
+            std::fill(row + std::max(span[0], span[1]), row + nz, 0.0f);
         }
     });
 }
 
-// Transport of one array by `velocity(i, j, k)`; values outside the box are those of its side, or zero as
-// outside the spans, where those are given.
+// Transport of one array by `velocity(i, j, k)`, corrected (MacCormack) or not, within the spans.
 template <class Velocity>
-void maccormack(In a, const Velocity &velocity, const std::vector<Span> *spans, Out result,
-                Workers &workers) {
-    Field forward(a.n);
-    const In hat = forward;
-    const auto gone = [&](const Point &x) { return spans && outside(a.n, x); };
-    const auto over = [&](const Out &filled, const auto &at) {
-        if (spans)
-            within_spans(*spans, filled, workers, at);
-        else
-            everywhere(a.n, workers, at);
-    };
-    over(forward, [&](int i, int j, int k, std::size_t index) {
-        const Point from = minus(i, j, k, velocity(i, j, k));
-        forward.data()[index] = gone(from) ? 0 : Corners(a, from).value();
+void advect(In a, const Velocity &velocity, const std::vector<Span> &spans, bool extend, bool corrected,
+            Out result, Workers &workers) {
+    Field forward(corrected ? a.n : Shape{});
+    const Out once = corrected ? forward.out() : result;
+    each_row(spans, velocity, once, workers, [&](int i, int j, const Span &span, const Way &way) {
+        carry_row(a, way, extend, i, j, span, once.row(i, j));
     });
-    over(result, [&](int i, int j, int k, std::size_t index) {
-        const Point u = velocity(i, j, k), from = minus(i, j, k, u), to = plus(i, j, k, u);
-        // Without the value after transport there is nothing to estimate the error from.
-        const bool correct = !gone(from) && !outside(a.n, to);
-        const float error = correct ? 0.5f * (a.data[index] - Corners(hat, to).value()) : 0;
-        result.data[index] = correct ? Corners(a, from).limit(hat.data[index] + error) : hat.data[index];
-    });
+    if (corrected)
+        each_row(spans, velocity, result, workers, [&](int i, int j, const Span &span, const Way &way) {
+            correct_row(a, once, way, extend, i, j, span, result.row(i, j));
+        });
 }
 
 } // namespace
 
-void advect_cells(In field, const StaggeredIn &displacement, bool extend, Out result, Workers &workers) {
-    everywhere(field.n, workers, [&](int i, int j, int k, std::size_t index) {
-        const Point from = minus(i, j, k, centre_velocity(displacement, i, j, k));
-        result.data[index] = !extend && outside(field.n, from) ? 0 : Corners(field, from).value();
-    });
-}
-
-void advect_cells_maccormack(In field, const StaggeredIn &displacement, Out result, Workers &workers) {
+void advect_cells(In field, const StaggeredIn &displacement, bool extend, bool corrected, Out result,
+                  Workers &workers) {
     const auto velocity = [&](int i, int j, int k) { return centre_velocity(displacement, i, j, k); };
     const std::vector<Span> spans = spans_within(field, reach_of(displacement, workers), workers);
-    maccormack(field, velocity, &spans, result, workers);
+    advect(field, velocity, spans, extend, corrected, result, workers);
 }
 
-void advect_faces(const StaggeredIn &field, const StaggeredIn &displacement, bool limited,
+void advect_faces(const StaggeredIn &field, const StaggeredIn &displacement, bool corrected,
                   const StaggeredOut &result, Workers &workers) {
     for (int c = 0; c < 3; ++c) {
         const auto velocity = [&](int i, int j, int k) { return face_velocity(displacement, c, i, j, k); };
-        if (limited) {
-            maccormack(field[c], velocity, nullptr, result[c], workers);
-            continue;
-        }
-        everywhere(field[c].n, workers, [&](int i, int j, int k, std::size_t index) {
-            result[c].data[index] = Corners(field[c], minus(i, j, k, velocity(i, j, k))).value();
-        });
+        const auto [nx, ny, nz] = field[c].n;
+        const std::vector<Span> everywhere(std::size_t(nx) * ny, Span{0, nz});
+        advect(field[c], velocity, everywhere, true, corrected, result[c], workers);
     }
 }
 

@@ -48,17 +48,14 @@ void register_transport(py::module_ &module) {
                            bool extend) {
                    require_fit(displacement.box.cells == field.n);
                    Field moved(field.n);
-                   if (maccormack)
-                       advect_cells_maccormack(field, displacement, moved, workers);
-                   else
-                       advect_cells(field, displacement, extend, moved, workers);
+                   advect_cells(field, displacement, extend, maccormack, moved, workers);
                    return moved;
                }),
                "field"_a, "displacement"_a, "maccormack"_a, "extend"_a = false,
                R"(Values at x - displacement(x), interpolated linearly.
 
-        What comes from outside the box is zero. With ``extend``, and without the correction, it is the nearest value
-        inside. The correction (Selle et al. 2008) is limited to the values around the point of origin.)");
+        What comes from outside the box is zero, or with ``extend`` the nearest value inside. The correction (Selle et al.
+        2008) is limited to the values around the point of origin.)");
 
     module.def("advect_faces",
                unlocked([](Workers &workers, const StaggeredIn &field, const StaggeredIn &displacement,
