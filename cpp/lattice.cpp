@@ -1,49 +1,40 @@
 #include "lattice.h"
 
-#include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
 
-// The nodes beside a place, and what each counts.
+// The nodes beside a place in a lattice that repeats, and how near the upper one is.
 struct Between {
     int low, high;
-    double weight_low, weight_high;
+    float weight;
 };
 
-SMOKELIFT_INLINE Between between(double place, int count) {
-    // in single turns and halves of them, as SciPy's mode "grid-wrap"
-    if (place < 0)
-        place += count * (double(std::int64_t(-place / count)) + 1);
-    else if (place > count - 1)
-        place -= count * double(std::int64_t(place / count));
-    const double low = std::floor(place), weight = 1 - (place - low);
-    const int node = int(low) < count ? int(low) : 0;
-    return {node, node + 1 < count ? node + 1 : 0, weight, 1 - weight};
+SMOKELIFT_INLINE Between between(float place, int count) {
+    const float length = float(count), inside = place - length * std::floor(place / length);
+    const int node = int(inside), low = node < count ? node : 0; // rounding may reach the end
+    return {low, low + 1 < count ? low + 1 : 0, inside - float(node)};
 }
 
 SMOKELIFT_CLONES
-void read_range(In lattice, const float *places, std::size_t count, std::size_t begin, std::size_t end,
-                float *values) {
-    const auto [nx, ny, nz] = lattice.n;
+void read_range(In lattice, const float *__restrict places, std::size_t count, std::size_t begin,
+                std::size_t end, float *__restrict values) {
+    const int nx = lattice.n[0], ny = lattice.n[1], nz = lattice.n[2];
+    const float *const __restrict nodes = lattice.data;
+    const float *const along_x = places, *const along_y = places + count, *const along_z = along_y + count;
     for (std::size_t n = begin; n < end; ++n) {
-        const Between x = between(places[n], nx), y = between(places[count + n], ny),
-                      z = between(places[2 * count + n], nz);
-        double sum = 0;
-        for (int i = 0; i < 2; ++i) {
-            for (int j = 0; j < 2; ++j) {
-                const float *row = lattice.row(i ? x.high : x.low, j ? y.high : y.low);
-                const double across = i ? x.weight_high : x.weight_low,
-                             along = j ? y.weight_high : y.weight_low;
-                sum += row[z.low] * across * along * z.weight_low;
-                sum += row[z.high] * across * along * z.weight_high;
-            }
-        }
-        values[n] = float(sum);
+        const Between x = between(along_x[n], nx), y = between(along_y[n], ny), z = between(along_z[n], nz);
+        const auto row = [&](int i, int j) SMOKELIFT_INLINE_LAMBDA {
+            const int first = (i * ny + j) * nz;
+            return nodes[first + z.low] + z.weight * (nodes[first + z.high] - nodes[first + z.low]);
+        };
+        const float low = row(x.low, y.low), low_high = row(x.low, y.high);
+        const float high = row(x.high, y.low), high_high = row(x.high, y.high);
+        const float near = low + y.weight * (low_high - low), far = high + y.weight * (high_high - high);
+        values[n] = near + x.weight * (far - near);
     }
 }
 

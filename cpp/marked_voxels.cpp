@@ -74,11 +74,9 @@ public:
 private:
     // part(cube, first, end) for the parts of a stretch in cubes of a row.
     template <class Part> void in_cubes(int z, int count, const Part &part) const {
-        for (int k = 0; k < count;) {
-            const int cube = (z + k + offset_) / size_, first = k;
-            k = std::min(count, (cube + 1) * size_ - offset_ - z);
-            part(cube, first, k);
-        }
+        int cube = (z + offset_) / size_, end = (cube + 1) * size_ - offset_ - z; // one division a stretch
+        for (int k = 0; k < count; k = end, end += size_)
+            part(cube++, k, std::min(count, end));
     }
 
     const MarkedVoxels &voxels_;

@@ -11,7 +11,7 @@ namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
-constexpr int SCALED = 256;         // voxels along z that are scaled together
+constexpr int TOGETHER = 256;       // voxels along z that are computed together
 constexpr int RUN = 32;             // voxels along z that are projected together
 constexpr double MIN_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
 
@@ -35,13 +35,17 @@ struct Place {
     bool visible;
 };
 
-SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int k) {
-    const double z = map.centres[2][k], depth = line.at(2, z);
+SMOKELIFT_INLINE Place place_of(const PixelRow &line, double z, int rows, int columns) {
+    const double depth = line.at(2, z);
     const double safe = std::abs(depth) < MIN_DEPTH ? MIN_DEPTH : depth;
     const double column = line.at(0, z) / safe - 0.5, row = line.at(1, z) / safe - 0.5;
     const bool inside =
-        (column > -0.5) & (column < map.columns - 0.5) & (row > -0.5) & (row < map.rows - 0.5);
-    return {float(row), float(column), inside && depth > 0};
+        (column > -0.5) & (column < columns - 0.5) & (row > -0.5) & (row < rows - 0.5) & (depth > 0);
+    return {float(row), float(column), inside};
+}
+
+SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int k) {
+    return place_of(line, map.centres[2][k], map.rows, map.columns);
 }
 
 SMOKELIFT_INLINE int pixel(float place, int count) {
@@ -61,16 +65,6 @@ void places_of_plane(const PictureMap &map, Mask voxels, int i, std::size_t at, 
             places.columns[at] = found.column;
             places.visible[at++] = found.visible;
         }
-    }
-}
-
-SMOKELIFT_CLONES
-void places_of_stretch(const PictureMap &map, const PixelRow &line, int z, int count, const Places &places) {
-    for (int k = 0; k < count; ++k) {
-        const Place found = place_of(map, line, z + k);
-        places.rows[k] = found.row;
-        places.columns[k] = found.column;
-        places.visible[k] = found.visible;
     }
 }
 
@@ -147,42 +141,85 @@ double nearest_in_plane(const PictureMap &map, int i) {
     return nearest;
 }
 
+// A picture read bilinearly; the nearest pixel's value outside.
+SMOKELIFT_INLINE float read_at(const double *__restrict picture, int rows, int columns, float at_row,
+                               float at_column) {
+    const double row = std::clamp(double(at_row), 0.0, double(rows - 1));
+    const double column = std::clamp(double(at_column), 0.0, double(columns - 1));
+    const int i = static_cast<int>(row), j = static_cast<int>(column);
+    const double f = row - i, g = column - j;
+    const int upper = i * columns, lower = std::min(i + 1, rows - 1) * columns;
+    const int next = std::min(j + 1, columns - 1);
+    const double near = (picture[upper + j] * (1 - f)) * (1 - g);
+    const double far = (picture[upper + next] * (1 - f)) * g;
+    const double near_below = (picture[lower + j] * f) * (1 - g);
+    const double far_below = (picture[lower + next] * f) * g;
+    return float(((near + far) + near_below) + far_below);
+}
+
 SMOKELIFT_CLONES
 void read_range(const double *__restrict picture, int rows, int columns, const float *__restrict at_rows,
                 const float *__restrict at_columns, std::size_t begin, std::size_t end,
                 float *__restrict values) {
-    for (std::size_t n = begin; n < end; ++n) {
-        const double row = std::clamp(double(at_rows[n]), 0.0, double(rows - 1));
-        const double column = std::clamp(double(at_columns[n]), 0.0, double(columns - 1));
-        const int i = static_cast<int>(row), j = static_cast<int>(column);
-        const double f = row - i, g = column - j;
-        const int upper = i * columns, lower = std::min(i + 1, rows - 1) * columns;
-        const int next = std::min(j + 1, columns - 1);
-        const double near = (picture[upper + j] * (1 - f)) * (1 - g);
-        const double far = (picture[upper + next] * (1 - f)) * g;
-        const double near_below = (picture[lower + j] * f) * (1 - g);
-        const double far_below = (picture[lower + next] * f) * g;
-        values[n] = float(((near + far) + near_below) + far_below);
+    for (std::size_t n = begin; n < end; ++n)
+        values[n] = read_at(picture, rows, columns, at_rows[n], at_columns[n]);
+}
+
+// The picture of a map read at voxels of a row, no more than TOGETHER; 0 where they are not in it.
+SMOKELIFT_CLONES
+void read_row(const double *picture, const PictureMap &map, const PixelRow &line, int first, int count,
+              float *__restrict values) {
+    const auto [start, along, end] = line;
+    const double *const z = map.centres[2].data() + first;
+    const double right = map.columns - 0.5, bottom = map.rows - 0.5;
+    float rows[TOGETHER] = {}, columns[TOGETHER] = {}, shown[TOGETHER];
+    for (int n = 0; n < count; ++n) {
+        const double depth = (start[2] + z[n] * along[2]) + end[2];
+        const double safe = std::abs(depth) < MIN_DEPTH ? MIN_DEPTH : depth;
+        const double column = ((start[0] + z[n] * along[0]) + end[0]) / safe - 0.5;
+        const double row = ((start[1] + z[n] * along[1]) + end[1]) / safe - 0.5;
+        rows[n] = float(row);
+        columns[n] = float(column);
+        shown[n] =
+            (column > -0.5) & (column < right) & (row > -0.5) & (row < bottom) & (depth > 0) ? 1.0f : 0.0f;
     }
-}
-
-SMOKELIFT_CLONES
-void scale_evenly(const float *__restrict steps, const bool *__restrict visible, float share,
-                  const float *values, float *scaled, int count) {
+    read_range(picture, map.rows, map.columns, rows, columns, 0, std::size_t(count), values);
     for (int n = 0; n < count; ++n)
-        scaled[n] = values[n] * exponential(visible[n] ? share * steps[n] : 0.0f);
+        values[n] *= shown[n];
 }
 
 SMOKELIFT_CLONES
-void scale_unevenly(const float *__restrict steps, const bool *__restrict visible, const RayScale &scale,
-                    const float *__restrict plausible, const float *values, float *scaled, int count) {
+void scale_evenly(const float *__restrict steps, float share, const float *values, float *scaled, int count) {
+    for (int n = 0; n < count; ++n)
+        scaled[n] = values[n] * exponential(share * steps[n]);
+}
+
+SMOKELIFT_CLONES
+void scale_unevenly(const float *__restrict steps, const RayScale &scale, const float *__restrict plausible,
+                    const float *values, float *scaled, int count) {
     const float share = scale.share, faint = scale.faint, most = scale.most;
     for (int n = 0; n < count; ++n) {
-        const float step = visible[n] ? steps[n] : 0.0f;
-        const float wanted = plausible[n] + faint, reached = values[n] * exponential(step) + faint;
+        const float step = steps[n], value = values[n];
+        const float wanted = plausible[n] + faint, reached = value * exponential(step) + faint;
         const float gain = step < 0 ? reached / wanted : wanted / reached;
-        scaled[n] = values[n] * exponential(share * step * (gain < most ? gain : most));
+        scaled[n] = value * exponential(share * step * (gain < most ? gain : most));
     }
+}
+
+// exp(-(distance / width)^(halves / 2)) of the distance from a middle in depth, in the place of the middles.
+SMOKELIFT_CLONES
+void profile_row(double start, double along, const double *__restrict z, int halves,
+                 const float *__restrict widths, float *__restrict shapes, int count) {
+    float root[TOGETHER], power[TOGETHER];
+    for (int n = 0; n < count; ++n) {
+        root[n] = std::sqrt(std::abs(float(start + z[n] * along) - shapes[n]) / widths[n]);
+        power[n] = 1;
+    }
+    for (int half = 0; half < halves; ++half)
+        for (int n = 0; n < count; ++n)
+            power[n] *= root[n];
+    for (int n = 0; n < count; ++n)
+        shapes[n] = attenuation(power[n]).transmittance;
 }
 
 } // namespace
@@ -224,21 +261,17 @@ double nearest_depth(const PictureMap &map, Workers &workers) {
 void scale_along_rays(const RayScale &scale, const PictureMap &map, const MarkedVoxels &voxels,
                       const float *values, float *scaled, Workers &workers) {
     workers.run(voxels.shape()[0], [&](int x) {
-        float rows[SCALED], columns[SCALED], steps[SCALED];
-        bool visible[SCALED];
+        float steps[TOGETHER];
         voxels.in_plane(x, [&](int y, int z, int length, std::size_t first) {
             const PixelRow line(map, x, y);
-            for (int begin = 0; begin < length; begin += SCALED) {
-                const int count = std::min(length - begin, SCALED);
+            for (int begin = 0; begin < length; begin += TOGETHER) {
+                const int count = std::min(length - begin, TOGETHER);
                 const std::size_t at = first + std::size_t(begin);
-                places_of_stretch(map, line, z + begin, count, {rows, columns, visible});
-                read_range(scale.logarithm, map.rows, map.columns, rows, columns, 0, std::size_t(count),
-                           steps);
+                read_row(scale.logarithm, map, line, z + begin, count, steps);
                 if (scale.plausible)
-                    scale_unevenly(steps, visible, scale, scale.plausible + at, values + at, scaled + at,
-                                   count);
+                    scale_unevenly(steps, scale, scale.plausible + at, values + at, scaled + at, count);
                 else
-                    scale_evenly(steps, visible, scale.share, values + at, scaled + at, count);
+                    scale_evenly(steps, scale.share, values + at, scaled + at, count);
             }
         });
     });
@@ -267,12 +300,14 @@ void find_profile(const DepthProfile &profile, Mask voxels, const std::vector<st
         for (int j = 0; j < voxels.n[1]; ++j) {
             const unsigned char *const row = voxels.row(i, j);
             const double start = x[i] * d[0] + y[j] * d[1];
-            for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2]; ++k) {
-                if (!row[k])
-                    continue;
-                const float distance = std::abs(float(start + z[k] * d[2]) - shapes[at]);
-                shapes[at] = std::exp(-std::pow(distance / widths[at], float(profile.flatness)));
-                ++at;
+            for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2];) {
+                const int begin = k;
+                while (k < voxels.n[2] && row[k] && k - begin < TOGETHER)
+                    ++k;
+                profile_row(start, d[2], z.data() + begin, profile.halves, widths + at, shapes + at,
+                            k - begin);
+                at += std::size_t(k - begin);
+                k += k == begin;
             }
         }
     });

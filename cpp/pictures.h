@@ -69,13 +69,13 @@ void scale_along_rays(const RayScale &scale, const PictureMap &map, const Marked
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,
                      const float *at_columns, std::size_t count, float *values, Workers &workers);
 
-// How likely smoke is at a voxel by its depth: exp(-(|depth - middle| / width)^flatness).
+// How likely smoke is at a voxel by its depth: exp(-(|depth - middle| / width)^(halves / 2)).
 struct DepthProfile {
     std::array<std::vector<double>, 3> places; // of the voxels along x, y and z, m from a centre
     std::array<double, 3> depth;               // direction
     const double *middle, *width;              // pictures (rows, columns) of each ray's, m
     int rows, columns;
-    double flatness;
+    int halves;
 };
 
 // Shape and width (m) at the marked voxels in their order in memory, which the picture shows at some places;

@@ -61,27 +61,29 @@ const int *spans_of(Read<3, int> spans, const Shape &n) {
 }
 
 void register_places(py::module_ &module) {
-    module.def("depth_profile",
-               unlocked([](Workers &workers, Mask voxels, const std::array<Doubles, 3> &places,
-                           const std::array<double, 3> &depth, const std::array<Read<>, 2> &at,
-                           Read<2, double> middle, Read<2, double> width, double flatness) {
-                   require_fit(middle.size > 0 && width.n == middle.n);
-                   for (int axis = 0; axis < 3; ++axis)
-                       require_fit(int(places[axis].size()) == voxels.n[axis]);
-                   const DepthProfile profile{
-                       places, depth, middle.data, width.data, int(middle.n[0]), int(middle.n[1]), flatness};
-                   const auto first = count_marked(voxels, workers);
-                   require_fit(at[0].size == first.back() && at[1].size == first.back());
-                   Made<float, 1> shapes({Index(first.back())}), widths(shapes.n);
-                   find_profile(profile, voxels, first, {at[0].data, at[1].data, nullptr}, shapes.data(),
-                                widths.data(), workers);
-                   return std::pair(std::move(shapes), std::move(widths));
-               }),
-               "voxels"_a, "places"_a, "depth"_a, "at"_a, "middle"_a, "width"_a, "flatness"_a,
-               R"(exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
+    module.def(
+        "depth_profile",
+        unlocked([](Workers &workers, Mask voxels, const std::array<Doubles, 3> &places,
+                    const std::array<double, 3> &depth, const std::array<Read<>, 2> &at,
+                    Read<2, double> middle, Read<2, double> width, double flatness) {
+            const int halves = int(2 * flatness);
+            require_fit(middle.size > 0 && width.n == middle.n && halves > 0 && halves == 2 * flatness);
+            for (int axis = 0; axis < 3; ++axis)
+                require_fit(int(places[axis].size()) == voxels.n[axis]);
+            const DepthProfile profile{places,           depth, middle.data, width.data, int(middle.n[0]),
+                                       int(middle.n[1]), halves};
+            const auto first = count_marked(voxels, workers);
+            require_fit(at[0].size == first.back() && at[1].size == first.back());
+            Made<float, 1> shapes({Index(first.back())}), widths(shapes.n);
+            find_profile(profile, voxels, first, {at[0].data, at[1].data, nullptr}, shapes.data(),
+                         widths.data(), workers);
+            return std::pair(std::move(shapes), std::move(widths));
+        }),
+        "voxels"_a, "places"_a, "depth"_a, "at"_a, "middle"_a, "width"_a, "flatness"_a,
+        R"(exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
 
-        ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction; ``at`` rows and
-        columns (n,) where the pictures ``middle`` and ``width`` are read.)");
+        ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction, ``flatness`` a
+        multiple of a half; ``at`` rows and columns (n,) where the pictures ``middle`` and ``width`` are read.)");
 
     py::class_<PictureMap>(module, "PictureMap", R"(Where the voxels of a grid lie in a picture.
 

@@ -61,8 +61,8 @@ def divergence(faces: Faces) -> Array:
 def advect_cells(field: Reals, displacement: Faces, maccormack: bool, extend: bool = False) -> Array:
     """Values at x - displacement(x), interpolated linearly.
 
-    What comes from outside the box is zero. With ``extend``, and without the correction, it is the nearest value
-    inside. The correction (Selle et al. 2008) is limited to the values around the point of origin.
+    What comes from outside the box is zero, or with ``extend`` the nearest value inside. The correction (Selle et al.
+    2008) is limited to the values around the point of origin.
     """
 
 def advect_faces(field: Faces, displacement: Faces, maccormack: bool) -> list[Array]:
@@ -366,8 +366,8 @@ def depth_profile(
 ) -> tuple[Array, Array]:
     """exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
 
-    ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction; ``at`` rows and
-    columns (n,) where the pictures ``middle`` and ``width`` are read.
+    ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction, ``flatness`` a
+    multiple of a half; ``at`` rows and columns (n,) where the pictures ``middle`` and ``width`` are read.
     """
 
 class PictureMap:
