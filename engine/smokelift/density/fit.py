@@ -14,12 +14,12 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
+from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
@@ -267,7 +267,7 @@ def without_traces(density: Volume, within: _core.MarkedVoxels) -> Volume:
 def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_]) -> Volume:
     """The density before a descent with the descent's changes, but for those of single voxels, in its place."""
     box = box_around(hull, 1)
-    below, changed = (ndimage.gaussian_filter(each[box], SINGLE_VOXELS) for each in (before, after))
+    below, changed = (_core.blur(each[box], SINGLE_VOXELS, BLUR_REACH) for each in (before, after))
     faint = FAINT_SHARE * float(below.max())
     changed += faint
     below += max(faint, MIN_DENSITY)
