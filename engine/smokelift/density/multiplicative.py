@@ -5,7 +5,9 @@ ray is scaled by s, the picture becomes J (1 - T^s) + T^s B. The transmittance t
 
     t = <I - J, B - J> / <B - J, B - J>,   s = ln t / ln T.
 
-Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s.
+Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s of
+the start: it hardly changes with the density, and to measure it takes another picture
+(docs/experiments/memory-and-time.md).
 Where smoke and background look alike the picture says little, so the neighbours' step counts instead.
 
 Where detail in depth is made up, what a picture adds or takes is detail as well, about as deep as it is wide. Scaled
@@ -72,6 +74,7 @@ def fit_multiplicative(
     current = best = smoke.values
     spare = np.empty_like(current)  # the best is kept, the others are overwritten: new memory takes as long
     least, done = np.inf, 0
+    sensitivities: dict[int, NDArray[np.float32]] = {}
     left: tuple[Image, ...] = ()
     for done in range(iterations + 1):
         volume = smoke.volume_of(current)
@@ -87,7 +90,8 @@ def fit_multiplicative(
             break
         for turn, term in enumerate(terms):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
-            current = _scaled(smoke, current, term, image, spare if current is best else current)
+            target = spare if current is best else current
+            current = _scaled(smoke, current, turn, term, image, sensitivities, target)
     return Fit(smoke.volume_of(best), least, left, done)
 
 
@@ -100,8 +104,8 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int, where: _core
     smoke = _Smoke(density, where)
     values = smoke.values
     for _ in range(rounds):
-        for term in terms:
-            values = _scaled(smoke, values, term, term.renderer.image(smoke.volume_of(values)), values)
+        for turn, term in enumerate(terms):
+            values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)), {}, values)
     return smoke.volume_of(values)
 
 
@@ -133,21 +137,36 @@ class _Smoke:
         return out
 
 
-def _scaled(smoke: _Smoke, values: Array, term: Term, image: Image, out: Array) -> Array:
-    """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`."""
+def _scaled(
+    smoke: _Smoke,
+    values: Array,
+    turn: int,
+    term: Term,
+    image: Image,
+    sensitivities: dict[int, NDArray[np.float32]],
+    out: Array,
+) -> Array:
+    """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`.
+
+    ``sensitivities`` are those of the terms' pictures by number, measured where they are not known yet.
+    """
     transmittance = term.renderer.transmittance
-    slope = _slope(smoke, values, term, image, transmittance)
-    return smoke.scaled(values, term, _log_scale(image, transmittance, slope, term), out)
+    if turn not in sensitivities:
+        sensitivities[turn] = _sensitivity(smoke, values, term, image, transmittance)
+    return smoke.scaled(values, term, _log_scale(image, transmittance, sensitivities[turn], term), out)
 
 
-def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> Image:
-    """dL / d ln s (rows, columns, channels) of a density, whose image and transmittance are given."""
+def _sensitivity(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> NDArray[np.float32]:
+    """|dL / d ln s| / |L - B| (rows, columns) of a density, whose image and transmittance are given."""
     if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
-        return np.asarray(image * np.log(np.maximum(transmittance, 1e-30))[..., None])
-    return np.asarray((term.renderer.image(smoke.volume_of(values, PROBE)) - image) / np.log(PROBE))
+        slope = image * np.log(np.maximum(transmittance, 1e-30))[..., None]
+    else:
+        slope = (term.renderer.image(smoke.volume_of(values, PROBE)) - image) / np.log(PROBE)
+    change = image - term.view.background
+    return np.asarray(np.sqrt(_over_channels(slope, slope)) / np.maximum(np.sqrt(_over_channels(change, change)), 1e-6))
 
 
-def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> NDArray[np.float32]:
+def _log_scale(image: Image, transmittance: Image, sensitivity: NDArray[np.float32], term: Term) -> NDArray[np.float32]:
     """Logarithm (rows, columns) of each pixel's scale, damped and smoothed."""
     background, share = term.view.background, np.sqrt(term.weight)
     clear = transmittance[..., None]
@@ -159,8 +178,6 @@ def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> 
     explained = _over_channels(term.view.image - source, contrast) / (power + 1e-20)
     wanted = np.clip(explained, 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
-    change = image - background
-    sensitivity = np.sqrt(_over_channels(slope, slope)) / np.maximum(np.sqrt(_over_channels(change, change)), 1e-6)
     gain = share * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
     trust = share * power / (power + floor)
