@@ -5,8 +5,6 @@
 namespace smokelift {
 namespace {
 
-constexpr std::size_t READS_PER_TASK = 1 << 16;
-
 // The nodes beside a place in a lattice that repeats, and how near the upper one is.
 struct Between {
     int low, high;
@@ -19,14 +17,18 @@ SMOKELIFT_INLINE Between between(float place, int count) {
     return {low, low + 1 < count ? low + 1 : 0, inside - float(node)};
 }
 
+// Values along a row of voxels: the first lies at `start`, the others `scale` apart along z.
 SMOKELIFT_CLONES
-void read_range(In lattice, const float *__restrict places, std::size_t count, std::size_t begin,
-                std::size_t end, float *__restrict values) {
+void read_row(In lattice, const std::array<float, 3> &start, float scale, const float *__restrict along_x,
+              const float *__restrict along_y, const float *__restrict along_z, float stretch, int count,
+              float *__restrict values) {
     const int nx = lattice.n[0], ny = lattice.n[1], nz = lattice.n[2];
     const float *const __restrict nodes = lattice.data;
-    const float *const along_x = places, *const along_y = places + count, *const along_z = along_y + count;
-    for (std::size_t n = begin; n < end; ++n) {
-        const Between x = between(along_x[n], nx), y = between(along_y[n], ny), z = between(along_z[n], nz);
+    const auto [first_x, first_y, first_z] = start;
+    for (int n = 0; n < count; ++n) {
+        const Between x = between(first_x + stretch * along_x[n], nx),
+                      y = between(first_y + stretch * along_y[n], ny),
+                      z = between(first_z + float(n) * scale + stretch * along_z[n], nz);
         const auto row = [&](int i, int j) SMOKELIFT_INLINE_LAMBDA {
             const int first = (i * ny + j) * nz;
             return nodes[first + z.low] + z.weight * (nodes[first + z.high] - nodes[first + z.low]);
@@ -40,9 +42,19 @@ void read_range(In lattice, const float *__restrict places, std::size_t count, s
 
 } // namespace
 
-void read_lattice(In lattice, const float *places, std::size_t count, float *values, Workers &workers) {
-    workers.run_ranges(count, READS_PER_TASK, [&](std::size_t begin, std::size_t end) {
-        read_range(lattice, places, count, begin, end, values);
+void read_lattice(In lattice, const LatticePlaces &places, const MarkedVoxels &voxels, float *values,
+                  Workers &workers) {
+    const float *const motion = places.motion;
+    const std::size_t all = voxels.count();
+    workers.run(voxels.shape()[0], [&](int x) {
+        voxels.in_plane(x, [&](int y, int z, int count, std::size_t at) {
+            std::array<float, 3> start = places.shift;
+            const int index[3] = {x, y, z};
+            for (int axis = 0; axis < 3; ++axis)
+                start[axis] += float(index[axis]) * places.scale;
+            read_row(lattice, start, places.scale, motion + at, motion + all + at, motion + 2 * all + at,
+                     places.stretch, count, values + at);
+        });
     });
 }
 

@@ -1,15 +1,23 @@
 // Values between the nodes of a lattice that repeats.
 #pragma once
 
-#include "grid.h"
-#include "threads.h"
+#include "marked_voxels.h"
 
-#include <cstddef>
+#include <array>
 
 namespace smokelift {
 
-// Values, linear between nodes at whole numbers, at `count` finite places: all along x, then along y and
-// along z.
-void read_lattice(In lattice, const float *places, std::size_t count, float *values, Workers &workers);
+// Where voxels lie in a lattice, in nodes: index x scale + shift + motion x stretch. The motion is that of
+// all voxels along x, then along y and along z.
+struct LatticePlaces {
+    float scale;
+    std::array<float, 3> shift;
+    const float *motion;
+    float stretch;
+};
+
+// Values at voxels, linear between nodes.
+void read_lattice(In lattice, const LatticePlaces &places, const MarkedVoxels &voxels, float *values,
+                  Workers &workers);
 
 } // namespace smokelift

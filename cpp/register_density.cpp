@@ -1,4 +1,5 @@
 #include "descent.h"
+#include "lattice.h"
 #include "marked_voxels.h"
 #include "pictures.h"
 #include "python.h"
@@ -60,6 +61,18 @@ void register_density(py::module_ &module) {
             R"(Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
 
         Half of it is over each of two lattices, half a cube apart. The result may replace the values.)")
+        .def("read_lattice",
+             unlocked([](Workers &workers, const MarkedVoxels &self, In lattice, float scale,
+                         const std::array<float, 3> &shift, Read<2> motion, float stretch) {
+                 require_fit(motion.n == std::array<Index, 2>{3, Index(self.count())});
+                 Made<float, 1> values({Index(self.count())});
+                 read_lattice(lattice, {scale, shift, motion.data, stretch}, self, values.data(), workers);
+                 return values;
+             }),
+             "lattice"_a, "scale"_a, "shift"_a, "motion"_a, "stretch"_a,
+             R"(A lattice that repeats, read at the voxels (count,), linear between nodes at whole numbers.
+
+        A voxel lies at its index x scale + shift (3,) + its motion (3, count) x stretch, which is finite.)")
         .def("scale_along_rays",
              unlocked([](Workers &workers, const MarkedVoxels &self, const PictureMap &picture, Read<> values,
                          std::optional<Read<>> plausible, Read<2, double> logarithm, float faint, float most,

@@ -2,7 +2,6 @@
 #include "codes.h"
 #include "extraction.h"
 #include "halves.h"
-#include "lattice.h"
 #include "patches.h"
 #include "pictures.h"
 #include "python.h"
@@ -125,17 +124,6 @@ void register_places(py::module_ &module) {
                }),
                "picture"_a, "rows"_a, "columns"_a,
                "A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside.");
-
-    module.def("read_lattice", unlocked([](Workers &workers, In lattice, Read<2> places) {
-                   require_fit(places.n[0] == 3);
-                   Made<float, 1> values({places.n[1]});
-                   read_lattice(lattice, places.data, std::size_t(places.n[1]), values.data(), workers);
-                   return values;
-               }),
-               "lattice"_a, "places"_a,
-               R"(A lattice that repeats, read at finite places (3, n), linear between nodes at whole numbers.
-
-        To the bit `scipy.ndimage.map_coordinates` of order 1 and mode "grid-wrap".)");
 }
 
 Shape halved(const Shape &n) { return {(n[0] + 1) / 2, (n[1] + 1) / 2, (n[2] + 1) / 2}; }

@@ -390,12 +390,6 @@ class PictureMap:
 def read_bilinearly(picture: Reals, rows: Reals, columns: Reals) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
 
-def read_lattice(lattice: Reals, places: Reals) -> Array:
-    """A lattice that repeats, read at finite places (3, n), linear between nodes at whole numbers.
-
-    To the bit `scipy.ndimage.map_coordinates` of order 1 and mode "grid-wrap".
-    """
-
 def means_of_two(values: Array, voxels: Mask | None = None) -> Array:
     """Means of two along every axis; beyond the grid there is nothing, nor in rows without marked voxels."""
 
@@ -501,6 +495,12 @@ class MarkedVoxels:
         """Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
 
         Half of it is over each of two lattices, half a cube apart. The result may replace the values.
+        """
+
+    def read_lattice(self, lattice: Reals, scale: float, shift: npt.ArrayLike, motion: Reals, stretch: float) -> Array:
+        """A lattice that repeats, read at the voxels (count,), linear between nodes at whole numbers.
+
+        A voxel lies at its index x scale + shift (3,) + its motion (3, count) x stretch, which is finite.
         """
 
     def scale_along_rays(

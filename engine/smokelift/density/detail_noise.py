@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import smokelift._core as _core
 from smokelift.density.levels import Level
 
 MAX_NODE_DISTANCE = 2.0
@@ -60,38 +59,39 @@ class StretchedNoise:
 
         Between them is the motion (3, n) in voxels that draws out the next, whose nodes are half as far apart.
         """
-        hull, size, octaves = level.views.hull, level.coarseness, 0
-        places = np.array(np.nonzero(hull), np.float32)
-        places *= size
-        places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
-        noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
+        where, size, octaves = level.views.where, level.coarseness, 0
+        noise, motion = np.zeros(where.count, np.float32), np.zeros((3, where.count), np.float32)
         if level.coarser is not None:
             coarse, motions, octaves = self._sum(level.coarser, lattices)
             for found, values in zip((noise, *motion), (coarse, *motions), strict=True):
                 found[...] = level.coarser.finer(level.coarser.views.volume(values), level)
-        moved = np.empty_like(places)
+        middle = (size - 1) / 2 - self.moved
+
+        def octave(spacing: float, strength: float) -> NDArray[np.float32]:
+            lattice = next(lattices)
+            shift = middle / spacing + lattice.corner
+            values = where.read_lattice(lattice.values, size / spacing, shift.tolist(), motion, 1 / spacing)
+            values *= np.float32(strength)
+            return values
+
         while octaves < len(self.strengths):
             spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
             if octaves and spacing < MIN_NODE_DISTANCE * size:
                 break
-            octave = _octave(np.add(places, motion, out=moved), spacing, next(lattices))
-            octave *= np.float32(self.strengths[octaves])
-            noise += octave
+            noise += octave(spacing, self.strengths[octaves])
             octaves += 1
             if octaves < len(self.strengths):
-                reach = np.float32(STRETCH * spacing)
-                drawn = [_octave(np.add(places, motion, out=moved), spacing, next(lattices)) for _ in motion]
-                for along, octave in zip(motion, drawn, strict=True):
-                    octave *= reach
-                    along += octave
+                drawn = [octave(spacing, STRETCH * spacing) for _ in motion]
+                for along, more in zip(motion, drawn, strict=True):
+                    along += more
         return noise, motion, octaves
 
 
 class _Lattice(NamedTuple):
-    """Values at nodes, of unit variance between them, and the place (3, 1) of the domain's low corner, in nodes."""
+    """Values at nodes, of unit variance between them, and the place (3,) of the domain's low corner, in nodes."""
 
     values: NDArray[np.float32]
-    corner: NDArray[np.float32]
+    corner: NDArray[np.float64]
 
 
 @lru_cache(maxsize=1)
@@ -101,14 +101,7 @@ def _lattices(seed: int, count: int) -> tuple[_Lattice, ...]:
     return tuple(
         _Lattice(
             random.standard_normal((LATTICE,) * 3).astype(np.float32) / NODES,
-            random.uniform(0, LATTICE, (3, 1)).astype(np.float32),
+            random.uniform(0, LATTICE, 3),
         )
         for _ in range(count)
     )
-
-
-def _octave(places: NDArray[np.float32], spacing: float, lattice: _Lattice) -> NDArray[np.float32]:
-    """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart; uses the places up."""
-    places /= np.float32(spacing)
-    places += lattice.corner
-    return _core.read_lattice(lattice.values, places)

@@ -14,7 +14,8 @@ NONE = (0.0, 0.0, 0.0)
 
 def level(shape) -> SimpleNamespace:
     """A grid that may hold smoke everywhere."""
-    return SimpleNamespace(views=SimpleNamespace(hull=np.ones(shape, np.bool_)), coarseness=1, coarser=None)
+    where = _core.MarkedVoxels(np.ones(shape, np.bool_))
+    return SimpleNamespace(views=SimpleNamespace(where=where), coarseness=1, coarser=None)
 
 
 def body(shape) -> np.ndarray:
@@ -90,8 +91,12 @@ def test_fine_octaves_are_drawn_out() -> None:
 def test_a_lattice_is_read_as_scipy_does() -> None:
     random = np.random.default_rng(0)
     lattice = random.standard_normal((5, 6, 7)).astype(np.float32)
-    places = random.uniform(-40, 40, (3, 2000)).astype(np.float32)
-    places[:, :200] = np.round(places[:, :200])
-    places[:, 100:200] -= np.float32(1e-6)
+    marked = random.random((12, 13, 14)) > 0.5
+    index = np.array(np.nonzero(marked))
+    motion = random.uniform(-40, 40, index.shape).astype(np.float32)
+    motion[:, :200] = np.round(motion[:, :200])
+    where, shift = _core.MarkedVoxels(marked), (-3.0, 4.5, 50.0)
+    places = 0.5 * index + np.array(shift)[:, None] + 0.25 * motion
     expected = ndimage.map_coordinates(lattice, places, output=np.float32, order=1, mode="grid-wrap")
-    np.testing.assert_allclose(_core.read_lattice(lattice, places), expected, atol=1e-6)
+    found = where.read_lattice(lattice, 0.5, shift, motion, 0.25)
+    np.testing.assert_allclose(found, expected, atol=1e-4)
