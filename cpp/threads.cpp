@@ -15,7 +15,7 @@ namespace smokelift {
 namespace {
 
 // Checks for the next loop before a thread goes to sleep: the loops of one call follow each other as fast,
-// calls from Python do not (docs/experiments/frame-cost.md).
+// calls from Python do not (docs/experiments/memory-and-time.md).
 constexpr int SPINS = 100;
 
 std::atomic<int> threads_set{0};
