@@ -52,11 +52,11 @@ def density_error(found: Array, true: Array) -> float:
 
 
 def ways(
-    moments: list[SmokeState], frames: int, dt: float, fitted: list[SmokeState] | None = None
+    moments: list[SmokeState], frames: int, dt: float, fitted: list[SmokeState] | None = None, *, true: bool
 ) -> Iterator[tuple[str, list[SmokeState], Physics | None]]:
     """Yield every way to continue moments by so many frames, with its moments and its physics.
 
-    The physics is fitted to the moments, or to others in their place.
+    The physics is fitted to the moments, or to others in their place. True moments have their eddies, and gain none.
     """
     last = moments[-1]
     yield "held", [last] * frames, None
@@ -66,6 +66,8 @@ def ways(
         carried.append(SmokeState(density, last.velocity))
     yield "carried", carried[1:], None
     simulation = fitted_simulation(fitted or moments, dt)
+    if true:
+        simulation = replace(simulation, eddies=None)
     simulated = [spun_up(simulation, moments[-FITTED_FRAMES:])]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))
@@ -110,7 +112,7 @@ def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list
         moments = [reconstructed_moment(folder, truth, frame) for frame in shown]
     really = rise([truth.velocity(frame - 1) for frame in frames], truth.density(cut - 1), truth.dt)
     fitted = with_dissolving_heads(moments, truth.dt, heads)
-    for how, found, physics in ways(moments, len(frames), truth.dt, fitted):
+    for how, found, physics in ways(moments, len(frames), truth.dt, fitted, true=folder is None):
         errors = [density_error(m.density, truth.density(f)) for m, f in zip(found, frames, strict=True)]
         up = rise([moment.velocity for moment in found], moments[-1].density, truth.dt) / really
         own = [f"{physics.buoyancy:.2f}", f"{up:.2f}"] if physics else ["", ""]
@@ -133,7 +135,7 @@ def picture(known: KnownScene, path: Path) -> None:
     shown = [0, len(frames) // 3, 2 * len(frames) // 3, len(frames) - 1]
     white = float(max(truth.density(f).mean(axis=1).max() for f in frames))
     columns = {"what came": [truth.density(frames[i]) for i in shown]}
-    for how, found, _ in ways(moments, len(frames), truth.dt):
+    for how, found, _ in ways(moments, len(frames), truth.dt, true=True):
         columns[how] = [found[i].density for i in shown]
     rows = [[tile(column[i], white) for column in columns.values()] for i in range(len(shown))]
     write_sheet(path, rows, tuple(columns), [f"+{i + 1}" for i in shown])

@@ -25,7 +25,7 @@ from smokelift.direct.growth import (
 from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, write_copy, write_simulated
 from smokelift.direct.state import SmokeState, read_state
 from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Obstacle, Obstacles, Surroundings, require_place
-from smokelift.direct.turbulence import Turbulence, with_small_eddies
+from smokelift.direct.turbulence import Turbulence
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -191,7 +191,7 @@ def _simulated(
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     else:
         box, larger = clip, _start_box(continuation, growth)
-        state = with_small_eddies(spun_up(simulation, states))
+        state = spun_up(simulation, states)
         state = replace(state, velocity=replace(state.velocity, closed=growth.closed))
     del states  # they are large
     for step in range(1, continuation.frames + 1):

@@ -4,7 +4,8 @@ An estimated velocity is smooth and slow: it explains how the smoke moved, but l
 simulation that starts from it makes threads. So the simulation runs along the clip first. It takes the velocity from
 the first frame alone, and at each frame the clip's density (direct insertion: Charney, Halem and Jastrow, "Use of
 incomplete historical data to infer the present state of the atmosphere", 1969). The density's detail turns the air
-around it, so that eddies come in on every scale that the clip shows.
+around it, so that eddies come in on every scale that the clip shows. Small ones that are still missing are made up
+(`smokelift.direct.turbulence`).
 
 The buoyancy is the one whose velocity moves the smoke up as the clip does: each frame is carried on for a step, and
 compared with the next one in the picture. What rises there is the pattern of the smoke, not its center of mass, which
@@ -28,6 +29,7 @@ from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.simulation import Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.turbulence import SmallEddies
 from smokelift.transport import Array, advect, at_centres
 from smokelift.velocity.pyramid import coarsen, coarsened
 
@@ -105,7 +107,8 @@ def fit_simulation(
         physics = Physics(0.0 if contradicted else fitted, dissipation, fitted if contradicted else 0.0)
     else:
         physics = Physics(buoyancy, dissipation)
-    return Simulation(physics, inflow.cropped(), surroundings or Surroundings(), dt, fit_fire(states, dt))
+    around = surroundings or Surroundings()
+    return Simulation(physics, inflow.cropped(), around, dt, fit_fire(states, dt), SmallEddies.of(states))
 
 
 def coarse(state: SmokeState) -> SmokeState:
@@ -122,7 +125,7 @@ def _coarse_mask(voxels: Mask) -> Mask:
 
 
 def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
-    """The last of some consecutive states, with the velocity that the forces have made since the first.
+    """The last of some consecutive states, with the velocity that the forces have made since the first, and its eddies.
 
     The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
@@ -130,7 +133,8 @@ def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
     along, velocity = _along(simulation), states[first].velocity
     for step, state in enumerate(states[first:-1], first + 1):
         velocity = along.velocity(replace(state, velocity=velocity), step)
-    return replace(states[-1], velocity=velocity)
+    last = replace(states[-1], velocity=velocity)
+    return last if simulation.eddies is None else simulation.eddies.begun(last)
 
 
 def _first_typical(states: Sequence[SmokeState]) -> int:
@@ -142,7 +146,7 @@ def _first_typical(states: Sequence[SmokeState]) -> int:
 
 def _along(simulation: Simulation) -> Simulation:
     """The simulation of the clip itself: step n goes to state n, and what entered then enters."""
-    return replace(simulation, inflow=simulation.inflow.forwards(), surroundings=Surroundings(), fire=None)
+    return Simulation(simulation.physics, simulation.inflow.forwards(), Surroundings(), simulation.dt)
 
 
 def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:

@@ -3,15 +3,16 @@
 A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
 the frame before to this one:
 
-    u'   = Project(advect(u - a, u) + dt (b rho up) + a'), in inlets and fans with their own velocity
-    rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
+    u'   = Project(K(advect(u - a, u)) + dt (b rho up) + a'), in inlets and fans with their own velocity
+    rho' = exp(-d dt) M(advect(rho, u')), in inlets with their own density
 
 where a is the ambient velocity: wind and turbulence, which all air has in addition to the flow. Outside the box there
 is nothing else.
 
 Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as are what enters
 (`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.burning`), which lifts nothing beside what b has.
-Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the eddies that the clip has.
+Advection keeps the mass, and MacCormack's correction the eddies that the grid shows. K gives small ones back what
+interpolation takes, and M mixes smoke as those do that the grid does not show (`smokelift.direct.turbulence`).
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Solid, Surroundings
+from smokelift.direct.turbulence import SmallEddies
 from smokelift.transport import Array, Velocity, advect, on_faces, project
 
 TRACE = np.float32(1e-4)
@@ -67,6 +69,8 @@ class Simulation:
         Time of a step in seconds.
     fire
         Of the clip; None without any.
+    eddies
+        Small ones that the smoke keeps; None leaves the flow to itself.
     """
 
     physics: Physics
@@ -74,6 +78,7 @@ class Simulation:
     surroundings: Surroundings
     dt: float
     fire: Combustion | None = None
+    eddies: SmallEddies | None = None
 
     def next(self, state: SmokeState, step: int) -> SmokeState:
         """Return the state one step later; step 1 starts from the clip's last state."""
@@ -104,11 +109,16 @@ class Simulation:
 
     def _driven(self, state: SmokeState, step: int, solid: Solid | None) -> Velocity:
         moved = self._self_advected(state.velocity, step)
+        if self.eddies is not None:
+            moved = self.eddies.kept(moved, state.density)
         driven = moved.with_faces(self._with_forces(moved, state, step))
         return project(driven) if solid is None else solid.projected(driven)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
-        return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
+        moved = advect(values, velocity, self.dt, conserve=True)
+        if self.eddies is not None:
+            moved = self.eddies.mixed(moved, velocity.voxel_size, self.dt)
+        return _without_traces(moved, solid)
 
     def _self_advected(self, velocity: Velocity, step: int) -> Velocity:
         """The velocity after it was advected by itself, without the ambient velocity."""

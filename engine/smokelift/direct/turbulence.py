@@ -1,16 +1,18 @@
-"""Turbulence: eddies without divergence that the air has at random, beside what moves it already.
+"""Turbulence: eddies without divergence that the air has at random, and those that smoke keeps by itself.
 
 Curl noise (Bridson et al. 2007), of random Fourier modes (Kraichnan 1970) in place of a lattice of noise: the curl of a
 wave is a wave that swings across its own direction. A sum of waves is known at any place, on any grid.
 
-An estimated velocity lacks small eddies (`with_small_eddies`). Smoke that is carried by a smooth velocity is drawn out
-into sheets. True smoke has as much motion in each octave of sizes below a tenth of its width
-(docs/experiments/continuation.md); estimates lack the fine ones by a factor of ten. What is missing is added once,
-where the smoke is, and moves on by itself.
+True smoke has as much motion in each octave of sizes below a tenth of its width, about a seventh of its speed
+(docs/experiments/continuation.md). An estimated velocity lacks it, and smoke that a smooth velocity carries is drawn
+out into sheets and threads. `SmallEddies` makes up what is missing, and keeps it at that level, which interpolation
+takes away (backscatter: Mason and Thomson 1992). What is smaller than a voxel mixes the smoke, as in large eddy
+simulation.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -20,7 +22,7 @@ from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
 from smokelift.direct.state import SmokeState
-from smokelift.transport import Array, Velocity, at_centres, on_faces, project
+from smokelift.transport import Array, Faces, Velocity, at_centres, on_faces, project
 
 MODES = 64
 """Waves in the sum: enough that it shows no pattern."""
@@ -96,7 +98,20 @@ class _Octave(NamedTuple):
 
 
 SIZES = (_Octave(3, 2.2), _Octave(7, 4.0), _Octave(13, 8.0), _Octave(27, 16.0))
-"""Voxels, from the finest to the one that estimates show."""
+"""Voxels, from the finest on; what is larger the estimate shows."""
+
+INTENSITY = 0.18
+"""Speed of an octave's eddies, of each component, over that of a clip's smoke: .14 of the true one, of which estimates
+show .6 to .7; between both (docs/experiments/continuation.md)."""
+
+LARGEST_GAIN = np.float32(1.25)
+"""Of an octave in a step: eddies grow as smoke is stirred, and do not appear."""
+
+MIXING = 0.1
+"""Diffusivity over the speed of the eddies and the length of a voxel (Deardorff 1980)."""
+
+LARGEST_SHARE = 0.25
+"""Of a voxel's smoke that a neighbor takes over in a step, at which the explicit step does not swing."""
 
 IN_SMOKE = np.float32(0.05)
 """Fraction of the largest density above which a voxel is in the smoke."""
@@ -105,21 +120,74 @@ EDGE = 5
 """Voxels over which the eddies end beside the smoke."""
 
 
-def with_small_eddies(state: SmokeState) -> SmokeState:
-    """A state with the eddies that it lacks; as it is in a box that is too narrow to show any, or without smoke."""
-    smoke, velocity = state.density > IN_SMOKE * state.density.max(), state.velocity
-    if min(smoke.shape) < SIZES[-1].average or not smoke.any():
-        return state
-    found, wider = np.zeros(len(SIZES)), at_centres(velocity.faces)
-    for number, octave in enumerate(SIZES):
-        averaged = [ndimage.uniform_filter(component, octave.average) for component in wider]
-        parts = [np.mean(np.square((u - mean)[smoke])) for u, mean in zip(wider, averaged, strict=True)]
-        found[number], wider = float(np.sum(parts)), (averaged[0], averaged[1], averaged[2])
-    near = ndimage.uniform_filter(smoke.astype(np.float32), EDGE)
-    weights = on_faces(np.repeat(near[..., None], 3, axis=-1))
-    faces = list(velocity.faces)
-    for seed, (octave, square) in enumerate(zip(SIZES[:-1], found[:-1], strict=True)):
-        speed = float(max(0.0, found[-1] - square)) ** 0.5
-        eddies = Turbulence(speed, octave.eddy * velocity.voxel_size, seed).velocity(velocity, 0.0)
-        faces = [u + weight * eddy for u, weight, eddy in zip(faces, weights, eddies, strict=True)]
-    return replace(state, velocity=project(velocity.with_faces(faces)))
+@dataclass(frozen=True)
+class SmallEddies:
+    """The eddies of each of `SIZES` that smoke has, of a `speed` in m/s, root mean square of each component."""
+
+    speed: float
+
+    @staticmethod
+    def of(states: Sequence[SmokeState]) -> SmallEddies:
+        """Those of a clip's smoke, by some of its states."""
+        squares = [sum(_mean_squares(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3)) for m in states]
+        return SmallEddies(INTENSITY * float(np.median(squares)) ** 0.5)
+
+    def begun(self, state: SmokeState) -> SmokeState:
+        """A state with those that it lacks."""
+        velocity, faces = state.velocity, list(state.velocity.faces)
+        smoke, near = _on_faces(state.density)
+        for seed, (octave, found) in enumerate(_octaves(velocity)):
+            missing = max(0.0, 3 * self.speed**2 - sum(_mean_squares(found, smoke))) ** 0.5
+            eddies = Turbulence(missing, octave.eddy * velocity.voxel_size, seed).velocity(velocity, 0.0)
+            faces = [u + weight * eddy for u, weight, eddy in zip(faces, near, eddies, strict=True)]
+        return replace(state, velocity=project(velocity.with_faces(faces)))
+
+    def kept(self, velocity: Velocity, density: Array) -> Velocity:
+        """A velocity in whose smoke those eddies are faster that have become too slow; it may have divergence."""
+        faces = list(velocity.faces)
+        smoke, near = _on_faces(density)
+        for _, found in _octaves(velocity):
+            square = sum(_mean_squares(found, smoke))
+            if 0 < square < 3 * self.speed**2:
+                gain = min(np.float32(3**0.5 * self.speed / square**0.5), LARGEST_GAIN)
+                faces = [u + (gain - 1) * weight * part for u, weight, part in zip(faces, near, found, strict=True)]
+        return velocity.with_faces(faces)
+
+    def mixed(self, values: Array, voxel_size: float, dt: float) -> Array:
+        """A density or an emission (nx, ny, nz) after smaller eddies have mixed it for a time in seconds."""
+        share = min(MIXING * self.speed * dt / voxel_size, LARGEST_SHARE)
+        mixed = values
+        for axis in range(3):
+            mixed = ndimage.correlate1d(mixed, [share, 1 - 2 * share, share], axis)
+        return mixed
+
+
+def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:
+    """The octaves that a box holds, and a velocity's motion in them on faces."""
+    wider = list(velocity.faces)
+    for octave in SIZES:
+        if octave.average < min(velocity.shape):
+            averaged = [ndimage.uniform_filter(component, octave.average) for component in wider]
+            yield octave, [u - mean for u, mean in zip(wider, averaged, strict=True)]
+            wider = averaged
+
+
+def _in_smoke(density: Array) -> Array:
+    """1 in the smoke, 0 elsewhere."""
+    smoke: Array = (density > IN_SMOKE * density.max()).astype(np.float32)
+    return smoke
+
+
+def _on_faces(density: Array) -> tuple[Faces, Faces]:
+    """1 on faces in the smoke, 0 elsewhere; and the same, with soft edges."""
+    smoke = _in_smoke(density)
+    inside, near = (on_faces(np.stack([each] * 3, -1)) for each in (smoke, ndimage.uniform_filter(smoke, EDGE)))
+    return inside, near
+
+
+def _mean_squares(components: Sequence[Array], weights: Sequence[Array]) -> list[float]:
+    """Mean squares of components with weights; 0 where there is no weight."""
+    return [
+        float(np.vdot(w, np.square(u))) / max(float(w.sum(dtype=np.float64)), 1e-30)
+        for u, w in zip(components, weights, strict=True)
+    ]

@@ -1,14 +1,17 @@
 """Eddies in all air: their speed, their size, what they do to smoke, and those that a smooth velocity gains."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from smokelift.direct import SmokeState, Turbulence
+from smokelift.direct import Simulation, SmokeState, Turbulence
+from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import with_small_eddies
+from smokelift.direct.turbulence import INTENSITY, MIXING, SmallEddies
 from smokelift.transport import Velocity, at_centres, divergence, project
-from tests.engine.direct.rising import DOMAIN, at_rest, blob, course, free
+from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
 
 STILL = Velocity.zero((40, 40, 40), 0.05)
 SHAPE = (32, 32, 40)
@@ -71,31 +74,53 @@ def stirred(*sizes: float) -> SmokeState:
     return SmokeState(density, project(still.with_faces([sum(parts) for parts in zip(*each, strict=True)])))
 
 
-def energy(state: SmokeState, smoke: bool) -> float:
+def energy(state: SmokeState, smoke: bool = True) -> float:
     inside = (state.density > 0) == smoke
     return sum(float(np.square(u[inside]).mean()) for u in at_centres(state.velocity.faces))
 
 
 def test_a_smooth_velocity_gains_eddies_in_the_smoke():
     smooth = stirred(16)
-    found = with_small_eddies(smooth)
-    assert energy(found, True) > 1.15 * energy(smooth, True)
+    eddies_of_clip = SmallEddies.of([smooth, smooth])
+    assert eddies_of_clip.speed == pytest.approx(INTENSITY * energy(smooth) ** 0.5, rel=1e-3)
+    found = eddies_of_clip.begun(smooth)
+    assert energy(found) > 1.05 * energy(smooth)
     far = np.ones(SHAPE, bool)
     far[1:-1, 1:-1, 1:-1] = False
     for before, after in zip(*(at_centres(m.velocity.faces) for m in (smooth, found)), strict=True):
         assert np.abs(after - before)[far].mean() < 0.1 * np.abs(before)[far].mean()
     assert np.abs(divergence(found.velocity)).max() * VOXEL < 1e-4
-    again = with_small_eddies(smooth)
-    np.testing.assert_array_equal(again.velocity.faces[0], found.velocity.faces[0])
+    np.testing.assert_array_equal(eddies_of_clip.begun(smooth).velocity.faces[0], found.velocity.faces[0])
 
 
-def test_a_velocity_that_has_its_eddies_gains_few():
-    full = stirred(2.2, 4, 8, 16)
-    assert energy(with_small_eddies(full), True) == pytest.approx(energy(full, True), rel=0.25)
+def test_small_eddies_stay_as_fast_as_they_are():
+    state = stirred(2.2, 4, 8)
+    left = Simulation(Physics(0.0, 0.0), Inflow(np.zeros(SHAPE, bool), [state]).cropped(), Surroundings(), DT)
+    kept = replace(left, eddies=SmallEddies(0.2))
+    with_eddies, without = (course(each, state, 24)[-1] for each in (kept, left))
+    assert energy(without) < 0.5 * energy(state)
+    assert 0.7 < energy(with_eddies) / energy(state) < 2
 
 
-def test_still_air_and_narrow_boxes_stay():
+def test_a_velocity_that_has_its_eddies_gains_none():
+    full = stirred(2.2, 4, 8)
+    found = SmallEddies(0.05).kept(full.velocity, full.density)
+    np.testing.assert_array_equal(found.faces[2], full.velocity.faces[2])
+
+
+def test_small_eddies_mix_smoke_and_keep_its_mass():
+    smoke = np.zeros((9, 9, 9), np.float32)
+    smoke[4, 4, 4] = smoke[0, 4, 4] = 1
+    found = SmallEddies(1.0).mixed(smoke, voxel_size=0.05, dt=0.1)
+    assert found.sum() == pytest.approx(2, rel=1e-6)
+    places = np.arange(9) - 4.0
+    spread = np.vdot(found[2:].sum((0, 1)), places**2) / found[2:].sum()
+    assert spread == pytest.approx(2 * MIXING * 1.0 * 0.1 / 0.05)
+    assert SmallEddies(100.0).mixed(smoke, voxel_size=0.05, dt=0.1).min() >= 0
+
+
+def test_still_air_gains_no_eddies():
     still = SmokeState(np.ones(SHAPE, np.float32), Velocity.zero(SHAPE, VOXEL))
-    assert not any(component.any() for component in with_small_eddies(still).velocity.faces)
-    narrow = SmokeState(np.ones((8, 8, 8), np.float32), Velocity.zero((8, 8, 8), VOXEL))
-    assert with_small_eddies(narrow) is narrow
+    eddies_of_clip = SmallEddies.of([still])
+    for velocity in (eddies_of_clip.begun(still).velocity, eddies_of_clip.kept(still.velocity, still.density)):
+        assert not any(component.any() for component in velocity.faces)
