@@ -16,9 +16,7 @@ from smokelift.direct.fitting import BUOYANCY_FRAMES, coarse, fit_simulation, sp
 from smokelift.direct.growth import (
     Growth,
     camera_and_lamp_places,
-    cut_sides,
     dissolved,
-    emerged,
     in_larger_box,
     moves,
 )
@@ -154,14 +152,10 @@ def continue_sequence(
     with directed_writer(sequence, out, "continue", settings, how, camera_frames, npz=npz, resume=resume) as writer:
         if writer.state is None and writer.finished:
             return
-        yield from _copied(sequence, copied, writer)
+        for number in copied:
+            if number not in writer.finished:
+                yield write_copy(sequence, number, writer, number, {})
         yield from _simulated(sequence, copied, continuation, growth, writer)
-
-
-def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter) -> Iterator[Written]:
-    for number in numbers:
-        if number not in writer.finished:
-            yield write_copy(sequence, number, writer, number, {})
 
 
 def _simulated(
@@ -182,11 +176,11 @@ def _simulated(
         buoyancy=continuation.buoyancy,
         dissipation=continuation.dissipation,
     )
-    cut = cut_sides(states[-1].density, growth.closed)
     saved = writer.state
     if saved is not None and saved.number > start:
         box = writer.box(saved.number)
-        state = _resumed(saved, box, growth.closed)
+        volumes = [np.asarray(saved.extra[name], np.float32) for name in UNFADED if name in saved.extra]
+        state = SmokeState(volumes[0], Velocity(saved.velocity, box.voxel_size, growth.closed), *volumes[1:])
         larger = growth.after(box, state, dt)
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     else:
@@ -204,11 +198,12 @@ def _simulated(
             simulation = simulation.in_larger_box(ends, _surroundings(continuation, larger, clip))
             state = in_larger_box(state, ends, before, simulation.surroundings, (step - 1) * dt)
             box = larger
-        state = emerged(simulation.next(state, step), clip.slices_in(box), cut, step, dt)
+        state = simulation.next(state, step)
         mass = float(state.density.sum(dtype=np.float64))
         state = dissolved(state, growth.stopped(box), dt, box.first_in(clip))
         gone = 1 - float(state.density.sum(dtype=np.float64)) / mass if mass > 0 else 0.0
-        faded = state.thinned(np.float32(_shown_fraction(step, continuation)))
+        shown = min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
+        faded = state.thinned(np.float32(shown))
         solid = simulation.surroundings.solid(step, dt)
         obstacles = None if solid is None else solid.voxels
         further = {**vars(simulation.physics), DISSOLVED: gone}
@@ -219,17 +214,6 @@ def _simulated(
             writer, number, faded, "simulated", further, started=started, solid=obstacles, box=box, state=saved
         )
         larger = growth.after(box, state, dt)
-
-
-def _resumed(saved: ResumeState, box: Domain, closed: tuple[Side, ...]) -> SmokeState:
-    """The last simulated state of a run that goes on."""
-    volumes = [np.asarray(saved.extra[name], np.float32) for name in UNFADED if name in saved.extra]
-    return SmokeState(volumes[0], Velocity(saved.velocity, box.voxel_size, closed), *volumes[1:])
-
-
-def _shown_fraction(step: int, continuation: Continuation) -> float:
-    """The fraction of the smoke that is shown while it fades."""
-    return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
 
 
 def _depth_axis(camera: Camera) -> int:

@@ -17,7 +17,7 @@ from smokelift.direct.surroundings import Surroundings
 from smokelift.scene import SIDES, Box, CompleteScene, Domain, EnvironmentLight, PointLight, Side
 from smokelift.scene.checks import Vector
 from smokelift.scene.domain import MAX_SIDE_VOXELS, box_around, open_sides
-from smokelift.transport import Array, Velocity, advect, at_centres
+from smokelift.transport import Array, Velocity, at_centres
 
 BLOCK = 8
 """Voxels by which a side moves: few steps change the box, and counts with small factors transform fast."""
@@ -42,11 +42,6 @@ BUMPS = 0.6
 
 WAVES = ((0.3, 0.9, 0.0), (1.4, 1.3, 2.1), (2.5, 0.7, 4.0), (2.0, 2.1, 1.0))
 """Bumps of the end: direction in radians, number in a fade's length, and phase. No two agree, so no pattern is seen."""
-
-EMERGING = 1.0
-"""Seconds after the clip in which smoke becomes dense that comes out of a side that had cut it. The clip shows none
-beyond, and smoke that came out at once would have a flat top."""
-
 
 Moves = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 """Voxels by which the low and the high side move outwards, along x, y and z."""
@@ -186,32 +181,6 @@ def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ..
         wave = np.cos(2 * np.pi * pitch * (np.cos(angle) * one + np.sin(angle) * other) + phase + axis)
         total = total + wave.take([0], axis).astype(np.float32) / len(WAVES)
     return np.float32(0.5) + np.float32(0.5) * total
-
-
-def emerged(state: SmokeState, clip: tuple[slice, ...], cut: tuple[Side, ...], step: int, dt: float) -> SmokeState:
-    """A state whose smoke is thin where it has just come out of sides of the clip's box that had cut it.
-
-    It is so many steps of `dt` seconds after the clip, whose box is given in voxels.
-    """
-    missing = 1 - min(1.0, step * dt / EMERGING) ** 2
-    if not cut or missing == 0:
-        return state
-    inside = np.zeros(state.density.shape, np.float32)
-    inside[clip] = 1
-    from_inside = advect(inside, state.velocity, dt, scheme="semi-lagrangian")
-    left = np.ones_like(inside)
-    for side, axis, is_high in open_sides(()):
-        if side in cut:
-            beyond = [slice(None)] * 3
-            beyond[axis] = slice(clip[axis].stop, None) if is_high else slice(None, clip[axis].start)
-            left[tuple(beyond)] = 1 - np.float32(missing) * from_inside[tuple(beyond)]
-    return state.thinned(left)
-
-
-def cut_sides(density: Array, closed: tuple[Side, ...]) -> tuple[Side, ...]:
-    """The sides of the box of a density (nx, ny, nz), but for the walls, at which there is smoke."""
-    seen = density > SEEN * density.max()
-    return tuple(side for side, axis, is_high in open_sides(closed) if seen.take(-is_high, axis).any())
 
 
 def _moved(box: Domain, side: Side, blocks: int) -> Domain:

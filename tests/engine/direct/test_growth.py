@@ -5,30 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import DISSOLVED, Continuation, SmokeState, Turbulence, continue_sequence, open_source
+from smokelift.direct import DISSOLVED, Continuation, SmokeState, Turbulence, open_source
 from smokelift.direct.growth import (
     BLOCK,
     MARGIN_VOXELS,
     Growth,
     camera_and_lamp_places,
-    cut_sides,
     dissolved,
-    emerged,
     in_larger_box,
     moves,
 )
 from smokelift.direct.surroundings import Surroundings
-from smokelift.output.sequence import Sequence
 from smokelift.scene import PointLight
-from smokelift.transport import Velocity, advect
-from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob
+from smokelift.transport import advect
+from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob, run, run_twice
 
 ROOMY = Growth(DOMAIN, ("z-",), 20 * DOMAIN.resolution[0] * DOMAIN.resolution[1] * DOMAIN.resolution[2])
-
-
-def run(source, out, continuation, **options):
-    list(continue_sequence(source, out, continuation, npz=True, **options))
-    return Sequence.open(out)
 
 
 def blowing(speed: float, density: np.ndarray) -> SmokeState:
@@ -98,29 +90,10 @@ def test_smoke_dissolves_softly_before_a_side_that_cannot_move():
     assert dissolved(still, ("x+",), DT).density == pytest.approx(still.density)
 
 
-def test_smoke_that_the_clip_cut_comes_out_thinly_at_first():
-    larger = DOMAIN.grown((0, 0, 0), (0, 0, 8))
-    cut = np.ones(DOMAIN.shape, np.float32)
-    assert cut_sides(cut, ("z-",)) == ("x-", "x+", "y-", "y+", "z+")
-    velocity = Velocity.zero(larger.shape, larger.voxel_size, ("z-",))
-    x, y, z = velocity.faces
-    z[:, :, 1:] = larger.voxel_size / DT
-    state = SmokeState(np.pad(cut, moves(DOMAIN, larger)), velocity.with_faces((x, y, z)))
-    tops = []
-    for step in range(1, 30):
-        density = advect(state.density, state.velocity, DT)
-        density[:, :, 0] = 1
-        state = emerged(replace(state, density=density), DOMAIN.slices_in(larger), ("z+",), step, DT)
-        tops.append(state.density[8, 8, 24:])
-    assert tops[0].max() < 0.01
-    assert np.abs(np.diff(tops[11])).max() < 0.2
-    assert tops[-1].min() > 0.5
-
-
 def test_smoke_in_wind_leaves_the_clips_box_uncut(source, tmp_path):
     """The frames have boxes of their own and open as one sequence; a stopped run goes on to the same."""
     continuation = Continuation(16, wind=(4.0, 0.0, 0.0), room=12)
-    made = run(source, tmp_path / "out", continuation)
+    made, stopped = run_twice(source, tmp_path, continuation, 21)
     assert made.scene.domain == made.box(26)
     assert made.box(10) == source.scene.domain
     assert made.density(10).shape == made.density(26).shape == made.scene.domain.shape
@@ -129,11 +102,7 @@ def test_smoke_in_wind_leaves_the_clips_box_uncut(source, tmp_path):
     seen = made.density(26) > 1e-2 * made.density(26).max()
     assert not any(seen.take(side, axis).any() for axis in (0, 1) for side in (0, -1))
     assert made.figures(26)[DISSOLVED] == 0
-    for number, _ in continue_sequence(source, tmp_path / "stopped", continuation, npz=True):
-        if number == 21:
-            break
-    stopped = run(source, tmp_path / "stopped", continuation, resume=True)
     np.testing.assert_array_equal(stopped.density(26), made.density(26))
-    again = run(open_source(tmp_path / "out"), tmp_path / "again", Continuation(1))
+    again = run(open_source(tmp_path / "whole"), tmp_path / "again", Continuation(1))
     np.testing.assert_array_equal(again.density(10)[again.box(10).slices_in(again.scene.domain)], source.density(10))
     assert again.density(26).sum() == pytest.approx(made.density(26).sum())
