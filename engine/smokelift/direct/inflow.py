@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -55,20 +54,6 @@ MIN_RESIDUAL_FRACTION = np.float32(1e-4)
 
 MARGIN_VOXELS = 1
 """Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
-
-
-class Residual(NamedTuple):
-    """The change of a density that a velocity leaves unexplained, and the larger density of before and after."""
-
-    change: Array
-    largest: Array
-
-
-class ResidualMeans(NamedTuple):
-    """Means of residuals and of their magnitude, over a few voxels and over frames, in units of the largest density."""
-
-    mean: Array
-    magnitude: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,45 +133,37 @@ def find_inflow(states: Sequence[SmokeState], dt: float, marked: Mask | None = N
 
 def _detect_inlets(states: Sequence[SmokeState], dt: float) -> Mask:
     """The voxels of inlets by the mean over all frames, for inlets stand still and errors do not."""
-    residuals = [_residual(before, after, dt) for before, after in pairwise(states)]
-    means = residual_means(residuals)
+    changes = []
+    for before, after in pairwise(states):
+        carried = advect(before.density, after.velocity, dt)
+        largest = np.maximum(after.density, carried)
+        changes.append((after.density - carried) / max(largest.max(), np.float32(1e-30)))
+    entering = inlet_score(changes, largest > MIN_DENSITY_FRACTION * largest.max()) > MIN_SCORE
     middle = len(states) // 2
-    halves = [residual_means(part).mean for part in (residuals[:middle], residuals[middle:]) if part]
-    largest = residuals[-1].largest
-    entering = inlet_score(means, largest > MIN_DENSITY_FRACTION * largest.max()) > MIN_SCORE
-    outflow = np.zeros_like(largest)
-    for state in states:
-        outflow += _outflow(state)
-    return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves), outflow)
+    lasting = np.minimum.reduce([_blurred_mean(part) for part in (changes[:middle], changes[middle:]) if part])
+    outflow = sum(map(_outflow, states[1:]), _outflow(states[0]))
+    return _strongest_inlets(entering, _blurred_mean(changes), lasting, outflow)
 
 
-def _residual(before: SmokeState, after: SmokeState, dt: float) -> Residual:
-    carried = advect(before.density, after.velocity, dt)
-    return Residual(after.density - carried, np.maximum(after.density, carried))
+def inlet_score(changes: Sequence[Array], smoke: Mask) -> Array:
+    """Return how surely smoke enters in each voxel (nx, ny, nz), from 0 to 1.
 
-
-def residual_means(residuals: Sequence[Residual]) -> ResidualMeans:
-    """Return the means over residuals, one at least."""
-    means = ResidualMeans(*(np.zeros_like(residuals[0].change) for _ in range(2)))
-    for number, (change, largest) in enumerate(residuals, 1):
-        relative = change / max(largest.max(), np.float32(1e-30))
-        for mean, values in zip(means, (relative, np.abs(relative)), strict=True):
-            mean *= np.float32(1 - 1 / number)
-            mean += np.float32(1 / number) * _core.blur(values, BLUR_VOXELS, 3.0)
-    return means
-
-
-def inlet_score(means: ResidualMeans, smoke: Mask) -> Array:
-    """Return how surely smoke enters in each voxel (nx, ny, nz), from 0 to 1."""
-    mean = means.mean
+    The changes, one at least, are what the velocity leaves unexplained of each step, in units of the largest density.
+    """
+    mean, magnitude = _blurred_mean(changes), _blurred_mean([np.abs(change) for change in changes])
     typical = float(np.median(np.abs(mean[smoke]))) if smoke.any() else 0.0
     if typical == 0.0:
         return np.zeros(mean.shape, np.float32)
-    coherent = _ramp(mean / (means.magnitude + MIN_RESIDUAL_FRACTION), COHERENCE)
+    coherent = _ramp(mean / (magnitude + MIN_RESIDUAL_FRACTION), COHERENCE)
     strong = _ramp(mean / np.float32(typical), STRENGTH)
     prominent = _ramp(mean / max(np.max(coherent * mean), MIN_RESIDUAL_FRACTION), PROMINENCE)
     score: Array = coherent * strong * prominent
     return score
+
+
+def _blurred_mean(changes: Sequence[Array]) -> Array:
+    """The mean over steps and over a few voxels."""
+    return _core.blur(sum(changes[1:], changes[0]) / np.float32(len(changes)), BLUR_VOXELS, 3.0)
 
 
 def _ramp(values: Array, ends: tuple[float, float]) -> Array:

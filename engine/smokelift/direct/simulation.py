@@ -83,7 +83,7 @@ class Simulation:
     def next(self, state: SmokeState, step: int) -> SmokeState:
         """Return the state one step later; step 1 starts from the clip's last state."""
         solid = self.surroundings.solid(step, self.dt)
-        velocity = self._driven(state, step, solid)
+        velocity = self.velocity(state, step, solid)
         obstacle = None if solid is None else solid.voxels
         density = self._advected(state.density, velocity, obstacle)
         density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
@@ -93,9 +93,13 @@ class Simulation:
             flame = self.fire.after(self._advected(state.flame, velocity, obstacle), obstacle)
         return SmokeState(density, velocity, flame)
 
-    def velocity(self, state: SmokeState, step: int) -> Velocity:
-        """The velocity of the state one step later."""
-        return self._driven(state, step, self.surroundings.solid(step, self.dt))
+    def velocity(self, state: SmokeState, step: int, solid: Solid | None = None) -> Velocity:
+        """The velocity of the state one step later, around what is solid."""
+        moved = self._self_advected(state.velocity, step)
+        if self.eddies is not None:
+            moved = self.eddies.kept(moved, state.density)
+        driven = moved.with_faces(self._with_forces(moved, state, step))
+        return project(driven) if solid is None else solid.projected(driven)
 
     def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
         """The simulation in a larger box with what is placed there.
@@ -106,13 +110,6 @@ class Simulation:
         inflow = replace(self.inflow, first=first)
         fire = None if self.fire is None else replace(self.fire, feed=np.pad(self.fire.feed, ends))
         return replace(self, inflow=inflow, surroundings=surroundings, fire=fire)
-
-    def _driven(self, state: SmokeState, step: int, solid: Solid | None) -> Velocity:
-        moved = self._self_advected(state.velocity, step)
-        if self.eddies is not None:
-            moved = self.eddies.kept(moved, state.density)
-        driven = moved.with_faces(self._with_forces(moved, state, step))
-        return project(driven) if solid is None else solid.projected(driven)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
         moved = advect(values, velocity, self.dt, conserve=True)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.direct import Ball, Simulation, SmokeState
+from smokelift.direct import Ball, Continuation, Simulation, SmokeState, continue_sequence
 from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
+from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed
 from smokelift.transport import Velocity
@@ -80,3 +81,19 @@ def write_plume(directory: Path, frames: int = 10, burning: bool = False) -> Non
     with SequenceWriter(directory, replace(SCENE, medium=medium), {"quality": "draft"}, npz=True) as writer:
         for number, state in enumerate(plume(burning)[:frames], 1):
             writer.write(number, state.density, state.velocity.faces, {"psnr": 30.0}, flame=state.flame)
+
+
+def run(
+    source: Sequence, out: Path, continuation: Continuation, *, last: int | None = None, resume: bool = False
+) -> Sequence:
+    """Continue a sequence, at most to a frame."""
+    for number, _ in continue_sequence(source, out, continuation, npz=True, resume=resume):
+        if number == last:
+            break
+    return Sequence.open(out)
+
+
+def run_twice(source: Sequence, folder: Path, continuation: Continuation, last: int) -> tuple[Sequence, Sequence]:
+    """Continue a sequence in one go, and in two: stopped after a frame, and gone on with."""
+    run(source, folder / "stopped", continuation, last=last)
+    return run(source, folder / "whole", continuation), run(source, folder / "stopped", continuation, resume=True)

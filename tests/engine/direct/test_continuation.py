@@ -3,19 +3,14 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Continuation, Fan, continue_sequence, loop_sequence, open_source, retime_sequence
+from smokelift.direct import Ball, Continuation, Fan, loop_sequence, open_source, retime_sequence
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
-from tests.engine.direct.rising import plume, write_plume
-
-
-def run(source, out, continuation, **options):
-    return [number for number, _ in continue_sequence(source, out, continuation, npz=True, **options)]
+from tests.engine.direct.rising import plume, run, run_twice, write_plume
 
 
 def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tmp_path):
-    assert run(source, tmp_path / "out", Continuation(5)) == list(range(1, 16))
-    made = Sequence.open(tmp_path / "out")
+    made = run(source, tmp_path / "out", Continuation(5))
     assert made.complete
     assert made.frames == tuple(range(1, 16))
     for number in source.frames:
@@ -32,23 +27,12 @@ def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tm
 
 
 def test_a_given_buoyancy_and_dissipation_count(source, tmp_path):
-    for name, buoyancy, dissipation in (("up", 6.0, 0.0), ("down", -6.0, 1.0)):
-        run(source, tmp_path / name, Continuation(6, buoyancy=buoyancy, dissipation=dissipation))
-    up, down = (Sequence.open(tmp_path / name) for name in ("up", "down"))
+    up = run(source, tmp_path / "up", Continuation(6, buoyancy=6.0, dissipation=0.0))
+    down = run(source, tmp_path / "down", Continuation(6, buoyancy=-6.0, dissipation=1.0))
     assert up.velocity(16).faces[2].mean() > down.velocity(16).faces[2].mean()
     assert up.density(16).sum() > 1.1 * down.density(16).sum()
     assert down.figures(16)["buoyancy"] == -6
     assert "given buoyancy and dissipation" in down.provenance[-1]["how"]
-
-
-def run_twice(source, folder, continuation, last):
-    """Continue a sequence in one go, and in two: stopped after a frame, and gone on with."""
-    run(source, folder / "whole", continuation)
-    for number, _ in continue_sequence(source, folder / "stopped", continuation, npz=True):
-        if number == last:
-            break
-    run(source, folder / "stopped", continuation, resume=True)
-    return Sequence.open(folder / "whole"), Sequence.open(folder / "stopped")
 
 
 def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
@@ -80,12 +64,8 @@ def test_fire_goes_on_and_fades_with_the_smoke(tmp_path):
 
 def test_sides_become_walls(source, tmp_path):
     walls = ("x-", "x+", "y-", "y+", "z+")
-    for number, _ in continue_sequence(source, tmp_path / "shut", Continuation(4, closed=walls), npz=True):
-        if number == 12:
-            break
-    run(source, tmp_path / "shut", Continuation(4, closed=walls), resume=True)
-    run(source, tmp_path / "open", Continuation(4))
-    shut, open_ = (Sequence.open(tmp_path / name).velocity(14).faces for name in ("shut", "open"))
+    _, stopped = run_twice(source, tmp_path, Continuation(4, closed=walls), 12)
+    shut, open_ = (made.velocity(14).faces for made in (stopped, run(source, tmp_path / "open", Continuation(4))))
     assert not any(np.take(shut[axis], (0, -1), axis).any() for axis in range(3))
     assert all(np.take(open_[axis], (0, -1), axis).any() for axis in range(3))
 
