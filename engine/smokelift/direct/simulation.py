@@ -4,7 +4,7 @@ A step of dt from density rho and velocity u to rho' and u', in the convention o
 the frame before to this one:
 
     u'   = Project(K(advect(u - a, u)) + dt (b rho up) + a'), in inlets and fans with their own velocity
-    rho' = exp(-d dt) M(advect(rho, u')), in inlets with their own density
+    rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
 
 where a is the ambient velocity: wind and turbulence, which all air has in addition to the flow. Outside the box there
 is nothing else.
@@ -12,7 +12,7 @@ is nothing else.
 Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as are what enters
 (`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.burning`), which lifts nothing beside what b has.
 Advection keeps the mass, and MacCormack's correction the eddies that the grid shows. K gives small ones back what
-interpolation takes, and M mixes smoke as those do that the grid does not show (`smokelift.direct.turbulence`).
+interpolation takes (`smokelift.direct.turbulence`).
 """
 
 from __future__ import annotations
@@ -112,10 +112,7 @@ class Simulation:
         return replace(self, inflow=inflow, surroundings=surroundings, fire=fire)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
-        moved = advect(values, velocity, self.dt, conserve=True)
-        if self.eddies is not None:
-            moved = self.eddies.mixed(moved, velocity.voxel_size, self.dt)
-        return _without_traces(moved, solid)
+        return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
 
     def _self_advected(self, velocity: Velocity, step: int) -> Velocity:
         """The velocity after it was advected by itself, without the ambient velocity."""

@@ -6,8 +6,7 @@ wave is a wave that swings across its own direction. A sum of waves is known at 
 True smoke has as much motion in each octave of sizes below a tenth of its width, about a seventh of its speed
 (docs/experiments/continuation.md). An estimated velocity lacks it, and smoke that a smooth velocity carries is drawn
 out into sheets and threads. `SmallEddies` makes up what is missing, and keeps it at that level, which interpolation
-takes away (backscatter: Mason and Thomson 1992). What is smaller than a voxel mixes the smoke, as in large eddy
-simulation.
+takes away (backscatter: Mason and Thomson 1992).
 """
 
 from __future__ import annotations
@@ -100,18 +99,12 @@ class _Octave(NamedTuple):
 SIZES = (_Octave(3, 2.2), _Octave(7, 4.0), _Octave(13, 8.0), _Octave(27, 16.0))
 """Voxels, from the finest on; what is larger the estimate shows."""
 
-INTENSITY = 0.18
+INTENSITY = 0.23
 """Speed of an octave's eddies, of each component, over that of a clip's smoke: .14 of the true one, of which estimates
-show .6 to .7; between both (docs/experiments/continuation.md)."""
+show .6 (docs/experiments/continuation.md)."""
 
 LARGEST_GAIN = np.float32(1.25)
 """Of an octave in a step: eddies grow as smoke is stirred, and do not appear."""
-
-MIXING = 0.1
-"""Diffusivity over the speed of the eddies and the length of a voxel (Deardorff 1980)."""
-
-LARGEST_SHARE = 0.25
-"""Of a voxel's smoke that a neighbor takes over in a step, at which the explicit step does not swing."""
 
 IN_SMOKE = np.float32(0.05)
 """Fraction of the largest density above which a voxel is in the smoke."""
@@ -152,14 +145,6 @@ class SmallEddies:
                 gain = min(np.float32(3**0.5 * self.speed / square**0.5), LARGEST_GAIN)
                 faces = [u + (gain - 1) * weight * part for u, weight, part in zip(faces, near, found, strict=True)]
         return velocity.with_faces(faces)
-
-    def mixed(self, values: Array, voxel_size: float, dt: float) -> Array:
-        """A density or an emission (nx, ny, nz) after smaller eddies have mixed it for a time in seconds."""
-        share = min(MIXING * self.speed * dt / voxel_size, LARGEST_SHARE)
-        mixed = values
-        for axis in range(3):
-            mixed = ndimage.correlate1d(mixed, [share, 1 - 2 * share, share], axis)
-        return mixed
 
 
 def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:

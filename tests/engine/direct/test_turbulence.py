@@ -9,7 +9,7 @@ from smokelift.direct import Simulation, SmokeState, Turbulence
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import INTENSITY, MIXING, SmallEddies
+from smokelift.direct.turbulence import INTENSITY, SmallEddies
 from smokelift.transport import Velocity, at_centres, divergence, project
 from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
 
@@ -106,17 +106,6 @@ def test_a_velocity_that_has_its_eddies_gains_none():
     full = stirred(2.2, 4, 8)
     found = SmallEddies(0.05).kept(full.velocity, full.density)
     np.testing.assert_array_equal(found.faces[2], full.velocity.faces[2])
-
-
-def test_small_eddies_mix_smoke_and_keep_its_mass():
-    smoke = np.zeros((9, 9, 9), np.float32)
-    smoke[4, 4, 4] = smoke[0, 4, 4] = 1
-    found = SmallEddies(1.0).mixed(smoke, voxel_size=0.05, dt=0.1)
-    assert found.sum() == pytest.approx(2, rel=1e-6)
-    places = np.arange(9) - 4.0
-    spread = np.vdot(found[2:].sum((0, 1)), places**2) / found[2:].sum()
-    assert spread == pytest.approx(2 * MIXING * 1.0 * 0.1 / 0.05)
-    assert SmallEddies(100.0).mixed(smoke, voxel_size=0.05, dt=0.1).min() >= 0
 
 
 def test_still_air_gains_no_eddies():
