@@ -2,10 +2,10 @@
 
     python -m benchmarks.direct.detail CONTINUED ...
 
-References are four of the clip's last twelve frames, from the front. Patches: `PatchStatistics.distance`. Edges: mean
-gradient over that of the clip. Lines: how much of the detail finer than four voxels runs in one direction over four
-voxels, as sheets and threads do (coherence of the structure tensor). Octaves: energy of the detail from 0 to 1, 1 to 2
-and 2 to 4 voxels over the clip's, in dB. Rise of the center of mass in m/s.
+References are four of the clip's last twelve frames, from the front. Patches and texture: `PatchStatistics`. Edges:
+mean gradient over that of the clip. Lines: how much of the detail finer than four voxels runs in one direction over
+four voxels, as sheets and threads do (coherence of the structure tensor). Octaves: energy of the detail from 0 to 1, 1
+to 2 and 2 to 4 voxels over the clip's, in dB. Rise of the center of mass in m/s.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from smokelift.evaluation.metrics import PatchStatistics, mean_gradient
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array
 
-HEADER = ["sequence", "frame", "view", "patches", "edges", "lines", "0 to 1", "1 to 2", "2 to 4", "mass", "rise"]
+COMPARED = ["patches", "texture", "edges", "lines", "0 to 1", "1 to 2", "2 to 4", "mass", "rise"]
 BACK = 12
 """Frames of the clip that are compared, every fourth of them, and over which it rises."""
 AFTER = 12, 24
@@ -69,9 +69,11 @@ def rows(directory: Path) -> list[list[str]]:
         rise = (height(density) - height(clip[since])) * speed / (number - since)
         mass = density.sum(dtype=np.float64) / clip[seam].sum(dtype=np.float64)
         for name, picture in views(density).items():
-            patches = np.mean([PatchStatistics.of(picture).distance(each) for each in statistics])
+            own = PatchStatistics.of(picture)
+            patches = np.mean([own.distance(each) for each in statistics])
+            texture = np.mean([own.texture_distance(each) for each in statistics])
             decibels = 10 * np.log10(octaves(picture) / energy)
-            figures = [patches, mean_gradient(picture) / sharp, lines(picture)]
+            figures = [patches, texture, mean_gradient(picture) / sharp, lines(picture)]
             found.append([directory.name, f"+{number - seam}", name, *(f"{each:.2f}" for each in figures)])
             found[-1] += [*(f"{each:.1f}" for each in decibels), f"{mass:.2f}", f"{rise:.2f}"]
     return found
@@ -81,7 +83,8 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sequences", nargs="+", type=Path, metavar="CONTINUED")
-    print(markdown(HEADER, [row for directory in parser.parse_args().sequences for row in rows(directory)]))
+    found = [row for directory in parser.parse_args().sequences for row in rows(directory)]
+    print(markdown(["sequence", "frame", "view", *COMPARED], found))
 
 
 if __name__ == "__main__":

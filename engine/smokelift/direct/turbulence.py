@@ -104,7 +104,7 @@ INTENSITY = 0.23
 show .6 (docs/experiments/continuation.md)."""
 
 LARGEST_GAIN = np.float32(1.25)
-"""Of an octave in a step: eddies grow as smoke is stirred, and do not appear."""
+"""Largest gain of an octave in a step: eddies grow as smoke is stirred, and do not appear."""
 
 IN_SMOKE = np.float32(0.05)
 """Fraction of the largest density above which a voxel is in the smoke."""
@@ -121,12 +121,12 @@ class SmallEddies:
 
     @staticmethod
     def of(states: Sequence[SmokeState]) -> SmallEddies:
-        """Those of a clip's smoke, by some of its states."""
+        """The eddies that a clip's smoke should have, by some of its states."""
         squares = [sum(_mean_squares(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3)) for m in states]
         return SmallEddies(INTENSITY * float(np.median(squares)) ** 0.5)
 
     def begun(self, state: SmokeState) -> SmokeState:
-        """A state with those that it lacks."""
+        """A state with the eddies that it lacks."""
         velocity, faces = state.velocity, list(state.velocity.faces)
         smoke, near = _on_faces(state.density)
         for seed, (octave, found) in enumerate(_octaves(velocity)):

@@ -16,12 +16,12 @@ def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tm
     for number in source.frames:
         assert made.files(number)["npz"].read_bytes() == source.files(number)["npz"].read_bytes()
     assert made.figures(3)["psnr"] == 30
-    # ours goes on as the simulation that made the clip did, although the inlet is only found
+    # ours goes on as the simulation that made the clip did, although the inlet is only found, and eddies are made up
     true = plume()[14].density
     part = source.scene.domain.slices_in(made.scene.domain)
     error = np.linalg.norm(made.density(15)[part] - true) / np.linalg.norm(true)
     held = np.linalg.norm(source.density(10) - true) / np.linalg.norm(true)
-    assert error < 0.5 * held
+    assert error < 0.6 * held
     assert made.provenance[-1]["origin"] == "made up"
     assert "Frames 11 to 15" in made.provenance[-1]["how"]
 
