@@ -168,10 +168,10 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy
         draw_text(box, context, job.sentence, "INFO")
     if run.icon:
         box.template_icon(icon_value=run.icon, scale=8.0)
-    if not job.ended:
-        return
     for kind, words in job.doubts if own else ():
         draw_doubt(box, context, kind, words)
+    if not job.ended:
+        return
     if own and job.outcome == "done" and run.take != volume.shown_take(shown):  # after an undo to before it
         box.operator("smokelift.show_take", icon="HIDE_OFF").take = name
     box.operator("smokelift.open_log", icon="TEXT").take = name

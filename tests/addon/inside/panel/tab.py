@@ -222,7 +222,7 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
         places.append(buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view)))
     assert len(set(places)) == 1
     texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
-    assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 2
+    assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 4
     assert {"[track_clip]", "[show_take]"} <= set(texts)
     for run in runs:
         run.smoke += 1
