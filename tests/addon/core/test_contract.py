@@ -124,6 +124,12 @@ def test_a_sequence_has_the_pictures_that_the_engine_finds(tmp_path, names) -> N
             assert found == ImageSequence(len(files), tuple(file.name for file in files if not file.is_file()))
 
 
+def test_a_sequence_is_seen_with_what_it_lacks(tmp_path) -> None:
+    for n in (17, 18, 20, 21):
+        (tmp_path / f"frame_{n:04d}.png").touch()
+    assert image_sequence_from(tmp_path / "frame_0017.png") == ImageSequence(5, ("frame_0019.png",))
+
+
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]))
 NUMBERS = st.integers(-(2**31), 2**31) | st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=False)
 VALUES = st.recursive(TEXTS | NUMBERS, lambda inner: st.lists(inner, max_size=4), max_leaves=8)
