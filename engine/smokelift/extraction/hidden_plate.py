@@ -4,9 +4,9 @@ A plate that was found in a clip is continued from its surroundings where no fra
 of what is there, in each frame another part. The turns start from the plate that explains all frames best: in each of
 them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T, and it goes on from what is known around it,
 above and below it, or on its sides, unless it is an object there. Then what an element leaves of a picture,
-(I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to
-the last shows next to nothing, and what is behind it stays as it was. Of the J that is found before the turns and the
-one found after them, that with which the frames are likelier is the smoke's.
+(I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to the last shows
+next to nothing, and what is behind it stays as it was. Of the J that is found before the turns and the one found after
+them, that with which the frames are likelier is the smoke's.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MIXTURES = np.linspace(0, 1, 6)
 CANDIDATES = 1.0, 0.6, 0.36
 """Values of T for which each frame proposes a plate."""
 
-ALIKE = 2.0
+NEIGHBORHOOD = 2.0
 """Standard deviation, in cells, of the Gaussian over which neighbors decide together: T of elements of eleven composed
 clips is off by .164, .159 and .158 with 1, 2 and 4, and by .162 cell by cell."""
 
@@ -115,21 +115,21 @@ def _likeliest(
     frames = [Cells.of(picture, plate, size) for picture in pictures]
     start = frames[0].behind
     where = frames[0].unknown > MIN_UNKNOWN
-    continued = _continued(start, ~where)[:, where]
+    continued = _continuations(start, ~where)[:, where]
     seen = [(cells.seen[where].astype(np.float64), cells.noise[where].mean(-1, dtype=np.float64)) for cells in frames]
     light = np.asarray(source, np.float64)
     low, high = _range_of(plate)
     proposed = (np.clip((values - (1 - t) * light) / t, low, high) for values, _ in seen for t in CANDIDATES)
-    nearby = blurred(where.astype(np.float32), ALIKE)[where]
+    nearby = blurred(where.astype(np.float32), NEIGHBORHOOD)[where]
     best, least = continued[0], np.full(continued.shape[1], np.inf)
     for each in (*continued, *proposed):
-        loss = _unlike(each, continued, plate.errors, high - low)
+        loss = _prior_loss(each, continued, plate.errors, high - low)
         for values, noise in seen:
             misfits = [_misfit(values - t * each, (1 - t) * light, noise) for t in MIXTURES]
             loss += INDEPENDENT / FRAMES * np.min(misfits, axis=0)
         whole = np.zeros(where.shape, np.float32)
         whole[where] = loss
-        loss = blurred(whole, ALIKE)[where] / nearby
+        loss = blurred(whole, NEIGHBORHOOD)[where] / nearby
         better = loss < least
         best, least = np.where(better[:, None], each, best), np.minimum(loss, least)
     found = start.copy()
@@ -137,7 +137,7 @@ def _likeliest(
     return found, float(least.mean())
 
 
-def _continued(plate: Picture, known: Mask) -> NDArray[np.float64]:
+def _continuations(plate: Picture, known: Mask) -> NDArray[np.float64]:
     """A plate (rows, columns, 3) as it is, and continued from the nearest cells that are ``known`` along its lines.
 
     Shape (3, rows, columns, 3): to all sides, up and down, to the left and right. Lines without known cells stay.
@@ -151,7 +151,7 @@ def _continued(plate: Picture, known: Mask) -> NDArray[np.float64]:
     return found
 
 
-def _unlike(plate: Picture, continued: NDArray[np.float64], errors: Picture, extent: Picture) -> Picture:
+def _prior_loss(plate: Picture, continued: NDArray[np.float64], errors: Picture, extent: Picture) -> Picture:
     """The loss (n,) of a plate (n, 3) by its continuations (continuations, n, 3), one of which is right but for errors.
 
     These are normal, of a covariance (3, 3). An `OBJECT` that no continuation shows has any color of an extent (3,).
