@@ -11,7 +11,7 @@ namespace {
 
 using Point = std::array<float, 3>;
 
-SMOKELIFT_INLINE Point centre_velocity(const StaggeredIn &u, int i, int j, int k) {
+SMOKELIFT_INLINE Point center_velocity(const StaggeredIn &u, int i, int j, int k) {
     const float *z = u[2].row(i, j) + k;
     return {0.5f * (u[0].row(i, j)[k] + u[0].row(i + 1, j)[k]),
             0.5f * (u[1].row(i, j)[k] + u[1].row(i, j + 1)[k]), 0.5f * (z[0] + z[1])};
@@ -84,7 +84,7 @@ SMOKELIFT_INLINE float limited(const float *row, const Corners &at, float value)
     return std::min(std::max(value, low), high);
 }
 
-// 0 beyond the sides of the box, half a cell from the outermost centres; else 1. A condition in its place
+// 0 beyond the sides of the box, half a cell from the outermost centers; else 1. A condition in its place
 // would keep loops from vector code.
 SMOKELIFT_INLINE float inside(const Shape &n, float x, float y, float z) {
     return float((x >= -0.5f) & (x <= float(n[0]) - 0.5f) & (y >= -0.5f) & (y <= float(n[1]) - 0.5f) &
@@ -226,7 +226,7 @@ void advect(In a, const Velocity &velocity, const std::vector<Span> &spans, bool
 
 void advect_cells(In field, const StaggeredIn &displacement, bool extend, bool corrected, Out result,
                   Workers &workers) {
-    const auto velocity = [&](int i, int j, int k) { return centre_velocity(displacement, i, j, k); };
+    const auto velocity = [&](int i, int j, int k) { return center_velocity(displacement, i, j, k); };
     const std::vector<Span> spans = spans_within(field, reach_of(displacement, workers), workers);
     advect(field, velocity, spans, extend, corrected, result, workers);
 }

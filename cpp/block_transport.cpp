@@ -3,7 +3,7 @@
 // Math. Math. Phys. 16, 10). A beam meets blocks whole, so nothing is interpolated and no energy is lost.
 //
 // Emission and radiance are linear across a block: in thick smoke light changes within a block, and a mean
-// alone would spread it too deep. On a path of length l through the block's centre, at u from -1/2 to 1/2,
+// alone would spread it too deep. On a path of length l through the block's center, at u from -1/2 to 1/2,
 // with the emission e + r u, the beam L_in that enters a block becomes
 //     L_out = T L_in + l (P e + Q r),    mean along the path     = P L_in + l (B e - Q/t r),
 //                                        mean of u along the path = -Q L_in + l (Q/t e + C r).
@@ -113,7 +113,7 @@ SMOKELIFT_INLINE Shares share_derivatives(float t) {
             thin ? SLANTED_DERIVATIVE(low) : thick.slanted, thin ? TILTED_DERIVATIVE(low) : thick.tilted};
 }
 
-// Neighbouring blocks. Rows are short, and compilers leave short loops and the rest of long ones scalar.
+// Neighboring blocks. Rows are short, and compilers leave short loops and the rest of long ones scalar.
 constexpr int LANES = Lattice::LANES;
 typedef float Lanes __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
 
@@ -128,7 +128,7 @@ template <class Visit> SMOKELIFT_INLINE void by_lanes(int count, const Visit &vi
     visit(count - LANES);
 }
 
-std::unique_ptr<float[]> uninitialised(std::size_t size) { return std::unique_ptr<float[]>(new float[size]); }
+std::unique_ptr<float[]> uninitialized(std::size_t size) { return std::unique_ptr<float[]>(new float[size]); }
 
 // What arrives along a line of the lattice, both ways: L of the emission, M of the weights taken for one. The
 // optical depth t of a block changes <weights, G emission>, by the beam that crosses it there and the one
@@ -154,7 +154,7 @@ struct Beams {
 class Arriving {
 public:
     Arriving(int lines, std::size_t count)
-        : size_(lines * count), count_(count), memory_(uninitialised(4 * size_)) {}
+        : size_(lines * count), count_(count), memory_(uninitialized(4 * size_)) {}
 
     float *of_emission(int way) { return part(way > 0 ? 0 : 1); }
     float *of_weights(int way) { return part(way > 0 ? 2 : 3); }
@@ -244,7 +244,7 @@ void BlockTransport::differentiate(const Crossing &c, DepthDerivatives &derivati
     }
 }
 
-// Follows the beams of the axis x or y, one way. visit(first, count, arriving) gets neighbouring blocks with
+// Follows the beams of the axis x or y, one way. visit(first, count, arriving) gets neighboring blocks with
 // what enters them of all that is carried.
 template <class Visit>
 SMOKELIFT_INLINE void BlockTransport::follow_rows(int axis, int way, const float *emission,
@@ -365,7 +365,7 @@ SMOKELIFT_CLONES
 void BlockTransport::through_axis(int axis, const float *emission, float *mean) const {
     const Crossing &crossing = classes_[0];
     const std::size_t all = lattice_.count();
-    const auto memory = uninitialised(CARRIED * all);
+    const auto memory = uninitialized(CARRIED * all);
     float *const arrived = memory.get();
     follow_axis(axis, 1, emission,
                 [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
@@ -436,7 +436,7 @@ void BlockTransport::gather(const float *emission, const float *parts, float *me
 
 void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &workers) const {
     const std::size_t all = lattice_.count();
-    const auto memory = uninitialised((AXES * FIELDS + WAYS * DIAGONAL_FIELDS) * all);
+    const auto memory = uninitialized((AXES * FIELDS + WAYS * DIAGONAL_FIELDS) * all);
     float *const parts = memory.get(), *const diagonals = parts + AXES * FIELDS * all;
     workers.run(AXES + WAYS, [&](int task) {
         if (task < WAYS)
@@ -534,7 +534,7 @@ void BlockTransport::add_extinction_gradient(const float *emission, const float 
     Own own_derivative = {Fields(all), Fields(all)};
     for (int number = 0; number < 2; ++number)
         differentiate(classes_[number], derivatives[number], own_derivative);
-    const auto memory = uninitialised((AXES + 1) * all);
+    const auto memory = uninitialized((AXES + 1) * all);
     float *const parts = memory.get();
     workers.run(AXES + 1, [&](int task) {
         if (task == AXES)

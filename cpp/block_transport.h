@@ -12,7 +12,7 @@
 namespace smokelift {
 
 // Where blocks lie in memory, [x][y][z] with z fastest: behind each row and behind each plane across x is a
-// border, which nothing leaves. It is also what lies before the next, so that the neighbour in any direction
+// border, which nothing leaves. It is also what lies before the next, so that the neighbor in any direction
 // is one offset away, and a whole plane is one loop.
 struct Lattice {
     static constexpr int LANES = 8; // blocks that loops take at once, no row being shorter
@@ -60,7 +60,7 @@ private:
         float along, across;  // directions of the class: that a slope lies along, and across
         Fields passed, escaped, slanted;
 
-        // The shares of neighbouring blocks from one on.
+        // The shares of neighboring blocks from one on.
         struct Row {
             const float *passed, *escaped, *slanted;
         };

@@ -39,7 +39,7 @@ std::size_t row_of(const Blocks &blocks, int x, int y) {
     return (std::size_t(x) * blocks.n[1] + y) * blocks.n[2];
 }
 
-// Distance of a voxel's centre from that of its block, over the mean square of those of all voxels, in
+// Distance of a voxel's center from that of its block, over the mean square of those of all voxels, in
 // blocks: the slope of the straight line that fits a block's values best is the mean of the values times
 // this.
 float lever_of(const Blocks &blocks, int axis, int voxel) {
@@ -174,7 +174,7 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
                 out[z * width] += memory[z];
             for (int channel = 0; channel < width - 1; ++channel) {
                 const float *const emission_gradient = memory.data() + (1 + 2 * channel) * length;
-                if (width == 2) // neighbours in memory
+                if (width == 2) // neighbors in memory
                     add_products(span, voxel, emission_gradient, along_y, length, 2, 1, out);
                 else
                     add_products(span, voxel, emission_gradient, along_y, length, width, channel + 1, out);
@@ -183,7 +183,7 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
     }
 }
 
-// A channel on the rows of voxels through the centres of blocks in a plane across x: for each row of blocks
+// A channel on the rows of voxels through the centers of blocks in a plane across x: for each row of blocks
 // the values, and their slope along y.
 SMOKELIFT_CLONES
 void expand(const float *fields, const Blocks &blocks, const Between &across_x,
@@ -232,7 +232,7 @@ void expand_adjoint(const float *rows, const Blocks &blocks, const std::vector<B
 }
 
 // What a row of voxels takes of the two rows of blocks beside it, of their values and of their slopes. At the
-// fraction t from one centre to the next it is (1 - t) (near + t near_slope) + t (far - (1 - t) far_slope).
+// fraction t from one center to the next it is (1 - t) (near + t near_slope) + t (far - (1 - t) far_slope).
 struct Mix {
     float near, near_slope, far, far_slope;
 
@@ -341,12 +341,12 @@ void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float facto
             const float *const mean = planes.data() + (std::size_t(x) * channels + channel) * PARTS * plane;
             for (int side = 0; side < 2; ++side) {
                 const float share = factor * (side ? across_x.fraction : 1 - across_x.fraction);
-                const float from_centre = share * (across_x.fraction - float(side));
+                const float from_center = share * (across_x.fraction - float(side));
                 float *const to =
                     values_gradient + channel * Blocks::FIELDS * count + (across_x.block + side) * plane;
                 for (std::size_t i = 0; i < plane; ++i) {
                     to[i] += share * mean[i];
-                    to[count + i] += from_centre * mean[i];
+                    to[count + i] += from_center * mean[i];
                     to[2 * count + i] += share * mean[plane + i];
                     to[3 * count + i] += share * mean[2 * plane + i];
                 }

@@ -8,7 +8,7 @@
 namespace smokelift {
 
 // Cubes of `size` voxels that cover a grid of voxels and reach half a block beyond it, so that every voxel
-// lies between the centres of eight. `offset` is the index of the grid's first voxel among those of the
+// lies between the centers of eight. `offset` is the index of the grid's first voxel among those of the
 // first block.
 struct Blocks {
     Shape n{};
@@ -31,7 +31,7 @@ void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blo
                      const float *means_gradient, const Voxels &gradient, Workers &workers);
 
 // J += factor x values, by channel linear across blocks: what the eight blocks around a voxel say of it,
-// weighted as between their centres.
+// weighted as between their centers.
 void add_interpolated(const float *values, float factor, const Blocks &blocks, const Voxels &medium,
                       const Spans &spans, Workers &workers);
 

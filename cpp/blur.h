@@ -15,7 +15,7 @@ namespace smokelift {
 void blur(In a, double width, double truncate, Out result, Workers &workers);
 
 // Smooths a picture (lines, columns, channels) down and across. `weights` are those of a pixel itself and of
-// its neighbours on either side, outwards; beyond its edges the picture is its own mirror image. Sums are of
+// its neighbors on either side, outwards; beyond its edges the picture is its own mirror image. Sums are of
 // double precision and in SciPy's order, every product rounded by itself (CMakeLists.txt).
 void blur_picture(const float *picture, const Extent &extent, const std::vector<double> &weights,
                   float *result);

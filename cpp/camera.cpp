@@ -10,7 +10,7 @@
 // Times the derivative of the loss by L and summed over the channels, J_s is `inscattered` and R_s is
 // `behind`, which starts as the derivative by the transmittance of the whole ray.
 //
-// Neighbouring rays go together, plane by plane: their samples lie in the same cache lines, and everything
+// Neighboring rays go together, plane by plane: their samples lie in the same cache lines, and everything
 // after the look-up is vector arithmetic. On the way back samples are first turned into derivatives, ray by
 // ray, and then added to the voxels plane by plane: each plane belongs to one task, so nothing is atomic.
 #include "camera.h"
@@ -32,7 +32,7 @@ template <int N> struct Floats {
     typedef float type __attribute__((vector_size(4 * N), aligned(4), may_alias));
 };
 
-// The values of a cell of four voxels, W floats each, mixed. Vectors: what one voxel holds, or two neighbours
+// The values of a cell of four voxels, W floats each, mixed. Vectors: what one voxel holds, or two neighbors
 // at once.
 template <int W, bool Adjacent>
 SMOKELIFT_INLINE void look_up(const float *at, Stride along_b, Stride along_c, float f, float g, float *out) {
@@ -399,7 +399,7 @@ void Rays::find_runs() {
         }
         close();
     }
-    // Tile by tile: rays of neighbouring rows look up the same cache lines.
+    // Tile by tile: rays of neighboring rows look up the same cache lines.
     std::sort(runs.begin(), runs.end(), [](const Run &a, const Run &b) {
         const auto place = [](const Run &r) {
             return std::array<int, 4>{r.row / TILE_ROWS, r.column / LANES, r.row, r.column};

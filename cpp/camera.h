@@ -10,7 +10,7 @@
 
 namespace smokelift {
 
-// Neighbouring pixels of a row whose rays have the same dominant axis and travel the same way along it.
+// Neighboring pixels of a row whose rays have the same dominant axis and travel the same way along it.
 struct Run {
     int row, column, count;
     int axis, travel;

@@ -26,9 +26,9 @@ typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
 constexpr float R2 = 1.22474487f, R6 = 0.70710678f; // sqrt(3 / 2), sqrt(3 / 6)
 constexpr float BASIS[3][2] = {{R2, R6}, {0, -2 * R6}, {-R2, R6}};
-constexpr float MIN_OPACITY = 0.03f; // at which J is linearised, so that J can move where no smoke is yet
+constexpr float MIN_OPACITY = 0.03f; // at which J is linearized, so that J can move where no smoke is yet
 constexpr float BRIGHTEST = 2;       // largest g
-constexpr float MAX_FIELD = 3;       // bound of the fields of J where they are linearised
+constexpr float MAX_FIELD = 3;       // bound of the fields of J where they are linearized
 constexpr float ENOUGH = 1e-3f;      // residual, as a share of the first, where a solve ends
 constexpr int WINDOW = 2;            // level whose cells tell how certain T is: four cells wide
 constexpr float SPREAD = 0.4f; // of the sum over a coefficient's cells, the energy of its bilinear weights
@@ -180,7 +180,7 @@ public:
 private:
     void expand(Values Level::*of);     // into fields_
     void collect_up(Values Level::*of); // from the finest level's values
-    void linearise(bool robust);
+    void linearize(bool robust);
     void precondition();
     double apply(Values Level::*of, Values Level::*result);
     double step(float size);
@@ -245,7 +245,7 @@ void Pyramid::collect_up(Values Level::*of) {
     }
 }
 
-void Pyramid::linearise(bool robust) {
+void Pyramid::linearize(bool robust) {
     expand(&Level::coefficients);
     const std::size_t cells = levels_[0].cells();
     for (std::size_t cell = 0; cell < cells; ++cell) {
@@ -448,7 +448,7 @@ void Pyramid::solve(int iterations) {
 void Pyramid::run(int rounds, int iterations) {
     for (int round = 0; round < rounds; ++round) {
         // what does not fit yet is no outlier
-        linearise(2 * round >= rounds);
+        linearize(2 * round >= rounds);
         precondition();
         solve(iterations);
     }

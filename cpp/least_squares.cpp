@@ -88,7 +88,7 @@ void LeastSquares::stress(Window &window, bool irrotational, int i) const {
         }
         smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
                         window.vorticity(std::min(i + 1, nx - 1))[c], low, box_.cells,
-                        regularisation_.second_order, pointwise, out);
+                        regularization_.second_order, pointwise, out);
     }
 }
 
@@ -105,7 +105,7 @@ void LeastSquares::along(Window &window, const StaggeredIn &u, In offset, int i)
 
 // Slab i of the result from what the window holds around it; returns its scalar product with u.
 double LeastSquares::finish(Window &window, const StaggeredIn &u, const StaggeredOut &result, int i) const {
-    const Regularisation &r = regularisation_;
+    const Regularization &r = regularization_;
     Out3 out{};
     for (int c = 0; c < 3; ++c)
         if (i < u[c].n[0]) {
@@ -161,9 +161,9 @@ double LeastSquares::apply(const StaggeredIn &u, const StaggeredOut &result, Wor
     return sweep(u, {}, result, workers);
 }
 
-StaggeredField LeastSquares::right_hand_side(In offset, const StaggeredIn &centre, Workers &workers) const {
+StaggeredField LeastSquares::right_hand_side(In offset, const StaggeredIn &center, Workers &workers) const {
     StaggeredField b(box_);
-    sweep(centre, offset, b.out(), workers);
+    sweep(center, offset, b.out(), workers);
     return b;
 }
 
@@ -190,8 +190,8 @@ std::array<double, 3> LeastSquares::symbol(Workers &workers) const {
             sum += value;
         return sum;
     });
-    return {regularisation_.kinetic + data / cells, regularisation_.first_order + irrotational / cells,
-            regularisation_.second_order};
+    return {regularization_.kinetic + data / cells, regularization_.first_order + irrotational / cells,
+            regularization_.second_order};
 }
 
 // Of the data term's part in the diagonal what cell (x, y, z) adds for each of its faces across axis c.
@@ -215,8 +215,8 @@ Field LeastSquares::irrotational_edges(int c) const {
 StaggeredField LeastSquares::diagonal(Workers &workers) const {
     StaggeredField diagonal(box_);
     const StaggeredOut out = diagonal.out();
-    const Regularisation &r = regularisation_;
-    // Differences of the vorticity: 4 edges times 6 neighbours, and 4 for pairs of edges.
+    const Regularization &r = regularization_;
+    // Differences of the vorticity: 4 edges times 6 neighbors, and 4 for pairs of edges.
     const float everywhere = 6 * r.first_order + 28 * r.second_order + r.kinetic;
     const std::array<Field, 3> edges{irrotational_edges(0), irrotational_edges(1), irrotational_edges(2)};
     for (int c = 0; c < 3; ++c) {

@@ -1,4 +1,4 @@
-// The linearised estimate of a velocity: a quadratic function of the face velocities, in cells per frame.
+// The linearized estimate of a velocity: a quadratic function of the face velocities, in cells per frame.
 #pragma once
 
 #include "grid.h"
@@ -6,29 +6,29 @@
 
 namespace smokelift {
 
-struct Regularisation {
+struct Regularization {
     float first_order = 0;  // times the squared differences of each component
     float second_order = 0; // times the squared differences of the vorticity
     float kinetic = 0;      // times the squared velocity
 };
 
-//     E(u) = sum over cells of weight (offset + direction . u)^2 + irrotational |curl u|^2 + R(u - centre),
-//     R(v) = the three terms of Regularisation
+//     E(u) = sum over cells of weight (offset + direction . u)^2 + irrotational |curl u|^2 + R(u - center),
+//     R(v) = the three terms of Regularization
 //
-// with `direction`, `offset`, `weight` and `irrotational` at cell centres, (nx, ny, nz).
+// with `direction`, `offset`, `weight` and `irrotational` at cell centers, (nx, ny, nz).
 //
 // E(u) = u.Au - 2 b.u + constant with A symmetric and positive definite if kinetic > 0.
 class LeastSquares {
 public:
     // What is passed here has to outlive this object.
     LeastSquares(const Box &box, const In3 &direction, In weight, In irrotational,
-                 const Regularisation &regularisation)
-        : box_(box), regularisation_(regularisation), direction_(direction), weight_(weight),
+                 const Regularization &regularization)
+        : box_(box), regularization_(regularization), direction_(direction), weight_(weight),
           irrotational_(irrotational) {}
 
     double apply(const StaggeredIn &u, const StaggeredOut &result,
                  Workers &workers) const; // A u; returns u.Au
-    StaggeredField right_hand_side(In offset, const StaggeredIn &centre, Workers &workers) const; // b
+    StaggeredField right_hand_side(In offset, const StaggeredIn &center, Workers &workers) const; // b
     StaggeredField diagonal(Workers &workers) const; // of A, as it is away from the sides
 
     // Coefficients of k^0, k^2 and k^4 of a problem with constant coefficients that resembles this one.
@@ -47,7 +47,7 @@ private:
     Field irrotational_edges(int c) const;
 
     Box box_;
-    Regularisation regularisation_;
+    Regularization regularization_;
     In3 direction_;
     In weight_, irrotational_;
 };

@@ -36,7 +36,7 @@ struct PointLight {
         int first_p, count_p, first_q, count_q; // columns that meet the grid, along the two other axes
     };
 
-    std::array<double, 3> position{}; // in grid coordinates, voxel centres at integers
+    std::array<double, 3> position{}; // in grid coordinates, voxel centers at integers
     std::array<float, 3> energy{};    // intensity by channel over the voxel edge squared, W/m^2
     float voxel_size = 0;             // m
     std::vector<Face> faces;

@@ -9,7 +9,7 @@
 
 namespace smokelift {
 
-// Neighbours along z are marked together, so that a stretch stands for many indices: what is read or written
+// Neighbors along z are marked together, so that a stretch stands for many indices: what is read or written
 // is copied from memory to memory.
 class MarkedVoxels {
 public:

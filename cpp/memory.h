@@ -14,7 +14,7 @@
 
 namespace smokelift {
 
-// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its
+// Leaves numbers uninitialized, so that the threads that fill an array are also those that first touch its
 // pages. A large array has pages of its own, which hold zeros and go back to the system with the array. They
 // are large pages where the system has them: in small ones the look-ups of rays would cost as much again.
 template <class T> struct LazyPages {

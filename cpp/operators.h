@@ -24,11 +24,11 @@ void add_curl_transposed_slab(const In3 &edges, const In3 &after, const Out3 &fa
 
 // result = weight (-laplace a) + pointwise * a on rows and columns [low, high) of a slab `a` with those
 // before and after it; natural ends: the quadratic form of -laplace is the sum of squared differences between
-// neighbours within the box, so that beside an end the slab is its own neighbour. `pointwise` may be empty.
+// neighbors within the box, so that beside an end the slab is its own neighbor. `pointwise` may be empty.
 void smoothness_slab(In before, In a, In after, const Shape &low, const Shape &high, float weight,
                      In pointwise, Out result);
 
-// Velocity at cell centres times `direction`, that is, the mean of two faces per axis.
+// Velocity at cell centers times `direction`, that is, the mean of two faces per axis.
 void directional_slab(const In3 &faces, const In3 &direction, Out cells, int i);
 
 // The slab of faces += transpose of directional_slab, from slab i of the cells and the one before it; one of

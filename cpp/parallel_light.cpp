@@ -7,7 +7,7 @@
 // the running sum is that of the light that travels the other way, so the adjoint is the sweep of the
 // reversed light.
 //
-// Columns do not depend on each other, so a task takes some neighbouring rows of them through all planes and
+// Columns do not depend on each other, so a task takes some neighboring rows of them through all planes and
 // keeps its running sums in the cache; the row that two tasks share is computed by both.
 #include "lighting.h"
 
@@ -121,7 +121,7 @@ public:
         }
     }
 
-    // visit(k, i, first, end, depth) for the rows of voxels between these columns: sums up to their centres,
+    // visit(k, i, first, end, depth) for the rows of voxels between these columns: sums up to their centers,
     // that is with half of the plane's own value.
     template <class Visit> SMOKELIFT_INLINE void visit_voxels(const Visit &visit) const {
         const float f = fraction_b_, g = fraction_c_;

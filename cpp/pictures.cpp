@@ -22,7 +22,7 @@ struct PixelRow {
     SMOKELIFT_INLINE PixelRow(const PictureMap &map, int i, int j) {
         for (int c = 0; c < 3; ++c) {
             const auto &m = map.to_pixel[c];
-            start[c] = std::fma(map.centres[1][j], m[1], map.centres[0][i] * m[0]);
+            start[c] = std::fma(map.centers[1][j], m[1], map.centers[0][i] * m[0]);
             along[c] = m[2];
             end[c] = m[3];
         }
@@ -45,7 +45,7 @@ SMOKELIFT_INLINE Place place_of(const PixelRow &line, double z, int rows, int co
 }
 
 SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int k) {
-    return place_of(line, map.centres[2][k], map.rows, map.columns);
+    return place_of(line, map.centers[2][k], map.rows, map.columns);
 }
 
 SMOKELIFT_INLINE int pixel(float place, int count) {
@@ -116,7 +116,7 @@ void mark_plane(const PictureMap &map, const unsigned char *picture, const Marke
         const PixelRow line(map, i, j);
         for (int begin = 0; begin < n[2]; begin += RUN) {
             const int end = std::min(begin + RUN, n[2]);
-            const double near = line.at(2, map.centres[2][begin]), far = line.at(2, map.centres[2][end - 1]);
+            const double near = line.at(2, map.centers[2][begin]), far = line.at(2, map.centers[2][end - 1]);
             // before the camera, what lies between two voxels is seen between them
             if (near > MIN_DEPTH && far > MIN_DEPTH &&
                 !marked.near(map, place_of(map, line, begin), place_of(map, line, end - 1)))
@@ -134,7 +134,7 @@ double nearest_in_plane(const PictureMap &map, int i) {
     for (int j = 0; j < n[1]; ++j) {
         const PixelRow line(map, i, j);
         for (int k = 0; k < n[2]; ++k) {
-            const double depth = line.at(2, map.centres[2][k]);
+            const double depth = line.at(2, map.centers[2][k]);
             nearest = depth > 0 && depth < nearest ? depth : nearest;
         }
     }
@@ -170,7 +170,7 @@ SMOKELIFT_CLONES
 void read_row(const double *picture, const PictureMap &map, const PixelRow &line, int first, int count,
               float *__restrict values) {
     const auto [start, along, end] = line;
-    const double *const z = map.centres[2].data() + first;
+    const double *const z = map.centers[2].data() + first;
     const double right = map.columns - 0.5, bottom = map.rows - 0.5;
     float rows[TOGETHER] = {}, columns[TOGETHER] = {}, shown[TOGETHER];
     for (int n = 0; n < count; ++n) {

@@ -14,13 +14,13 @@ namespace smokelift {
 struct PictureMap {
     // From the world (m) to (x depth, y depth, depth), x and y in pixels.
     std::array<std::array<double, 4>, 3> to_pixel{};
-    std::array<std::vector<double>, 3> centres; // of the voxels along x, y and z, m
+    std::array<std::vector<double>, 3> centers; // of the voxels along x, y and z, m
     int rows = 0, columns = 0;                  // of the picture
 
-    Shape shape() const { return {int(centres[0].size()), int(centres[1].size()), int(centres[2].size())}; }
+    Shape shape() const { return {int(centers[0].size()), int(centers[1].size()), int(centers[2].size())}; }
 };
 
-// Places in a picture, pixel centres at integers, and whether they are in it and before the camera.
+// Places in a picture, pixel centers at integers, and whether they are in it and before the camera.
 struct Places {
     float *rows, *columns;
     bool *visible;
@@ -42,7 +42,7 @@ std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
                  const Places &places, Workers &workers);
 
-// Marks the voxels whose centre's nearest pixel is marked in a picture (rows, columns), and in it.
+// Marks the voxels whose center's nearest pixel is marked in a picture (rows, columns), and in it.
 void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers);
 
 // Least depth of the voxels before the camera; infinite if there are none.
@@ -71,7 +71,7 @@ void read_bilinearly(const double *picture, int rows, int columns, const float *
 
 // How likely smoke is at a voxel by its depth: exp(-(|depth - middle| / width)^(halves / 2)).
 struct DepthProfile {
-    std::array<std::vector<double>, 3> places; // of the voxels along x, y and z, m from a centre
+    std::array<std::vector<double>, 3> places; // of the voxels along x, y and z, m from a center
     std::array<double, 3> depth;               // direction
     const double *middle, *width;              // pictures (rows, columns) of each ray's, m
     int rows, columns;

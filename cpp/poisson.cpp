@@ -64,13 +64,13 @@ Poisson::Poisson(const Box &box) : box_(box) {
 }
 
 // Reciprocal pivots [x][z] of the systems along x of the modes with number j along y.
-void Poisson::factorise(int j, std::vector<float> &pivots) const {
+void Poisson::factorize(int j, std::vector<float> &pivots) const {
     const auto [nx, ny, nz] = box_.cells;
     thread_local std::vector<double> last;
     pivots.resize(std::size_t(nx) * nz);
     last.assign(nz, 0);
     for (int i = 0; i < nx; ++i) {
-        // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
+        // A missing neighbor takes 1 from the diagonal at a wall and adds 1 at an open side.
         double end = 0;
         if (i == 0)
             end += box_.closed[0] ? -1 : 1;
@@ -95,7 +95,7 @@ void Poisson::solve(Out f, Workers &workers) const {
     });
     workers.run(ny, [&, nx = nx, nz = nz](int j) {
         thread_local std::vector<float> pivots;
-        factorise(j, pivots);
+        factorize(j, pivots);
         tridiagonal(f.row(0, j), pivots.data(), nx, slab, nz);
     });
     workers.run(nx, [&, ny = ny, nz = nz](int i) {

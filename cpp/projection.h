@@ -10,8 +10,8 @@
 
 namespace smokelift {
 
-// Poisson's equation on a box of unit cells, solved directly by fast diagonalisation (Lynch, Rice, Thomas
-// 1964). -laplace p = f at cell centres, each side closed (no flux) or open (p = 0 on the side itself).
+// Poisson's equation on a box of unit cells, solved directly by fast diagonalization (Lynch, Rice, Thomas
+// 1964). -laplace p = f at cell centers, each side closed (no flux) or open (p = 0 on the side itself).
 // Eigenvectors along y and z decouple the equations into one tridiagonal system along x for each pair of
 // them.
 class Poisson {
@@ -22,7 +22,7 @@ public:
     void solve(Out f, Workers &workers) const;
 
 private:
-    void factorise(int j, std::vector<float> &pivots) const;
+    void factorize(int j, std::vector<float> &pivots) const;
 
     Box box_;
     LineTransform y_, z_;

@@ -6,7 +6,7 @@
 namespace smokelift {
 namespace {
 
-// A fine cell across an axis: its coarse one, that one's neighbours (itself at an end) and on which side it
+// A fine cell across an axis: its coarse one, that one's neighbors (itself at an end) and on which side it
 // lies.
 struct Half {
     Half(int fine, int coarse_cells)
@@ -17,7 +17,7 @@ struct Half {
     float side;
 };
 
-// The mean over one half of a cell of the parabola that has the means of the cell and of its neighbours.
+// The mean over one half of a cell of the parabola that has the means of the cell and of its neighbors.
 float half_mean(float low, float middle, float high, float side) { return middle + side * (high - low) / 8; }
 
 SMOKELIFT_CLONES

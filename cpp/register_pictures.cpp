@@ -16,16 +16,16 @@ using Doubles = std::vector<double>;
 using Integers = Read<1, int>;
 using Codes = py::array_t<unsigned char, 0>;
 
-PictureMap map_of(Read<2, double> to_pixel, const std::array<Doubles, 3> &centres,
+PictureMap map_of(Read<2, double> to_pixel, const std::array<Doubles, 3> &centers,
                   const std::array<int, 2> &size) {
     require_fit(to_pixel.n == std::array<Index, 2>{3, 4});
     PictureMap map;
     for (int row = 0; row < 3; ++row)
         std::copy_n(to_pixel.data + 4 * row, 4, map.to_pixel[row].begin());
-    map.centres = centres;
+    map.centers = centers;
     map.columns = size[0];
     map.rows = size[1];
-    for (const Doubles &along : centres)
+    for (const Doubles &along : centers)
         require_fit(!along.empty());
     return map;
 }
@@ -81,14 +81,14 @@ void register_places(py::module_ &module) {
         "voxels"_a, "places"_a, "depth"_a, "at"_a, "middle"_a, "width"_a, "flatness"_a,
         R"(exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
 
-        ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction, ``flatness`` a
+        ``places`` are those of the voxels along x, y and z in meters from a center, ``depth`` a direction, ``flatness`` a
         multiple of a half; ``at`` rows and columns (n,) where the pictures ``middle`` and ``width`` are read.)");
 
     py::class_<PictureMap>(module, "PictureMap", R"(Where the voxels of a grid lie in a picture.
 
-        ``to_pixel`` (3, 4) maps homogeneous points of the world to (x depth, y depth, depth) in pixels. ``centres`` are the
-        voxel centres' world coordinates (m) along x, y and z, ``size`` the picture's columns and rows.)")
-        .def(py::init(&map_of), "to_pixel"_a, "centres"_a, "size"_a)
+        ``to_pixel`` (3, 4) maps homogeneous points of the world to (x depth, y depth, depth) in pixels. ``centers`` are the
+        voxel centers' world coordinates (m) along x, y and z, ``size`` the picture's columns and rows.)")
+        .def(py::init(&map_of), "to_pixel"_a, "centers"_a, "size"_a)
         .def("places", unlocked([](Workers &workers, const PictureMap &map, Mask voxels) {
                  require_fit(voxels.n == map.shape());
                  const auto first = count_marked(voxels, workers);
@@ -98,7 +98,7 @@ void register_places(py::module_ &module) {
                  return std::tuple(std::move(rows), std::move(columns), std::move(visible));
              }),
              "voxels"_a,
-             "Rows and columns (n,) of the marked voxels, pixel centres at integers; whether they are in the "
+             "Rows and columns (n,) of the marked voxels, pixel centers at integers; whether they are in the "
              "picture.")
         .def("shown", unlocked([](Workers &workers, const PictureMap &map, Read<2, bool> picture) {
                  require_fit(picture.n == std::array<Index, 2>{map.rows, map.columns});
@@ -128,7 +128,7 @@ void register_places(py::module_ &module) {
 
 Shape halved(const Shape &n) { return {(n[0] + 1) / 2, (n[1] + 1) / 2, (n[2] + 1) / 2}; }
 
-// Neighbours along z have to be neighbours in memory.
+// Neighbors along z have to be neighbors in memory.
 template <class... T> void require_rows(Part<T>... boxes) { require_fit(((boxes.at.stride[2] == 1) && ...)); }
 
 void register_halves(py::module_ &module) {
@@ -239,7 +239,7 @@ void register_codes(py::module_ &module) {
                "picture"_a, "weights"_a,
                R"(A picture (rows, columns) or (rows, columns, channels), smoothed down and across.
 
-        ``weights`` are those of a pixel itself and of its neighbours on either side, outwards. Beyond its edges the picture
+        ``weights`` are those of a pixel itself and of its neighbors on either side, outwards. Beyond its edges the picture
         is its own mirror image.)");
 }
 
@@ -267,8 +267,8 @@ void register_turning(py::module_ &module) {
 
         It is zero outside the spans; see `filled_spans`.
 
-        The column of voxels (i, j) is centred on first + i steps[0] + j steps[1], in pixels. A pixel gets what it covers of
-        the voxels' shadows, so that even smoke makes an even picture from every angle.)");
+        The column of voxels (i, j) is centered on first + i steps[0] + j steps[1], in pixels. A pixel gets what it covers
+        of the voxels' shadows, so that even smoke makes an even picture from every angle.)");
 
     module.def("scale_turned",
                unlocked([](Workers &workers, Write<3> volume, Read<3, int> spans, double first,

@@ -174,7 +174,7 @@ void register_lights(py::module_ &module) {
         slope
             Voxels that a ray moves from plane to plane along the two other axes.
         step
-            Length of a ray between two planes in metres.)")
+            Length of a ray between two planes in meters.)")
         .def(py::init([](const std::array<float, 3> &direction, const std::array<float, 3> &energy, int axis,
                          int travel, int first, const std::array<double, 2> &slope, float step) {
                  return ParallelLight{direction, energy, axis, travel, first, slope, step};
@@ -209,11 +209,11 @@ void register_lights(py::module_ &module) {
         Parameters
         ----------
         position : (3,)
-            In grid coordinates, voxel centres at integers.
+            In grid coordinates, voxel centers at integers.
         energy : (3,)
             Intensity by channel over the squared voxel edge, in W/m^2.
         voxel_size
-            In metres.
+            In meters.
         faces
             The sides of the cube around it that see the grid.)")
         .def(py::init([](const std::array<double, 3> &position, const std::array<float, 3> &energy,
@@ -270,9 +270,9 @@ void register_camera(py::module_ &module) {
         ----------
         lines : (rows, columns, 4)
             b0, b1, c0, c1: the ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k) along the two other axes,
-            voxel centres at integers.
+            voxel centers at integers.
         length : (rows, columns)
-            Between two planes in metres.
+            Between two planes in meters.
         planes : (rows, columns, 4)
             Dominant axis, travel along it, first and last plane with a sample; last < first where there is none.)")
         .def(py::init<const Floats &, const Floats &, Read<3, int>>(), "lines"_a, "length"_a, "planes"_a)
@@ -282,9 +282,8 @@ void register_camera(py::module_ &module) {
              }),
              "support"_a, "medium"_a, "Shorten every ray to where the voxels around it hold anything.")
         .def_property_readonly("samples", &OwnedRays::samples, "Samples of all rays together.")
-        .def_property_readonly(
-            "recorded", &OwnedRays::recorded,
-            "Samples that a record holds of each channel: neighbouring rays have as many.");
+        .def_property_readonly("recorded", &OwnedRays::recorded,
+                               "Samples that a record holds of each channel: neighboring rays have as many.");
 
     using Places = std::vector<double>;
     module.def(
@@ -352,7 +351,7 @@ void register_camera(py::module_ &module) {
 void register_blocks(py::module_ &module) {
     py::class_<Blocks>(
         module, "Blocks",
-        R"(Cubes of ``size`` voxels; every voxel of a support lies between the centres of eight.
+        R"(Cubes of ``size`` voxels; every voxel of a support lies between the centers of eight.
 
         ``offset`` is the index of the support's first voxel among those of the first block, ``shape`` the number of blocks.)")
         .def(py::init([](const Shape &shape, int size, const Shape &offset) {
@@ -396,7 +395,7 @@ void register_blocks(py::module_ &module) {
                }),
                "values"_a, "factor"_a, "blocks"_a, "medium"_a, "support"_a,
                "J += factor x values (4 channels, bx, by, bz): what eight blocks say, weighted as between "
-               "their centres.");
+               "their centers.");
 
     module.def("interpolate_adjoint",
                unlocked([](Workers &workers, VoxelArray gradient, const Support &support, float factor,
@@ -430,7 +429,7 @@ void register_blocks(py::module_ &module) {
         means : (1 + 4 channels, bx, by, bz)
             Extinction in 1/m, then what is emitted by channel, in W/m^3/sr, the same in all directions.
         edge
-            Of a block in metres.)");
+            Of a block in meters.)");
 
     module.def(
         "diffuse_adjoint",

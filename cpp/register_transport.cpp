@@ -15,7 +15,7 @@ void register_transport(py::module_ &module) {
             return p;
         }),
         "f"_a, "closed"_a,
-        R"(Solve -laplace p = f at cell centres, with p = 0 on open sides and no flux through closed ones.
+        R"(Solve -laplace p = f at cell centers, with p = 0 on open sides and no flux through closed ones.
 
         With all sides closed the mean of f is removed first, and p is known up to a constant.)");
 

@@ -23,12 +23,12 @@ using Components = std::array<Floats, 3>;
 class Problem {
 public:
     Problem(const Components &direction, In offset, const Floats &weight, const Floats &irrotational,
-            const StaggeredIn &centre, const Regularisation &regularisation, const Box::Closed &closed)
+            const StaggeredIn &center, const Regularization &regularization, const Box::Closed &closed)
         : direction_(direction), weight_(weight), irrotational_(irrotational), box_{offset.n, closed},
           linear_(box_,
                   {view(direction[0], offset.n), view(direction[1], offset.n), view(direction[2], offset.n)},
-                  view(weight, offset.n), view(irrotational, offset.n), regularisation) {
-        const StaggeredIn around = in_box(centre, box_);
+                  view(weight, offset.n), view(irrotational, offset.n), regularization) {
+        const StaggeredIn around = in_box(center, box_);
         const py::gil_scoped_release release;
         b = linear_.right_hand_side(offset, around, *BorrowedWorkers());
     }
@@ -85,16 +85,16 @@ void register_velocity(py::module_ &module) {
     py::class_<Problem>(module, "LeastSquares",
                         R"(A quadratic function of face velocities, E(u) = u.Au - 2 b.u + constant.
 
-        E sums weight (offset + direction . u)^2 + irrotational |curl u|^2 over the cells, and of v = u - centre the terms
+        E sums weight (offset + direction . u)^2 + irrotational |curl u|^2 over the cells, and of v = u - center the terms
         first_order |grad v|^2 + second_order |grad curl v|^2 + kinetic |v|^2.)")
         .def(py::init([](const Components &direction, In offset, const Floats &weight,
-                         const Floats &irrotational, const StaggeredIn &centre, float first_order,
+                         const Floats &irrotational, const StaggeredIn &center, float first_order,
                          float second_order, float kinetic, const Box::Closed &closed) {
-                 const Regularisation regularisation{first_order, second_order, kinetic};
-                 return std::make_unique<Problem>(direction, offset, weight, irrotational, centre,
-                                                  regularisation, closed);
+                 const Regularization regularization{first_order, second_order, kinetic};
+                 return std::make_unique<Problem>(direction, offset, weight, irrotational, center,
+                                                  regularization, closed);
              }),
-             py::kw_only(), "direction"_a, "offset"_a, "weight"_a, "irrotational"_a, "centre"_a,
+             py::kw_only(), "direction"_a, "offset"_a, "weight"_a, "irrotational"_a, "center"_a,
              "first_order"_a, "second_order"_a, "kinetic"_a, "closed"_a)
         .def("apply", unlocked([](Workers &workers, const Problem &problem, const StaggeredIn &u) {
                  NewFaces product(problem.box());
@@ -116,7 +116,7 @@ void register_velocity(py::module_ &module) {
                  });
              }),
              "start"_a, py::kw_only(), "tolerance"_a, "limit"_a,
-             R"(Minimise over velocities without divergence by preconditioned conjugate gradients among them.
+             R"(Minimize over velocities without divergence by preconditioned conjugate gradients among them.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ void register_velocity(py::module_ &module) {
              }),
              "start"_a, py::kw_only(), "sigma"_a, "tau"_a, "theta"_a, "absolute"_a, "relative"_a, "limit"_a,
              "inner_tolerance"_a, "inner_limit"_a,
-             R"(Minimise over velocities without divergence by Chambolle and Pock's splitting (2011).
+             R"(Minimize over velocities without divergence by Chambolle and Pock's splitting (2011).
 
         Parameters
         ----------

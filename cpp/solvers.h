@@ -7,7 +7,7 @@
 
 namespace smokelift {
 
-// Minimises the quadratic from u, which has to be free of divergence and stays so. Stops when the projected
+// Minimizes the quadratic from u, which has to be free of divergence and stays so. Stops when the projected
 // gradient has fallen to `tolerance` times that of the fluid at rest, after `limit` iterations, or when
 // rounding keeps it from falling any further. `b`, the right-hand side, gives its room to the residual in the
 // meantime and is the same as before, to rounding, in the end.
@@ -22,7 +22,7 @@ struct PrimalDual {
     int inner_limit;
 };
 
-// Minimises the quadratic with the right-hand side b over velocities without divergence, starting from u.
+// Minimizes the quadratic with the right-hand side b over velocities without divergence, starting from u.
 // Throws std::invalid_argument for steps that violate the condition for convergence.
 Figures primal_dual(const LeastSquares &problem, const StaggeredField &b, Projection &projection,
                     const PrimalDual &settings, const StaggeredOut &u, Workers &workers);

@@ -56,15 +56,15 @@ int points_of(Transform transform, int n) {
 }
 
 bool is_cosine(Transform transform) { return int(transform) % 2 == 0; }
-bool on_centres(Transform transform) { return int(transform) / 2 % 2 == 1; }      // II and IV
+bool on_centers(Transform transform) { return int(transform) / 2 % 2 == 1; }      // II and IV
 bool has_half_modes(Transform transform) { return transform >= Transform::dct3; } // III and IV
 
 // The first point with values: sines on faces are zero at the start.
-int first_point(Transform transform) { return !is_cosine(transform) && !on_centres(transform); }
+int first_point(Transform transform) { return !is_cosine(transform) && !on_centers(transform); }
 
 double value(Transform transform, int n, int mode, int point) {
     const double phase = (mode + (has_half_modes(transform) ? 0.5 : 0)) * std::acos(-1.0) / n *
-                         (point + (on_centres(transform) ? 0.5 : first_point(transform)));
+                         (point + (on_centers(transform) ? 0.5 : first_point(transform)));
     return is_cosine(transform) ? std::cos(phase) : std::sin(phase);
 }
 
@@ -78,7 +78,7 @@ std::vector<int> count_up(int count) {
 } // namespace
 
 LineTransform::LineTransform(Transform transform, int n, int first, int count) : modes_(count) {
-    const bool faces = !on_centres(transform);
+    const bool faces = !on_centers(transform);
     length_ = n + faces;
     std::vector<int> modes;
     for (int m = first; m < first + count; ++m)
@@ -156,10 +156,10 @@ std::vector<int> LineTransform::split_parities(Transform transform, int n, const
 }
 
 // Types III and IV, all n modes: m and n - 1 - m are the same on every second point, and opposite on the
-// others (III), or sums and differences of neighbours turned by half the angle of m (IV).
+// others (III), or sums and differences of neighbors turned by half the angle of m (IV).
 std::vector<int> LineTransform::split_pairs(Transform transform, int n, int start, int stride) {
     const auto row = [&](int i) { return start + i * stride; };
-    const bool cosine = is_cosine(transform), on_faces = !on_centres(transform);
+    const bool cosine = is_cosine(transform), on_faces = !on_centers(transform);
     const int half = n / 2;
     std::vector<int> a, b;
     if (on_faces) {
@@ -217,7 +217,7 @@ void LineTransform::analyse(float *points, float *modes) const {
 
 // The transpose.
 SMOKELIFT_CLONES
-void LineTransform::synthesise(float *modes, float *points) const {
+void LineTransform::synthesize(float *modes, float *points) const {
     for (int m = 0; m < modes_; ++m)
         reinterpret_cast<Vector *>(modes)[m] *= norms_[m];
     for (auto t = after_.rbegin(); t != after_.rend(); ++t)
@@ -338,7 +338,7 @@ void LineTransform::rows_from_modes(const float *modes, int count, float *points
                                     std::vector<float> &scratch) const {
     in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
         rows_in(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
-        synthesise(y, x);
+        synthesize(y, x);
         rows_out(points + std::size_t(first) * length_, length_, lines, nullptr, x);
     });
 }
@@ -356,7 +356,7 @@ void LineTransform::columns_from_modes(const float *modes, int modes_stride, int
                                        int stride, std::vector<float> &scratch) const {
     in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
         columns_in(modes + first, modes_stride, modes_, lines, rows_.data(), y);
-        synthesise(y, x);
+        synthesize(y, x);
         columns_out(points + first, stride, length_, lines, nullptr, x);
     });
 }

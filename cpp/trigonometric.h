@@ -28,7 +28,7 @@ public:
     void rows_to_modes(const float *points, int count, float *modes, std::vector<float> &scratch) const;
     void rows_from_modes(const float *modes, int count, float *points, std::vector<float> &scratch) const;
 
-    // Lines are columns: `count` neighbouring ones, their rows `stride` apart. Input and output may be the
+    // Lines are columns: `count` neighboring ones, their rows `stride` apart. Input and output may be the
     // same.
     void columns_to_modes(const float *points, int stride, int count, float *modes, int modes_stride,
                           std::vector<float> &scratch) const;
@@ -54,7 +54,7 @@ private:
                                     int stride);
     std::vector<int> split_pairs(Transform transform, int n, int start, int stride);
     void analyse(float *points, float *modes) const;
-    void synthesise(float *modes, float *points) const;
+    void synthesize(float *modes, float *points) const;
 
     int length_ = 0, modes_ = 0;
     std::vector<Butterfly> before_, after_;
@@ -64,7 +64,7 @@ private:
 };
 
 // Cosines and sines that fit a line of n cells. A mode of the pressure is zero half a cell outside the last
-// centre, that is, on an open end, and level on a closed one; its differences live on the faces and are the
+// center, that is, on an open end, and level on a closed one; its differences live on the faces and are the
 // mode there.
 //     differences of face mode k = difference[k] times cell mode k
 // Between closed ends cells have the DCT-II and faces the DST-I, between open ends DST-II and DCT-I, with the

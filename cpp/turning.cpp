@@ -33,10 +33,10 @@ Taps taps_of(const Turned &turned, int i, int j) {
     const double thinnest = 1e-3; // of a square seen from its side
     const double a = std::max(std::abs(turned.step_x), thinnest),
                  b = std::max(std::abs(turned.step_y), thinnest);
-    const double centre = turned.first + i * turned.step_x + j * turned.step_y;
-    Taps one{int(std::lround(centre)) - 1, {}};
+    const double center = turned.first + i * turned.step_x + j * turned.step_y;
+    Taps one{int(std::lround(center)) - 1, {}};
     for (int t = 0; t < taps; ++t) {
-        const double at = one.first + t - centre;
+        const double at = one.first + t - center;
         const int column = one.first + t;
         if (column >= 0 && column < turned.columns)
             one.weights[t] = float(shadow_up_to(at + 0.5, a, b) - shadow_up_to(at - 0.5, a, b));

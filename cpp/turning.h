@@ -7,8 +7,8 @@
 
 namespace smokelift {
 
-// Where the columns of voxels stand in the picture of a turned volume: that of (i, j) is centred on
-// first + i step_x + j step_y, in pixels, pixel centres at integers; a voxel is as wide as a pixel.
+// Where the columns of voxels stand in the picture of a turned volume: that of (i, j) is centered on
+// first + i step_x + j step_y, in pixels, pixel centers at integers; a voxel is as wide as a pixel.
 struct Turned {
     double first, step_x, step_y;
     int columns; // of the picture

@@ -6,7 +6,7 @@
 namespace smokelift {
 namespace {
 
-// Ranges of a table of rows, each joined with its eight neighbours' and made one longer at both ends.
+// Ranges of a table of rows, each joined with its eight neighbors' and made one longer at both ends.
 std::vector<Span> around(const std::vector<Span> &rows, int count_a, int count_b, int length) {
     std::vector<Span> result(rows.size());
     for (int a = 0; a < count_a; ++a) {

@@ -36,7 +36,7 @@ GOLDEN: Mapping[str, Figures] = {
 """What each shot measures, means over its frames:
 
 - ``psnr`` inside the smoke at the clip's pixels (dB)
-- ``mass`` over the true one; where that is not known, density times cubic metres
+- ``mass`` over the true one; where that is not known, density times cubic meters
 - ``patches`` from all around: distance from the truth's, or where that is not known from those of the own front
 - ``transmittance``: error, root mean square over the pixels that show smoke
 - ``velocity``: error in smoke, relative L2

@@ -1,6 +1,6 @@
 """Build the extension's zips, for each of Blender's platforms and Pythons, and check them as Blender does.
 
-`smokelift` holds the add-on, the manifest, the licence, the manual and, in a folder that is named after its Python, the
+`smokelift` holds the add-on, the manifest, the license, the manual and, in a folder that is named after its Python, the
 engine with everything that it needs: it is installed from disk and works at once, without a network. numpy is left out,
 because Blender has its own. `smokelift_gpu` holds Taichi, which only a GPU needs and which is larger than all the rest;
 the add-on finds it beside itself.

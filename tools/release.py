@@ -28,8 +28,8 @@ DIST = ROOT / "dist"
 LARGEST_ZIP, LARGEST_INSTALLED = 100e6, 250e6
 """Bytes of an extension."""
 
-LICENCE = re.compile(r"licen[cs]e|copying|notice", re.IGNORECASE)
-"""How files are called that hold a licence."""
+LICENSE = re.compile(r"licen[cs]e|copying|notice", re.IGNORECASE)
+"""How files are called that hold a license."""
 
 DEBIAN = Path(os.environ.get("SMOKELIFT_BLENDER_ROOT", Path.home() / ".cache" / "smokelift-tests" / "trixie"))
 """The root with a Blender that `make test-blender` builds."""
@@ -46,7 +46,7 @@ def main() -> int:
     quick: bool = parser.parse_args().quick
     steps: list[Callable[[], str]] = [clean_checkout, changelog_has_the_version]
     if not quick:
-        steps += [zips_are_small_and_whole, licences_are_carried, blender_takes_the_zips, sdist_builds_alone, checksums]
+        steps += [zips_are_small_and_whole, licenses_are_carried, blender_takes_the_zips, sdist_builds_alone, checksums]
     failed = 0
     for step in steps:
         try:
@@ -96,8 +96,8 @@ def zips_are_small_and_whole(folder: Path = DIST) -> str:
     return f"{len(zips)} zips: {', '.join(f'{path.name} {path.stat().st_size / 1e6:.0f} MB' for path in zips)}"
 
 
-def licences_are_carried(folder: Path = DIST) -> str:
-    """Every package in a zip carries the text of its licence, and so does the zip."""
+def licenses_are_carried(folder: Path = DIST) -> str:
+    """Every package in a zip carries the text of its license, and so does the zip."""
     packages = set()
     for path in sorted(folder.glob(f"smokelift*-{VERSION}-*.zip")):
         with zipfile.ZipFile(path) as archive:
@@ -105,10 +105,10 @@ def licences_are_carried(folder: Path = DIST) -> str:
         if "LICENSE" not in names:
             raise NotReadyError(f"{path.name} has no LICENSE.")
         for about in {name.partition(".dist-info/")[0] for name in names if ".dist-info/" in name}:
-            if not any(LICENCE.search(name) for name in names if name.startswith(f"{about}.dist-info/")):
-                raise NotReadyError(f"{path.name} carries {about.rpartition('/')[2]} without its licence.")
+            if not any(LICENSE.search(name) for name in names if name.startswith(f"{about}.dist-info/")):
+                raise NotReadyError(f"{path.name} carries {about.rpartition('/')[2]} without its license.")
             packages.add(about.rpartition("/")[2].partition("-")[0])
-    return f"licences of {len(packages)} packages: {', '.join(sorted(packages))}"
+    return f"licenses of {len(packages)} packages: {', '.join(sorted(packages))}"
 
 
 def blender_takes_the_zips(folder: Path = DIST) -> str:

@@ -1,6 +1,6 @@
 """Run tests with a compiled core that checks itself: AddressSanitizer and UndefinedBehaviorSanitizer.
 
-An access outside an array, a cast of what no integer can hold, or any other undefined behaviour ends the run with
+An access outside an array, a cast of what no integer can hold, or any other undefined behavior ends the run with
 where it happened. By default the tests of transport, velocity and rendering run.
 
     .venv/bin/python tools/sanitize.py [PYTEST ARGUMENTS]

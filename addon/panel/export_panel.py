@@ -35,7 +35,7 @@ class ExportSettings:
         description="Bits of each value. Smoke too thin to be seen is left out either way",
         items=[
             ("half", "Half", "Floats of 16 bits"),
-            ("quantised", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
+            ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
         ],
     )
     use_velocity: BoolProperty(

@@ -22,7 +22,7 @@ SUB_PANEL = (1042, 78, 1300, 440)
 SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 STAGES = ("qualities", "view_3d_running", "view_3d_done")
 GAP = 8
-COLOURS = 256
+COLORS = 256
 
 
 def main() -> None:
@@ -50,7 +50,7 @@ def beside(pictures: list[Image.Image]) -> Image.Image:
 
 def save(name: str, picture: Image.Image) -> None:
     """Write a picture that takes little room."""
-    picture.quantize(COLOURS, dither=Image.Dither.FLOYDSTEINBERG).save(DOCS / name, optimize=True)
+    picture.quantize(COLORS, dither=Image.Dither.FLOYDSTEINBERG).save(DOCS / name, optimize=True)
 
 
 if __name__ == "__main__":

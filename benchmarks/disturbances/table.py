@@ -68,7 +68,7 @@ DISTURBANCES: dict[str, Disturbance] = {
     "flicker": Disturbance(
         "Exposure flickers, black behind", "fraction", run(spoiled.flicker), FLICKER, common=(0.1,)
     ),
-    "flicker-grey": Disturbance(
+    "flicker-gray": Disturbance(
         "Exposure flickers, gray behind", "fraction", run(spoiled.flicker_before_gray), FLICKER, common=(0.1,)
     ),
     "missing": Disturbance(

@@ -34,8 +34,8 @@ ESTIMATORS: Mapping[str, VelocityEstimator] = {
         f"{n} primal-dual steps": CoarseToFine(VelocitySettings(solver=PrimalDual(iterations=n)))
         for n in (2, 5, 20, 100)
     },
-    "1 linearization": CoarseToFine(replace(VelocitySettings(), linearisations=1)),
-    "3 linearizations": CoarseToFine(replace(VelocitySettings(), linearisations=3)),
+    "1 linearization": CoarseToFine(replace(VelocitySettings(), linearizations=1)),
+    "3 linearizations": CoarseToFine(replace(VelocitySettings(), linearizations=3)),
     "the paper's method": PaperVelocity(),
 }
 

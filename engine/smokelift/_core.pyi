@@ -43,7 +43,7 @@ def set_threads(count: int) -> None:
     """
 
 def solve_poisson(f: Reals, closed: npt.ArrayLike) -> Array:
-    """Solve -laplace p = f at cell centres, with p = 0 on open sides and no flux through closed ones.
+    """Solve -laplace p = f at cell centers, with p = 0 on open sides and no flux through closed ones.
 
     With all sides closed the mean of f is removed first, and p is known up to a constant.
     """
@@ -77,7 +77,7 @@ def prolong(u: Faces) -> list[Array]:
 class LeastSquares:
     """A quadratic function of face velocities, E(u) = u.Au - 2 b.u + constant.
 
-    E sums weight (offset + direction . u)^2 + irrotational |curl u|^2 over the cells, and of v = u - centre the terms
+    E sums weight (offset + direction . u)^2 + irrotational |curl u|^2 over the cells, and of v = u - center the terms
     first_order |grad v|^2 + second_order |grad curl v|^2 + kinetic |v|^2.
     """
     def __init__(
@@ -87,7 +87,7 @@ class LeastSquares:
         offset: Reals,
         weight: Reals,
         irrotational: Reals,
-        centre: Faces,
+        center: Faces,
         first_order: float,
         second_order: float,
         kinetic: float,
@@ -100,7 +100,7 @@ class LeastSquares:
         """b."""
 
     def projected_cg(self, start: Faces, *, tolerance: float, limit: int) -> tuple[list[Array], Figures]:
-        """Minimise over velocities without divergence by preconditioned conjugate gradients among them.
+        """Minimize over velocities without divergence by preconditioned conjugate gradients among them.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class LeastSquares:
         inner_tolerance: float,
         inner_limit: int,
     ) -> tuple[list[Array], Figures]:
-        """Minimise over velocities without divergence by Chambolle and Pock's splitting (2011).
+        """Minimize over velocities without divergence by Chambolle and Pock's splitting (2011).
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class ParallelLight:
     slope
         Voxels that a ray moves from plane to plane along the two other axes.
     step
-        Length of a ray between two planes in metres.
+        Length of a ray between two planes in meters.
     """
     def __init__(
         self,
@@ -227,11 +227,11 @@ class PointLight:
     Parameters
     ----------
     position : (3,)
-        In grid coordinates, voxel centres at integers.
+        In grid coordinates, voxel centers at integers.
     energy : (3,)
         Intensity by channel over the squared voxel edge, in W/m^2.
     voxel_size
-        In metres.
+        In meters.
     faces
         The sides of the cube around it that see the grid.
     """
@@ -263,9 +263,9 @@ class Rays:
     ----------
     lines : (rows, columns, 4)
         b0, b1, c0, c1: the ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k) along the two other axes,
-        voxel centres at integers.
+        voxel centers at integers.
     length : (rows, columns)
-        Between two planes in metres.
+        Between two planes in meters.
     planes : (rows, columns, 4)
         Dominant axis, travel along it, first and last plane with a sample; last < first where there is none.
     """
@@ -279,7 +279,7 @@ class Rays:
 
     @property
     def recorded(self) -> int:
-        """Samples that a record holds of each channel: neighbouring rays have as many."""
+        """Samples that a record holds of each channel: neighboring rays have as many."""
 
 def pixel_rays(
     start: npt.ArrayLike,
@@ -323,7 +323,7 @@ def march_adjoint(
     """
 
 class Blocks:
-    """Cubes of ``size`` voxels; every voxel of a support lies between the centres of eight.
+    """Cubes of ``size`` voxels; every voxel of a support lies between the centers of eight.
 
     ``offset`` is the index of the support's first voxel among those of the first block, ``shape`` the number of blocks.
     """
@@ -336,7 +336,7 @@ def average_adjoint(medium: Array, support: Support, blocks: Blocks, means_gradi
     """Add to the derivatives by kappa and J what those by the result of `average` say of them."""
 
 def add_interpolated(values: Reals, factor: float, blocks: Blocks, medium: Array, support: Support) -> None:
-    """J += factor x values (4 channels, bx, by, bz): what eight blocks say, weighted as between their centres."""
+    """J += factor x values (4 channels, bx, by, bz): what eight blocks say, weighted as between their centers."""
 
 def interpolate_adjoint(gradient: Array, support: Support, factor: float, blocks: Blocks) -> Array:
     """Derivative by the values of `add_interpolated` (4 channels, bx, by, bz) from that by J."""
@@ -349,7 +349,7 @@ def diffuse(means: Reals, albedo: float, edge: float) -> Array:
     means : (1 + 4 channels, bx, by, bz)
         Extinction in 1/m, then what is emitted by channel, in W/m^3/sr, the same in all directions.
     edge
-        Of a block in metres.
+        Of a block in meters.
     """
 
 def diffuse_adjoint(means: Reals, radiance: Reals, radiance_gradient: Reals, albedo: float, edge: float) -> Array:
@@ -366,19 +366,19 @@ def depth_profile(
 ) -> tuple[Array, Array]:
     """exp(-(|depth - middle| / width)^flatness) and the width, both (n,) at the marked voxels.
 
-    ``places`` are those of the voxels along x, y and z in metres from a centre, ``depth`` a direction, ``flatness`` a
+    ``places`` are those of the voxels along x, y and z in meters from a center, ``depth`` a direction, ``flatness`` a
     multiple of a half; ``at`` rows and columns (n,) where the pictures ``middle`` and ``width`` are read.
     """
 
 class PictureMap:
     """Where the voxels of a grid lie in a picture.
 
-    ``to_pixel`` (3, 4) maps homogeneous points of the world to (x depth, y depth, depth) in pixels. ``centres`` are the
-    voxel centres' world coordinates (m) along x, y and z, ``size`` the picture's columns and rows.
+    ``to_pixel`` (3, 4) maps homogeneous points of the world to (x depth, y depth, depth) in pixels. ``centers`` are the
+    voxel centers' world coordinates (m) along x, y and z, ``size`` the picture's columns and rows.
     """
-    def __init__(self, to_pixel: Reals, centres: npt.ArrayLike, size: npt.ArrayLike) -> None: ...
+    def __init__(self, to_pixel: Reals, centers: npt.ArrayLike, size: npt.ArrayLike) -> None: ...
     def places(self, voxels: Mask) -> tuple[Array, Array, Mask]:
-        """Rows and columns (n,) of the marked voxels, pixel centres at integers; whether they are in the picture."""
+        """Rows and columns (n,) of the marked voxels, pixel centers at integers; whether they are in the picture."""
 
     def shown(self, picture: Mask) -> Mask:
         """Voxels in the picture whose nearest pixel is marked (rows, columns)."""
@@ -422,7 +422,7 @@ def add_weighted(picture: Bytes, table: Reals, weights: Reals, lines: Integers, 
 def blur_picture(picture: Reals, weights: npt.ArrayLike) -> Array:
     """A picture (rows, columns) or (rows, columns, channels), smoothed down and across.
 
-    ``weights`` are those of a pixel itself and of its neighbours on either side, outwards. Beyond its edges the picture
+    ``weights`` are those of a pixel itself and of its neighbors on either side, outwards. Beyond its edges the picture
     is its own mirror image.
     """
 
@@ -434,8 +434,8 @@ def project_turned(volume: Reals, spans: Integers, first: float, steps: npt.Arra
 
     It is zero outside the spans; see `filled_spans`.
 
-    The column of voxels (i, j) is centred on first + i steps[0] + j steps[1], in pixels. A pixel gets what it covers of
-    the voxels' shadows, so that even smoke makes an even picture from every angle.
+    The column of voxels (i, j) is centered on first + i steps[0] + j steps[1], in pixels. A pixel gets what it covers
+    of the voxels' shadows, so that even smoke makes an even picture from every angle.
     """
 
 def scale_turned(volume: Array, spans: Integers, first: float, steps: npt.ArrayLike, logarithm: Reals) -> None:

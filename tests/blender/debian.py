@@ -203,7 +203,7 @@ def load(path: Path) -> Any:
 
 
 def change(before: Any, after: Any, region: list[int]) -> float:
-    """Mean difference of two pictures in a region (grey levels of 255)."""
+    """Mean difference of two pictures in a region (gray levels of 255)."""
     x, y, width, height = region
     rows, columns = slice(y, y + height), slice(x, x + width)
     return float(np.abs(after[rows, columns] - before[rows, columns]).mean())

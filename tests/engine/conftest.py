@@ -34,7 +34,7 @@ def on_the_processor() -> None:
 FRAMES = 5
 FIRST_HEIGHT = 0.45
 RISE = 0.075
-"""Metres a frame: one and a half voxels."""
+"""Meters a frame: one and a half voxels."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Plume:
 
     @staticmethod
     def blob(scene: Scene, height: float) -> np.ndarray:
-        """The volume of a structured blob whose centre is so many metres high; exactly 0 outside."""
+        """The volume of a structured blob whose center is so many meters high; exactly 0 outside."""
         domain = scene.domain
         assert domain is not None
         axes = [

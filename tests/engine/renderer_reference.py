@@ -96,14 +96,14 @@ def inscatter_of(kappa, camera, domain, medium, lights, scattering):
     if scattering == "absorption":
         return total
     index = np.stack(np.meshgrid(*[np.arange(n) for n in kappa.shape], indexing="ij"), -1)
-    centres = np.array(domain.min) + (index + 0.5) * h
+    centers = np.array(domain.min) + (index + 0.5) * h
     matrix = np.array(camera.matrix)
-    to_eye = matrix[:3, 3] - centres if camera.type == "perspective" else np.broadcast_to(matrix[:3, 2], centres.shape)
+    to_eye = matrix[:3, 3] - centers if camera.type == "perspective" else np.broadcast_to(matrix[:3, 2], centers.shape)
     to_eye = to_eye / np.linalg.norm(to_eye, axis=-1, keepdims=True)
     g = medium.anisotropy
     for light in lights:
         if hasattr(light, "position"):
-            away = centres - np.array(light.position)
+            away = centers - np.array(light.position)
             distance = np.linalg.norm(away, axis=-1)
             travel = away / distance[..., None]
             energy = np.array(light.intensity) / distance[..., None] ** 2

@@ -86,7 +86,7 @@ CALLS: dict[str, Callable[[float], Any]] = {
         SMOKE, SCENE, Camera.look_at((0.4, -v, 0.4), (0.4, 0.4, 0.4), fov_y_degrees=30, size=(9, 9))
     ),
     "render, field of view": lambda v: render(SMOKE, SCENE, replace(CAMERA, fx=v, fy=v)),
-    "render, centre": lambda v: render(SMOKE, SCENE, replace(CAMERA, cx=v)),
+    "render, center": lambda v: render(SMOKE, SCENE, replace(CAMERA, cx=v)),
     "render, orbit": lambda v: render(SMOKE, SCENE, orbit(CAMERA, SCENE.domain, v)),
     "render, box": lambda v: pictured(domain=Domain((0, 0, 0), (v, v, v), SHAPE)),
     "render_gradient": lambda v: render_gradient(SMOKE, SCENE, np.full((10, 10, 3), min(v, 1e20), np.float32)),

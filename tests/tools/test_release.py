@@ -47,17 +47,17 @@ def test_zips_have_to_be_there_whole_and_small(tmp_path, monkeypatch) -> None:
         release.zips_are_small_and_whole(tmp_path)
 
 
-def test_a_zip_carries_the_licence_of_all_that_is_in_it(tmp_path) -> None:
+def test_a_zip_carries_the_license_of_all_that_is_in_it(tmp_path) -> None:
     inside = "python3.13/mdurl-0.1.2.dist-info"
     own, about = ("LICENSE", f"{inside}/METADATA"), f"{inside}/licenses/COPYING"
     zipped(tmp_path, own[1:])
     with pytest.raises(release.NotReadyError, match="has no LICENSE"):
-        release.licences_are_carried(tmp_path)
+        release.licenses_are_carried(tmp_path)
     zipped(tmp_path, own)
-    with pytest.raises(release.NotReadyError, match=r"mdurl-0.1.2 without its licence"):
-        release.licences_are_carried(tmp_path)
+    with pytest.raises(release.NotReadyError, match=r"mdurl-0.1.2 without its license"):
+        release.licenses_are_carried(tmp_path)
     zipped(tmp_path, (*own, about))
-    assert release.licences_are_carried(tmp_path) == "licences of 1 packages: mdurl"
+    assert release.licenses_are_carried(tmp_path) == "licenses of 1 packages: mdurl"
 
 
 def test_checksums_name_what_is_released(tmp_path) -> None:

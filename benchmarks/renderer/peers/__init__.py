@@ -21,12 +21,12 @@ from benchmarks.process import finds_llvm
 
 @dataclass(frozen=True)
 class Iteration:
-    """One step of an optimisation, ready to run.
+    """One step of an optimization, ready to run.
 
     Attributes
     ----------
     upload
-        Converts a density (n, n, n) float32 to what ``run`` takes. Not timed: an optimisation keeps it where it is.
+        Converts a density (n, n, n) float32 to what ``run`` takes. Not timed: an optimization keeps it where it is.
     run
         Returns the image and the derivative of the loss, both complete. This is timed.
     download

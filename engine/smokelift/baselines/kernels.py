@@ -4,7 +4,7 @@
 
 Extinction is [x + 1, y + 1, z + 1, 0] with a border of one voxel, as the light sweeps read it. In-scattered radiance
 is [x, y, z, value]: J of every channel, then J x way of the light of every channel. Positions are in voxels, voxel
-centres at integers. Volumes are read trilinearly, and beyond the outermost centres as the nearest voxel, so that a
+centers at integers. Volumes are read trilinearly, and beyond the outermost centers as the nearest voxel, so that a
 sample's weights always add up to one.
 """
 

@@ -1,6 +1,6 @@
-"""The paper's velocity (algorithm 5): one grid, one linearisation around rest, first-order smoothness, primal-dual.
+"""The paper's velocity (algorithm 5): one grid, one linearization around rest, first-order smoothness, primal-dual.
 
-It minimises, over velocities u without divergence in voxels per frame,
+It minimizes, over velocities u without divergence in voxels per frame,
 
     sum (after - before + g . u)^2 / s^2 + smoothness * sum |grad u|^2 + kinetic * sum |u|^2
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from smokelift.transport import StaggeredGrid, Velocity
 from smokelift.velocity.estimator import DensityPair, checked, in_meters, motion_weight, predict_velocity
-from smokelift.velocity.linearisation import least_squares, linearise
+from smokelift.velocity.linearization import least_squares, linearize
 from smokelift.velocity.preparation import without_noise
 from smokelift.velocity.solver import PrimalDual, Solver
 
@@ -43,7 +43,7 @@ class PaperVelocity:
         pair = checked(pair)
         (first, second, _), _ = without_noise(pair.before, pair.after, (self.blur,), np.inf)
         rest = StaggeredGrid.zero(first.shape, 1.0, pair.closed)
-        linear = linearise(first, second, motion_weight(first.shape, pair.inflow), rest)
+        linear = linearize(first, second, motion_weight(first.shape, pair.inflow), rest)
         if linear is None:
             return Velocity.zero(first.shape, pair.voxel_size, pair.closed)
         problem = least_squares(linear, rest, first_order=self.smoothness, kinetic=self.kinetic)

@@ -1,4 +1,4 @@
-"""The axis that depth profiles are centred on, and how well it is known."""
+"""The axis that depth profiles are centered on, and how well it is known."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from smokelift.scene import Camera, Domain
 
 @dataclass(frozen=True, eq=False)
 class SmokeAxis:
-    """How far behind the domain's centre the middle of the smoke is, on the upright plane through the centre.
+    """How far behind the domain's center the middle of the smoke is, on the upright plane through the center.
 
     Attributes
     ----------
     heights : (n,)
-        Metres above the centre, ascending, along `view_frame`'s height.
+        Meters above the center, ascending, along `view_frame`'s height.
     laterals : (m,)
-        Metres from the centre, ascending, along its lateral direction; one where there is one column.
+        Meters from the center, ascending, along its lateral direction; one where there is one column.
     depths : (n, m)
-        Metres away from the camera, along its depth direction.
+        Meters away from the camera, along its depth direction.
     spreads : (n, m)
         Standard deviation (m) of the depth over the columns that stand behind one another.
     widths : (n, m)
@@ -67,7 +67,7 @@ class SmokeAxis:
 
 
 def depth_at(distance: float, camera: Camera, domain: Domain) -> float:
-    """Depth (m behind the domain's centre) of what stands at a level distance (m) ahead of a camera.
+    """Depth (m behind the domain's center) of what stands at a level distance (m) ahead of a camera.
 
     It raises ValueError outside the domain.
     """
@@ -90,7 +90,7 @@ Cue = Literal["box", "floor contact", "inlets", "distance"]
 class AxisEstimate:
     """An axis, the cue that shows it, and how well it is known.
 
-    `axis` is the likeliest, `depth` the mean depth (m behind the domain's centre) of smoke that stands on it, and
+    `axis` is the likeliest, `depth` the mean depth (m behind the domain's center) of smoke that stands on it, and
     `deviation` the standard deviation (m) of that depth's error.
     """
 

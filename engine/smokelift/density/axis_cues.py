@@ -62,7 +62,7 @@ LEANING = 0.2
 """Fraction of the box's variance that stays of a column whose base is known: it may lean."""
 
 WIDENING = 0.15
-"""Growth of a column's radius per metre of height: it takes in air (docs/experiments/density-axis.md)."""
+"""Growth of a column's radius per meter of height: it takes in air (docs/experiments/density-axis.md)."""
 
 INERTIA = 0.5
 """Weight of a column's place in the row below, in shares of its smoke: other smoke in a row may not be its own
@@ -156,7 +156,7 @@ class _Column:
     base
         Depth (m) of its base.
     begins
-        Height (m above the domain's centre) of its base.
+        Height (m above the domain's center) of its base.
     middles, widths, drifts : (n,)
         By height: lateral place (m) of its axis, its lateral standard deviation, distance of its axis from its base.
     trust
@@ -226,7 +226,7 @@ def _inlet_columns(
     """The columns above inlets, followed upwards in the mean picture where there are several.
 
     The smoke of each row is shared out among the columns that have begun: a mixture of Gaussians, by expectation
-    maximisation. Each is expected where it was in the row below, as wide as a rising column becomes. Were the widths
+    maximization. Each is expected where it was in the row below, as wide as a rising column becomes. Were the widths
     free, one column would swallow the others.
     """
     lateral, along, up = view_frame(camera)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places, project_voxels
-from smokelift.density.levels import any_of_two, with_neighbours
+from smokelift.density.levels import any_of_two, with_neighbors
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
@@ -135,7 +135,7 @@ class RoundDepth:
 
 
 def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
-    """Voxels (nx, ny, nz) of the hull where any profile expects smoke, and their neighbours.
+    """Voxels (nx, ny, nz) of the hull where any profile expects smoke, and their neighbors.
 
     A profile decides along each ray by itself, so that a thin veil beside thick smoke stays.
     """
@@ -147,7 +147,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
     expected = np.zeros(hull.shape, np.bool_)
     expected[hull] = found
     box = box_around(hull, 1)
-    expected[box] = with_neighbours(expected[box]) & hull[box]
+    expected[box] = with_neighbors(expected[box]) & hull[box]
     return expected
 
 
@@ -189,7 +189,7 @@ def _common(
 
 
 def _common_axis(view: ObservedView, views: ViewSet) -> SmokeAxis:
-    """How far behind the domain's centre all pictures together put the middle of the smoke, by height in one view."""
+    """How far behind the domain's center all pictures together put the middle of the smoke, by height in one view."""
     domain, hull = views.optics.domain, views.hull
     _, depth, height = view_frame(view.camera)
     places = domain.offsets(domain.centre)

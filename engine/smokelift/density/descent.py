@@ -3,7 +3,7 @@
 Every voxel is measured in units of its own scale, start + floor. In these units the steepest descent changes a ray's
 smoke in proportion to what is there, so what the start assumes of depth survives where the pictures say nothing. The
 direction is that of the limited-memory BFGS method (Nocedal 1980), among the voxels that no bound holds (two-metric
-projection: Bertsekas 1982). What neighbours share counts more in it than what each wants for itself: thick smoke that
+projection: Bertsekas 1982). What neighbors share counts more in it than what each wants for itself: thick smoke that
 is too dark is so over a whole lobe, and voxels that mend it one by one become spikes. No voxel changes by more than a
 share of itself. The step is shortened until the objective falls sufficiently (Armijo), so the objective never rises.
 """
@@ -64,7 +64,7 @@ def descend(
     bound: float = np.inf,
     expected: Volume | None = None,
 ) -> Fit:
-    """Minimise the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
+    """Minimize the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
 
     The result takes the start's place, which is zero outside the hull.
     It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
@@ -191,7 +191,7 @@ class _Curvature:
 
     Of each of the last `MEMORY` steps it keeps s, the step itself, y, the change of the gradient along it, and their
     product ys = 1 / rho (Nocedal, "Updating quasi-Newton matrices with limited storage", 1980). Where nothing is known,
-    the inverse of the second derivatives is a multiple of what neighbours share.
+    the inverse of the second derivatives is a multiple of what neighbors share.
     """
 
     def __init__(self, where: _core.MarkedVoxels, room: _Room) -> None:
@@ -221,16 +221,16 @@ class _Curvature:
             saxpy(y, q, a=-alphas[-1])
         if self._steps:
             _, y, ys = self._steps[-1]
-            shared = with_neighbours(self._where, y, self._room.take())
+            shared = with_neighbors(self._where, y, self._room.take())
             q *= np.float32(ys / _dot(y, shared))
             self._room.give(shared)
-        with_neighbours(self._where, q, q)
+        with_neighbors(self._where, q, q)
         for (s, y, ys), alpha in zip(self._steps, reversed(alphas), strict=True):
             beta = _dot(y, q) / ys
             saxpy(s, q, a=alpha - beta)
 
 
-def with_neighbours(where: _core.MarkedVoxels, values: Array, out: Array) -> Array:
+def with_neighbors(where: _core.MarkedVoxels, values: Array, out: Array) -> Array:
     """The voxels' values (n,) and, `SHARED` times as much, their means over cubes.
 
     The cubes are those of two lattices half a cube apart, so that no cube shows. The result may replace the values.

@@ -24,7 +24,7 @@ from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
 from smokelift.extraction import extract_element, usual_source
-from smokelift.footage.given_background import backdrop_colour, background_picture
+from smokelift.footage.given_background import backdrop_color, background_picture
 from smokelift.footage.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.device import products_on_one_thread
@@ -243,7 +243,7 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
         plate = eight_bit_plate(background_picture(scene, camera), camera.size)
         observation = replace(observation, plate=plate)
     picture, plate = observation.image, observation.plate
-    if observation.element is not None or backdrop_colour(plate.image) is not None:
+    if observation.element is not None or backdrop_color(plate.image) is not None:
         return observation
     source = usual_source([(picture, plate)], camera.size)
     return replace(observation, element=extract_element(picture, plate, source, camera.size))

@@ -2,7 +2,7 @@
 
 The picture shows the integral of the emission along each ray, less what the smoke before it takes away. It says nothing
 of the depth. As for smoke, a flame is assumed to be as deep as it is wide (`smokelift.density.profile`), about the
-middle of the smoke at its height. From there maximum likelihood expectation maximisation (Shepp and Vardi 1982) scales
+middle of the smoke at its height. From there maximum likelihood expectation maximization (Shepp and Vardi 1982) scales
 the emission until it shows the picture. The emission stays at least 0, and its distribution along a ray stays about
 what it was. Figures: docs/experiments/fire.md.
 """
@@ -35,7 +35,7 @@ SMOOTHING = 2.0
 
 
 def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, optics: Optics) -> Volume:
-    """Reconstruct the emission (nx, ny, nz) of a flame, radiance per metre.
+    """Reconstruct the emission (nx, ny, nz) of a flame, radiance per meter.
 
     ``light`` (rows, columns) is the radiance that the flame adds to the picture of the smoke, not negative. The camera
     stands still. The density (nx, ny, nz) of the smoke takes light away.
@@ -71,7 +71,7 @@ def _scaled(emission: NDArray[np.float64], light: NDArray[np.float64], matrix: s
 
 
 def _middle(density: Volume, camera: Camera, domain: Domain) -> SmokeAxis:
-    """How far behind the domain's centre the smoke's middle is, by height; below the smoke as at its base."""
+    """How far behind the domain's center the smoke's middle is, by height; below the smoke as at its base."""
     where = np.nonzero(density)
     if not where[0].size:
         return SmokeAxis.upright()

@@ -20,8 +20,8 @@ from smokelift.scene.projection import world_to_pixel
 class Places:
     """Where some voxels lie in a picture.
 
-    `rows` and `columns` (n,) are picture coordinates of their centres; pixel centres are integers. `visible` (n,) says
-    whether they are before the camera and their centre falls into the picture.
+    `rows` and `columns` (n,) are picture coordinates of their centers; pixel centers are integers. `visible` (n,) says
+    whether they are before the camera and their center falls into the picture.
     """
 
     rows: NDArray[np.float32]
@@ -46,7 +46,7 @@ class Projection:
 
     @cached_property
     def visible(self) -> NDArray[np.bool_]:
-        """Voxels (nx, ny, nz) before the camera whose centre falls into the picture."""
+        """Voxels (nx, ny, nz) before the camera whose center falls into the picture."""
         return self.shown(np.ones(self._size[::-1], np.bool_))
 
     def places(self, voxels: NDArray[np.bool_]) -> Places:
@@ -64,7 +64,7 @@ class Projection:
 
 @lru_cache(maxsize=8)
 def project_voxels(camera: Camera, domain: Domain) -> Projection:
-    """Project every voxel centre of a domain."""
+    """Project every voxel center of a domain."""
     axes = [axis.ravel() for axis in domain.offsets((0, 0, 0))]
     projected = _core.PictureMap(world_to_pixel(camera), axes, camera.size)
     near = projected.nearest if camera.type == "perspective" else 1.0

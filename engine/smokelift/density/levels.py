@@ -124,7 +124,7 @@ def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return voxels
 
 
-def with_neighbours(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def with_neighbors(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mark the six voxels beside each marked one too: a fast `ndimage.binary_dilation`."""
     result = voxels.copy()
     for axis in range(3):

@@ -8,7 +8,7 @@ ray is scaled by s, the picture becomes J (1 - T^s) + T^s B. The transmittance t
 Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s of
 the start: it hardly changes with the density, and to measure it takes another picture
 (docs/experiments/memory-and-time.md).
-Where smoke and background look alike the picture says little, so the neighbours' step counts instead.
+Where smoke and background look alike the picture says little, so the neighbors' step counts instead.
 
 Where detail in depth is made up, what a picture adds or takes is detail as well, about as deep as it is wide. Scaled
 evenly, all of a ray would share it: from the side a layer along the rays. So a step that would scale smoke to rho is
@@ -181,7 +181,7 @@ def _log_scale(image: Image, transmittance: Image, sensitivity: NDArray[np.float
     gain = share * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
     trust = share * power / (power + floor)
-    # one pixel's blur keeps neighbouring rays from fighting over the voxels that they share
+    # one pixel's blur keeps neighboring rays from fighting over the voxels that they share
     return np.asarray(
         ndimage.gaussian_filter(trust * step, 0.7) / (ndimage.gaussian_filter(trust, 0.7) + 1e-3), np.float32
     )

@@ -1,4 +1,4 @@
-"""What a density fit minimises: one objective for both of its optimisers and for where they stop.
+"""What a density fit minimizes: one objective for both of its optimizers and for where they stop.
 
     E(rho) = sum over terms, pixels of  w |L(rho) - I|^2,    0 <= rho <= bound,  rho = 0 outside the hull
 
@@ -66,7 +66,7 @@ def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A density (nx, ny, nz) that an optimiser found in so many iterations.
+    """A density (nx, ny, nz) that an optimizer found in so many iterations.
 
     `loss` is the objective. `residuals` are what is left of each term's picture (rows, columns, channels), L - I.
     """

@@ -69,13 +69,13 @@ SMOOTHING = 1.5
 def lateral_spread(
     amount: NDArray[np.float32], camera: Camera, domain: Domain
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Heights (n,) and the smoke's standard deviation (n,) across the picture at each, in metres.
+    """Heights (n,) and the smoke's standard deviation (n,) across the picture at each, in meters.
 
-    ``amount`` (rows, columns) is the optical depth, or proportional to it. Heights are above the domain's centre, along
-    `view_frame`'s height. Where there is no smoke the neighbours fill the spread; it is smoothed over two voxels.
+    ``amount`` (rows, columns) is the optical depth, or proportional to it. Heights are above the domain's center, along
+    `view_frame`'s height. Where there is no smoke the neighbors fill the spread; it is smoothed over two voxels.
     """
     rows = on_upright_plane(amount, camera, domain, 1)
-    # normalised convolution: heights count by the smoke that they hold
+    # normalized convolution: heights count by the smoke that they hold
     total = rows.total
     most = total.max(initial=0.0)
     weight = ndimage.gaussian_filter1d(total, 2.0) + 1e-6 * max(most, 1e-30)
@@ -97,8 +97,8 @@ def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     inside = ndimage.distance_transform_edt(np.pad(mask, 1, mode="constant" if mask.all() else "edge"))[1:-1, 1:-1]
     for part in ndimage.find_objects(mask.astype(np.uint8)):  # the box around it, as no ball reaches out of the outline
         radius, balls = 1.5, half[part]
-        while (centres := inside[part] >= radius).any():
-            distance = ndimage.distance_transform_edt(~centres)
+        while (centers := inside[part] >= radius).any():
+            distance = ndimage.distance_transform_edt(~centers)
             np.maximum(balls, np.sqrt(np.maximum(radius**2 - distance**2, 0)), out=balls)
             radius *= 1.1
     return half
@@ -115,7 +115,7 @@ def ball_spread(amount: NDArray[np.float32], camera: Camera, domain: Domain) -> 
 
 
 def _pixel_size(camera: Camera, domain: Domain) -> float:
-    """Width (m) of a pixel at the domain's centre."""
+    """Width (m) of a pixel at the domain's center."""
     if camera.type == "orthographic":
         return 1 / camera.fx
     matrix = np.array(camera.matrix, np.float64)

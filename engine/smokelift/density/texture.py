@@ -31,7 +31,7 @@ Picture = NDArray[np.float32]
 """Optical depth (columns, voxels along the axis) on the screen of a turntable, or the like."""
 
 SIZE = 7
-"""Pixels along a patch's side. With one scale for each factor of two, patches of neighbouring scales overlap widely."""
+"""Pixels along a patch's side. With one scale for each factor of two, patches of neighboring scales overlap widely."""
 
 UNIT = 0.05
 """tau0, in shares of the clip's 95th percentile of optical depth."""
@@ -73,7 +73,7 @@ VOXEL = 12**-0.5
 BODY = 0.1
 """Share of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not count."""
 
-NEIGHBOURS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
+NEIGHBORS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
 """Blurs of the octaves whose energy a band holds, over the band's own: others add less than a hundredth."""
 
 FINE_ENOUGH = 1.5
@@ -208,7 +208,7 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
 
 def _unit_energy(blur: float, width: float) -> float:
     """`_energy` of octaves of unit strength: each is blurred white noise, of which a ray averages independent parts."""
-    own = np.array([each * blur for each in NEIGHBOURS])
+    own = np.array([each * blur for each in NEIGHBORS])
     square = own**2
     bands = 1 / (square + blur**2 / 4) - 2 / (square + blur**2 * 5 / 8) + 1 / (square + blur**2)
     return float(np.sum(square * bands * own / np.hypot(own, width)))

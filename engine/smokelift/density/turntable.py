@@ -22,10 +22,10 @@ Spans = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Turntable:
-    """A domain on a turntable before a camera, with a screen through its centre.
+    """A domain on a turntable before a camera, with a screen through its center.
 
     `lateral`, `depth` and `height` (3,) are the directions (unit, world) of the view that faces the screen. The domain
-    turns about `height`, an axis of the grid through its centre.
+    turns about `height`, an axis of the grid through its center.
     """
 
     lateral: Doubles

@@ -1,4 +1,4 @@
-"""The upright plane through the domain's centre: one picture's rows as heights in the world."""
+"""The upright plane through the domain's center: one picture's rows as heights in the world."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 class PlaneRays(NamedTuple):
-    """Where the rays of pixels meet the domain (rows, columns), by depth: metres behind its centre.
+    """Where the rays of pixels meet the domain (rows, columns), by depth: meters behind its center.
 
     A ray enters at `near` and leaves at `far`, both 0 where `missed` marks that it does not meet the domain. Over the
-    centre's depth it is at `height` and `lateral`, and each changes by `rise` and `drift` a metre of depth.
+    center's depth it is at `height` and `lateral`, and each changes by `rise` and `drift` a meter of depth.
     """
 
     near: NDArray[np.float64]
@@ -81,9 +81,9 @@ def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PlanePicture:
-    """A picture on the upright plane through the domain's centre.
+    """A picture on the upright plane through the domain's center.
 
-    Its `values` (n, m) are at `heights` (n,) above the centre and `laterals` (m,) from it, in metres.
+    Its `values` (n, m) are at `heights` (n,) above the center and `laterals` (m,) from it, in meters.
     """
 
     heights: NDArray[np.float64]
@@ -110,19 +110,19 @@ class PlanePicture:
 def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
     """Put a picture (rows, columns) on the upright plane, ``per_voxel`` rows to a voxel and one column."""
     lateral, depth, height = view_frame(camera)
-    centre = np.array(domain.centre)
+    center = np.array(domain.centre)
     h = domain.voxel_size
     sideways = reach_along(domain, lateral)
     across = np.arange(-sideways + h / 2, sideways, h)
     # what stands before the plane shows beyond the domain's ends there
     ends = reach_along(domain, height) + reach_along(domain, depth) / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
-    points = centre + across[None, :, None] * lateral + up[:, None, None] * height
+    points = center + across[None, :, None] * lateral + up[:, None, None] * height
     return PlanePicture(up, across, seen_at(points, amount, camera))
 
 
 def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
-    """What a picture (rows, columns) shows at points (..., 3), in metres; zero outside and behind the camera."""
+    """What a picture (rows, columns) shows at points (..., 3), in meters; zero outside and behind the camera."""
     pixels, distance = project_points(camera, points)
     at = pixels[..., 1] - 0.5, pixels[..., 0] - 0.5
     values = ndimage.map_coordinates(picture.astype(np.float64), at, order=1, mode="constant")

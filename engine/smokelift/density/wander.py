@@ -84,7 +84,7 @@ class Wander:
     def offset(self, places: Doubles, frame: int) -> Doubles:
         """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
 
-        ``places`` (rows, columns, 3) are where the pixels' rays cross an upright plane through the domain's centre, in
+        ``places`` (rows, columns, 3) are where the pixels' rays cross an upright plane through the domain's center, in
         voxels from there.
         """
         random = np.random.default_rng(self.seed)

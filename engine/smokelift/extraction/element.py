@@ -47,7 +47,7 @@ OUTLIER_FREEDOM = 5.0
 """Degrees of freedom of the noise's Student t distribution: outliers of more than three deviations hardly count."""
 
 ROUNDS, ITERATIONS = 6, 40
-"""Linearisations of ln J, and steps of conjugate gradients for each: twice as many of both change T by .003."""
+"""Linearizations of ln J, and steps of conjugate gradients for each: twice as many of both change T by .003."""
 
 SOURCE_ROUNDS = 6
 """Times that the usual source radiance is found from the smoke, and that from it: six leave T rms within .01 of what

@@ -1,11 +1,11 @@
-"""How integer pixels with an alpha channel hold their colours: three conventions, distinguished by the pixels.
+"""How integer pixels with an alpha channel hold their colors: three conventions, distinguished by the pixels.
 
-Straight colours are the smoke's own. Premultiplied ones are over black: multiplied by alpha in linear light and then
+Straight colors are the smoke's own. Premultiplied ones are over black: multiplied by alpha in linear light and then
 encoded, or encoded and then multiplied, as most compositing programs do. Formats do not say which, or say it wrongly:
 PNG is straight by its specification, and programs write all three.
 
-The right one makes the smoke's own colour vary least: how much light smoke sends depends on how much smoke there is,
-its colour does not. That is a fit of one colour to each convention, so nothing has to be set.
+The right one makes the smoke's own color vary least: how much light smoke sends depends on how much smoke there is,
+its color does not. That is a fit of one color to each convention, so nothing has to be set.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Association = Literal["straight", "premultiplied in linear light", "premultiplie
 
 
 def association(pictures: Iterable[npt.NDArray[Any]], decode: Callable[[npt.ArrayLike], Picture]) -> Association:
-    """Return how pictures (rows, columns, rgba) of encoded values, with 1 as white, hold their colours.
+    """Return how pictures (rows, columns, rgba) of encoded values, with 1 as white, hold their colors.
 
     ``decode`` makes values linear. Opaque pictures are straight.
     """
@@ -33,10 +33,10 @@ def association(pictures: Iterable[npt.NDArray[Any]], decode: Callable[[npt.Arra
         encoded, alpha = shown[:, :3].max(-1), shown[:, 3]
         linear = decode(encoded)
         with np.errstate(all="ignore"):  # curves of HDR have no value far above white
-            colours = np.stack([linear, linear / alpha, decode(encoded / alpha)], -1).astype(np.float64)
+            colors = np.stack([linear, linear / alpha, decode(encoded / alpha)], -1).astype(np.float64)
             # errors of premultiplied values are divided by alpha, too
             weights = np.square(alpha, dtype=np.float64)
-            sums += [np.full(3, weights.sum()), weights @ colours, weights @ colours**2]
+            sums += [np.full(3, weights.sum()), weights @ colors, weights @ colors**2]
     total, first, second = sums
     with np.errstate(all="ignore"):
         variation = second * total / first**2
@@ -46,5 +46,5 @@ def association(pictures: Iterable[npt.NDArray[Any]], decode: Callable[[npt.Arra
 
 
 def association_notes(held: Association) -> tuple[Finding, ...]:
-    """Return how colours are read, where they are not straight."""
-    return () if held == "straight" else (Finding("premultiplied colours", {"held": held}),)
+    """Return how colors are read, where they are not straight."""
+    return () if held == "straight" else (Finding("premultiplied colors", {"held": held}),)

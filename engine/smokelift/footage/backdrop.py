@@ -1,9 +1,9 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
-The first of these that applies: what an alpha channel says; what the scene gives; one colour, if the whole file makes
+The first of these that applies: what an alpha channel says; what the scene gives; one color, if the whole file makes
 it the likeliest (`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show
 next to nothing. If the camera moves before a picture, the frames are registered (`camera_motion`), or the clip is
-refused; one colour is the same wherever it points. The clip's noise is measured first, on what cannot be smoke
+refused; one color is the same wherever it points. The clip's noise is measured first, on what cannot be smoke
 (`noise`). Strokes of the scene change what was found (`strokes`); an alpha channel leaves nothing for them to say.
 """
 
@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
+from smokelift.footage.background_kind import MAX_DEVIATION, color_around, rank, within
 from smokelift.footage.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
@@ -36,25 +36,25 @@ from smokelift.footage.noise import (
 from smokelift.footage.plate import Plate, Plates, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import PROXY_SIDE, Proxy
 from smokelift.footage.strokes import Strokes, stroked_plate, without_others
-from smokelift.footage.video import median_quantiser
+from smokelift.footage.video import median_quantizer
 from smokelift.scene import Background, Camera
 
 MOSTLY = 0.5
-"""Mean share of the picture in one colour from which on that colour is no texture that passes by."""
+"""Mean share of the picture in one color from which on that color is no texture that passes by."""
 
 MIN_KNOWN = 0.1
 """Smallest fraction of what no mask hides that must be seen clear: public clips before a picture show .2 and more
 (docs/clips.md)."""
 
 SEEN_OFTEN = 0.15
-"""Share of the blocks of all frames in one colour from which on that colour is no texture that passes by. Public clips
+"""Share of the blocks of all frames in one color from which on that color is no texture that passes by. Public clips
 have .2 and more, two walls before a moving camera .05 and .12 (docs/experiments/turning-camera.md)."""
 
 TEXTURE = np.float32(6 / 255)
 """White noise, in sRGB values, above which it is texture that a moving camera sees."""
 
 NO_ERRORS = np.zeros((3, 3), np.float32)
-"""Covariance of the colour errors of a known background."""
+"""Covariance of the color errors of a known background."""
 
 MOVING_CAMERA = (
     "The camera moves, so what is behind the smoke cannot be found from the clip. Stabilize the clip (Blender's Movie "
@@ -75,7 +75,7 @@ STROKES_OVER_ONE_FRAME = (
 )
 """Message that refuses strokes."""
 
-Source = Literal["alpha", "given", "colour", "colour around one frame", "black for want of a picture", "picture"]
+Source = Literal["alpha", "given", "color", "color around one frame", "black for want of a picture", "picture"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +98,8 @@ class Backdrop:
         Number of the file's frames, up to the next cut, that it was estimated from.
     shot
         First and last of these in the file; None where it was not estimated from frames.
-    quantiser
-        The file's median quantiser, if known; only for an estimated picture.
+    quantizer
+        The file's median quantizer, if known; only for an estimated picture.
     cut
         Frames of the file before and after a cut within the clip, if there is one.
     strokes
@@ -114,7 +114,7 @@ class Backdrop:
     background: Background | None = None
     frames: int = 0
     shot: tuple[int, int] | None = None
-    quantiser: float | None = None
+    quantizer: float | None = None
     cut: tuple[int, int] | None = None
     strokes: Strokes | None = None
     motion: CameraMotion | None = None
@@ -128,11 +128,11 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     """Find what stands behind the smoke of a clip, given what the scene says of it.
 
     ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves, other
-    than a similarity of the picture mends, and the background is neither given for every frame nor of one colour, or
+    than a similarity of the picture mends, and the background is neither given for every frame nor of one color, or
     strokes are given.
     """
-    grey = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
-    behind, moves = grey or background, camera is not None and camera.moves
+    gray = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
+    behind, moves = gray or background, camera is not None and camera.moves
     if moves and behind is not None and behind.frame is not None:
         raise ValueError(MOVING_CAMERA)
     clip, motion = _on_plate(clip, one_picture(behind, camera, clip))
@@ -145,12 +145,12 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             again: Any = given_plates(behind, camera, quiet)
             plates = replace(again, noise=plates.noise)
-        found = Backdrop("alpha" if grey else "given", quiet, plates, behind, motion=motion)
+        found = Backdrop("alpha" if gray else "given", quiet, plates, behind, motion=motion)
     shown = found.plates
     if found.source == "picture" and isinstance(shown, Plate):
         shown = uncovered(shown, found.clip)
     found = replace(found, clip=cleared(found.clip, shown), plates=shown)
-    if background is None or background.strokes is None or grey is not None:
+    if background is None or background.strokes is None or gray is not None:
         return found
     return _with_strokes(found, background, background.strokes, moves)
 
@@ -187,8 +187,8 @@ def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bo
 def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> Backdrop:
     """The background of a clip when none is given; ``motion`` is that by which its frames are registered."""
     filmed = clip
-    if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
-        return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
+    if len(clip) == len(clip.whole()) == 1 and (around := color_around(clip.frame(0))) is not None:
+        return Backdrop("color around one frame", clip, known_plate(around, clip), frames=1)
     proxy = Proxy.of(clip)
     white = _white_noise(proxy)
     quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
@@ -199,33 +199,33 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     found = rank(even, white)
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
-        if found.colour is None or found.objects.any() or passes_by:
+        if found.color is None or found.objects.any() or passes_by:
             raise ValueError(MOVING_CAMERA)
-        red, green, blue = (float(v) for v in found.colour)
+        red, green, blue = (float(v) for v in found.color)
         behind = Background(color=(red, green, blue))
-        return Backdrop("colour", clip, known_plate(found.colour, clip), behind, len(proxy.numbers))
+        return Backdrop("color", clip, known_plate(found.color, clip), behind, len(proxy.numbers))
     shot = part.numbers[0], part.numbers[-1]
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
-    # black, or a colour seen often, is the same wherever the camera points; any other may be texture that passes by
+    # black, or a color seen often, is the same wherever the camera points; any other may be texture that passes by
     often = found.clear > SEEN_OFTEN and white.max() <= TEXTURE
-    plain = found.colour is not None and (often or not found.colour.any())
+    plain = found.color is not None and (often or not found.color.any())
     if not plain and motion is None:
         shaken = find_motion(proxy.with_own(part))
         if shaken == "other":
             raise ValueError(MOVING_CAMERA)
         if shaken is not None:
             return _estimated(_registered(filmed, shaken), moves, shaken)
-    colour, objects = found.colour, found.objects
-    source: Source = "colour"
-    if colour is None:
+    color, objects = found.color, found.objects
+    source: Source = "color"
+    if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
         shown = part.with_still()
         plate = _picture(clip, shown, white)
         if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
-            return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
+            return made("picture", plates=plate, quantizer=median_quantizer(clip.path))
         # fog drifts over all of the file: treat it as filmed before black
-        colour, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    return made(source, plates=_of_one_colour(clip, part, even, gains, colour, objects, white))
+        color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
+    return made(source, plates=_of_one_color(clip, part, even, gains, color, objects, white))
 
 
 def _picture(clip: Clip, part: Proxy, white: Picture) -> Plate:
@@ -241,16 +241,16 @@ def _picture(clip: Clip, part: Proxy, white: Picture) -> Plate:
     )
 
 
-def _of_one_colour(
-    clip: Clip, part: Proxy, even: Proxy, gains: Picture, colour: Picture, objects: Mask, white: Picture
+def _of_one_color(
+    clip: Clip, part: Proxy, even: Proxy, gains: Picture, color: Picture, objects: Mask, white: Picture
 ) -> Plate:
-    """The plate of one colour with the objects before it."""
-    image = np.tile(colour, (*objects.shape, 1))
+    """The plate of one color with the objects before it."""
+    image = np.tile(color, (*objects.shape, 1))
     deviations = _deviations(even, image)
-    # smoke moves a colour to one side: deviations to the other side are noise alone
+    # smoke moves a color to one side: deviations to the other side are noise alone
     sides = (np.where(beyond, np.float32(np.nan), deviations) for beyond in (deviations > 0, deviations < 0))
     noise = noise_of(white, np.minimum(*map(spread_about, sides)), even.scale**2)
-    whole = np.tile(colour, (*clip.size[::-1], 1))
+    whole = np.tile(color, (*clip.size[::-1], 1))
     if objects.any():
         own = np.median(even.pictures[:, objects], axis=0)
         image[objects] = own

@@ -1,9 +1,9 @@
-"""Whether a clip stands before one colour or a picture: one cost ranks them.
+"""Whether a clip stands before one color or a picture: one cost ranks them.
 
 A block of the picture is clear, and shows its background within the noise, or it is smoke, and shows anything. Smoke
 goes on as it was, or jumps to any value. The cost of a background is the negative logarithm of the blocks' probability
-in their likeliest states (Viterbi, "Error bounds for convolutional codes", 1967). One colour stands behind all blocks
-but a few objects. A picture has its own colour in each block, which costs as much as a jump: all colours are equally
+in their likeliest states (Viterbi, "Error bounds for convolutional codes", 1967). One color stands behind all blocks
+but a few objects. A picture has its own color in each block, which costs as much as a jump: all colors are equally
 likely in either.
 
 A frame that is black everywhere says nothing against a picture, since clips fade. All frames of the file up to the next
@@ -45,11 +45,11 @@ STAY_PROBABILITY, SWITCH_PROBABILITY = 0.98, 0.03
 smoke. Jumps rank the backgrounds; these only break ties."""
 
 OBJECT = 0.1
-"""Probability that a block is an object before one colour (a nozzle, a floor, a logo), and largest share of such
-blocks. Public clips before one colour have up to .02 (docs/clips.md)."""
+"""Probability that a block is an object before one color (a nozzle, a floor, a logo), and largest share of such
+blocks. Public clips before one color have up to .02 (docs/clips.md)."""
 
 MIN_SHOWN_SHARE = 0.25
-"""Smallest share of the blocks that must show the one colour at some time."""
+"""Smallest share of the blocks that must show the one color at some time."""
 
 MIN_STILL_SHARE = 0.9
 """Smallest share of the frames in which an object is within half of the limit of its median: smoke wavers more."""
@@ -58,7 +58,7 @@ MIN_SEEN_SHARE = 0.99
 """Smallest share of a block that no mask hides."""
 
 CANDIDATES = 4
-"""Number of the commonest colours that are tried."""
+"""Number of the commonest colors that are tried."""
 
 MIN_BLACK_SHARE = 0.98
 """Share of black blocks from which on a frame counts as black everywhere."""
@@ -71,20 +71,20 @@ DETAIL_QUANTILE, MAX_MIST_DETAIL = 0.99, np.float32(15 / 255)
 of 255, walls and stages in the dark 17 to 40 (docs/experiments/background.md)."""
 
 MAX_SIDE_DIFFERENCE, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
-"""Difference in sRGB values up to which a block has the colour around a single picture, and share of such blocks needed
-along each of three sides. 18 frames of public clips before one colour have 0.56 to 1, others 0.2 at most, but for
+"""Difference in sRGB values up to which a block has the color around a single picture, and share of such blocks needed
+along each of three sides. 18 frames of public clips before one color have 0.56 to 1, others 0.2 at most, but for
 stages in the dark (docs/experiments/background.md)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """The likeliest background: one linear colour (3,), or a picture if ``colour`` is None.
+    """The likeliest background: one linear color (3,), or a picture if ``color`` is None.
 
-    ``objects`` (rows, columns) are the proxy's pixels where something hides the colour all the time. ``clear`` is the
-    share of all blocks and frames that show the colour.
+    ``objects`` (rows, columns) are the proxy's pixels where something hides the color all the time. ``clear`` is the
+    share of all blocks and frames that show the color.
     """
 
-    colour: Picture | None
+    color: Picture | None
     objects: Mask
     clear: float
 
@@ -109,7 +109,7 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
     for value in values:
         picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
     best = float(picture.mean()) + jump
-    colour, found, share = None, np.zeros(values.shape[1], np.bool_), 0.0
+    color, found, share = None, np.zeros(values.shape[1], np.bool_), 0.0
     still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
     for candidate in _candidates(values, limit):
         clear = within(values - candidate, limit)
@@ -119,28 +119,28 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
         if candidate.max() <= EIGHT_BIT_STEP and not _sharp(proxy, white):
             stands[:] = False
         cost = np.where(stands, np.minimum(own - np.log(OBJECT), cost), cost)
-        # smoke of one brightness moves a colour to one side only
+        # smoke of one brightness moves a color to one side only
         brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
         if total < best and stands.mean() <= OBJECT and shows.mean() >= MIN_SHOWN_SHARE:
             best, found, share = total, stands & still, float(clear.mean())
-            colour = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
-            colour[linear_to_srgb(colour) < EIGHT_BIT_STEP / 2] = 0
-    return Ranking(colour, on_picture(found), share)
+            color = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
+            color[linear_to_srgb(color) < EIGHT_BIT_STEP / 2] = 0
+    return Ranking(color, on_picture(found), share)
 
 
-def colour_around(picture: Picture) -> tuple[float, float, float] | None:
-    """Return the linear colour along the sides of a single picture (rows, columns, 3), or None if they have several.
+def color_around(picture: Picture) -> tuple[float, float, float] | None:
+    """Return the linear color along the sides of a single picture (rows, columns, 3), or None if they have several.
 
-    One picture does not show what never changes, so all that has another colour may be smoke. Smoke may enter from one
+    One picture does not show what never changes, so all that has another color may be smoke. Smoke may enter from one
     side, and cover more of the picture than its background does.
     """
     linear = block_means(picture[None])[0]
     blocks = linear_to_srgb(linear)
     sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
-    colour = np.median(np.concatenate(sides[0]), axis=0)
-    alike = [(np.abs(side - colour) <= MAX_SIDE_DIFFERENCE).all(-1) for side in sides[0]]
+    color = np.median(np.concatenate(sides[0]), axis=0)
+    alike = [(np.abs(side - color) <= MAX_SIDE_DIFFERENCE).all(-1) for side in sides[0]]
     if sum(side.mean() >= MIN_SIDE_SHARE for side in alike) < 3:
         return None
     red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
@@ -172,7 +172,7 @@ def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
 
 
 def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
-    """The colours of blocks (frames, blocks, 3), in sRGB values, and the numbers of rows and columns of blocks."""
+    """The colors of blocks (frames, blocks, 3), in sRGB values, and the numbers of rows and columns of blocks."""
     rows, columns = proxy.seen.shape[1:]
     wide, high = reduced_size(columns, rows, BLOCKS)
     values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
@@ -194,18 +194,18 @@ def _limit(values: Picture, white: Picture) -> Picture:
 
 
 def _candidates(values: Picture, limit: Picture) -> list[Picture]:
-    """Black, and the commonest colours of all blocks."""
+    """Black, and the commonest colors of all blocks."""
     left = values.reshape(-1, 3)
     found = [np.zeros(3, np.float32)]
     while len(left) and len(found) <= CANDIDATES:
         cells = np.floor(left / (2 * limit)).astype(np.int64) @ np.array([1, 1 << 20, 1 << 40])
         _, which, counts = np.unique(cells, return_inverse=True, return_counts=True)
-        colour = np.median(left[which == counts.argmax()], axis=0)
+        color = np.median(left[which == counts.argmax()], axis=0)
         for _ in range(3):  # mean shift settles it
-            near = within(left - colour, limit)
-            colour = left[near].mean(0) if near.any() else colour
-        found.append(colour)
-        left = left[~within(left - colour, 2 * limit)]
+            near = within(left - color, limit)
+            color = left[near].mean(0) if near.any() else color
+        found.append(color)
+        left = left[~within(left - color, 2 * limit)]
     return found
 
 

@@ -367,7 +367,7 @@ def _within_reach(match: Match, shape: tuple[int, ...]) -> bool:
 
 
 def _detail(picture: Picture) -> Picture:
-    """The band-passed grey of a linear picture (rows, columns, 3), in units of the contrast around each pixel."""
-    grey = channel_mean(linear_to_srgb(picture))
-    detail = blurred(grey, FINE_SIGMA) - blurred(grey, COARSE_SIGMA)
+    """The band-passed gray of a linear picture (rows, columns, 3), in units of the contrast around each pixel."""
+    gray = channel_mean(linear_to_srgb(picture))
+    detail = blurred(gray, FINE_SIGMA) - blurred(gray, COARSE_SIGMA)
     return np.asarray(detail / np.sqrt(blurred(detail**2, CONTRAST_SIGMA) + MIN_CONTRAST**2), np.float32)

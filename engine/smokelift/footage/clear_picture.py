@@ -119,28 +119,28 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     """
     width = smoothing(noise)
     pictures, seen = proxy.pictures, proxy.seen
-    grey = np.stack([blurred(channel_mean(encoded), width) for encoded in proxy.encoded])
-    grey[~seen] = np.nan
-    some = np.ascontiguousarray(grey[:, ::STRIDE, ::STRIDE])
+    gray = np.stack([blurred(channel_mean(encoded), width) for encoded in proxy.encoded])
+    gray[~seen] = np.nan
+    some = np.ascontiguousarray(gray[:, ::STRIDE, ::STRIDE])
     window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
     smoke = _smoke_of(some, window)
-    height, across = grey.shape[1:]
+    height, across = gray.shape[1:]
     brightens = np.repeat(np.repeat(smoke.brightens, STRIDE, 0), STRIDE, 1)[:height, :across]
-    grey *= np.where(brightens, np.float32(1), np.float32(-1))
+    gray *= np.where(brightens, np.float32(1), np.float32(-1))
     image = np.empty((height, across, 3), np.float32)
     known, calm = np.empty((2, height, across), np.bool_)
-    clear = np.empty(grey.shape, np.bool_)
+    clear = np.empty(gray.shape, np.bool_)
     rows = max(1, BAND // across)
     for row in range(0, height, rows):
         band = slice(row, row + rows)
         image[band], known[band], calm[band], clear[:, band] = _clear_values(
-            pictures[:, band], grey[:, band], window, smoke.similarity
+            pictures[:, band], gray[:, band], window, smoke.similarity
         )
     known = in_one_piece(known)
     if not known.all():
         # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
         known = in_one_piece(known | (calm & (MIN_CHANGE_SHARE * _unlike(image, known) >= window + DRIFT)))
-        # or if it is like them: smoke hardly changes a background of its own colour
+        # or if it is like them: smoke hardly changes a background of its own color
         known = mostly_beside(in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
@@ -154,19 +154,19 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:
-    """Difference (rows, columns) of a linear picture from its known part, continued, in grey sRGB values."""
+    """Difference (rows, columns) of a linear picture from its known part, continued, in gray sRGB values."""
     encoded = linear_to_srgb(image)
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
 
-def _smoke_of(grey: Picture, window: float) -> _Smoke:
-    """Measure the smoke in grey pictures (frames, rows, columns).
+def _smoke_of(gray: Picture, window: float) -> _Smoke:
+    """Measure the smoke in gray pictures (frames, rows, columns).
 
     Its similarity is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
     the value that it moves every background towards; it brightens pixels of a darker background.
     """
-    shape = grey.shape[1:]
-    values = grey.reshape(len(grey), -1)
+    shape = gray.shape[1:]
+    values = gray.reshape(len(gray), -1)
     ordered = np.sort(values, axis=0)
     counts = np.ones(ordered.shape, np.int16)  # values from each one up to a window above it
     for lag in range(1, len(ordered)):
@@ -198,7 +198,7 @@ def _smoke_of(grey: Picture, window: float) -> _Smoke:
 
 
 def _turn(background: Picture, change: Picture) -> float:
-    """The grey value below which changes (frames, n) brighten backgrounds (n,), and above which they darken them."""
+    """The gray value below which changes (frames, n) brighten backgrounds (n,), and above which they darken them."""
     brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
     one_sided = ONE_SIDED * float((brighter + darker).sum())
     if brighter.sum() >= one_sided:
@@ -217,7 +217,7 @@ def _clear_values(
     """The linear background of each pixel; whether it is certain; whether it only drifts; the frames that show it.
 
     An uncertain background is the least smoky value; that of a drifting pixel is the median. ``away`` is the pictures'
-    grey value, negated where smoke darkens: the lower, the clearer.
+    gray value, negated where smoke darkens: the lower, the clearer.
     """
     unseen, number = np.isnan(away), count_of_seen(away)
     alike = (np.abs(np.diff(away, axis=0)) <= window).sum(0)
@@ -238,12 +238,12 @@ def _clear_values(
         certain |= (inside | unseen).all(0) & often
         np.copyto(best, value, where=certain & (value < best))
     known = np.isfinite(best)
-    centre = np.where(known, best, lowest) + np.float32(0.5 * window)
-    centre = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), centre)
+    center = np.where(known, best, lowest) + np.float32(0.5 * window)
+    center = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), center)
     for _ in range(3):  # mean shift settles the window around the mean of its values
-        inside = np.abs(away - centre) <= 0.5 * window * 1.001
+        inside = np.abs(away - center) <= 0.5 * window * 1.001
         within = np.maximum(inside.sum(0), 1)
-        centre = np.where(inside, away, 0).sum(axis=0) / within
+        center = np.where(inside, away, 0).sum(axis=0) / within
     value = np.einsum("tyxc,tyx->yxc", pictures, inside.astype(np.float32)) / within[..., None]
     return value.astype(np.float32), known, calm, inside
 

@@ -51,9 +51,9 @@ class Clip:
     warning
         What is said of a defect (a truncated file, say), else None.
     lens
-        Focal length in millimetres on 35 mm film, if the file says it.
+        Focal length in millimeters on 35 mm film, if the file says it.
     backdrop
-        Linear grey that is shown behind pictures with an alpha channel; None behind opaque ones.
+        Linear gray that is shown behind pictures with an alpha channel; None behind opaque ones.
     mask
         What hides a part of the frames, if anything does.
     """

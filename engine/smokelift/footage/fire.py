@@ -1,7 +1,7 @@
 """Fire in smoke: pixels that shine by themselves, and a clip with smoke in their place.
 
-Fire is brighter than light explains. Smoke reflects no more than white does, and coloured smoke less. So a pixel with
-the colours of glowing soot shines by itself if it is as bright as white, or far brighter than smoke of other colours in
+Fire is brighter than light explains. Smoke reflects no more than white does, and colored smoke less. So a pixel with
+the colors of glowing soot shines by itself if it is as bright as white, or far brighter than smoke of other colors in
 the same light. Without emission, a flame would be read as the densest smoke of all, and its light as what lights the
 rest. What a flame hides is unknown: the smoke beside it is continued there. Figures: docs/experiments/fire.md.
 """
@@ -33,14 +33,14 @@ MIN_BRIGHTNESS_RATIO = 3.0
 """Smallest ratio of what fire adds to the background to what other smoke adds: fire lights the smoke near it."""
 
 MIN_FIRE_SHARE, MIN_SMOKE_SHARE = 0.0005, 0.1
-"""Smallest shares of smoke pixels that are fire, and that have another colour."""
+"""Smallest shares of smoke pixels that are fire, and that have another color."""
 
 MIN_BRIGHT_SHARE = 0.25
 """Smallest share of the fire that is so bright: six public clips of fire have .4 to .7, red smoke and red ink none
 (docs/experiments/fire.md)."""
 
-MIN_COLOURED_VALUE = 0.01
-"""Linear value of a pixel's largest channel from which on its colour counts: 8 bits show none in darker ones."""
+MIN_COLORED_VALUE = 0.01
+"""Linear value of a pixel's largest channel from which on its color counts: 8 bits show none in darker ones."""
 
 GLOW = 0.01
 """Width of the edge that still glows, as a share of the picture's longer side."""
@@ -48,13 +48,13 @@ GLOW = 0.01
 CLIPPED_VALUE = 0.95
 """Linear value from which on a channel may be clipped."""
 
-COLOUR_FRAMES = 8
-"""Largest number of frames that the colour of fire is taken from."""
+COLOR_FRAMES = 8
+"""Largest number of frames that the color of fire is taken from."""
 
 
 @dataclass(frozen=True)
 class HotPixels:
-    """Smoke pixels that have the colours of fire and add as much light.
+    """Smoke pixels that have the colors of fire and add as much light.
 
     ``share`` is theirs of all smoke pixels, ``bright`` that of them which are brighter than light explains.
     """
@@ -73,18 +73,18 @@ class HotPixels:
         return self.share * self.bright > MIN_FIRE_SHARE
 
 
-def hot_pixels(colours: Picture, behind: Picture) -> HotPixels:
+def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
     """Return how much of the smoke may be fire.
 
-    ``colours`` and ``behind`` are the linear radiance (n, 3) of the smoke's pixels and of their background.
+    ``colors`` and ``behind`` are the linear radiance (n, 3) of the smoke's pixels and of their background.
     """
-    fire, brightest = _hot(colours, behind), brightest_channel(colours)
+    fire, brightest = _hot(colors, behind), brightest_channel(colors)
     if not fire.any():
         return HotPixels(0.0, 0.0)
-    added = brightest_channel(colours - behind)
-    # a core clipped to yellow or white does not show its colour
-    other = ~_warm(colours) & (brightest > MIN_COLOURED_VALUE) & (brightest < CLIPPED_VALUE)
-    bright = colours[..., 0] > WHITE_RED
+    added = brightest_channel(colors - behind)
+    # a core clipped to yellow or white does not show its color
+    other = ~_warm(colors) & (brightest > MIN_COLORED_VALUE) & (brightest < CLIPPED_VALUE)
+    bright = colors[..., 0] > WHITE_RED
     if other.mean() >= MIN_SMOKE_SHARE:
         bright |= added > MIN_BRIGHTNESS_RATIO * np.percentile(added[other], 95)
     return HotPixels(float(fire.mean()), float(bright[fire].mean()))
@@ -100,14 +100,14 @@ def firelight(clip: Clip, doused: Clip) -> Clip:
     return clip.changed(lambda number, picture: np.maximum(picture - doused.frame(number), 0))
 
 
-def fire_colour(clip: Clip, light: Clip) -> Vector:
-    """Return the colour of a clip's `firelight`, the largest of red, green and blue 1; the light must not be all zero.
+def fire_color(clip: Clip, light: Clip) -> Vector:
+    """Return the color of a clip's `firelight`, the largest of red, green and blue 1; the light must not be all zero.
 
     It is the mean over pixels that are not clipped (over all if all are), weighted by the light's brightness, since
     smoke mistaken for fire is as bright everywhere.
     """
     whole, certain = np.zeros(3), np.zeros(3)
-    for number in clip.spread(COLOUR_FRAMES):
+    for number in clip.spread(COLOR_FRAMES):
         picture, added = clip.frame(number), light.frame(number)
         weighted = added * added.max(-1, keepdims=True)
         whole += weighted.sum((0, 1), dtype=np.float64)
@@ -130,13 +130,13 @@ def _doused(picture: Picture, plate: Plate) -> Picture:
     return np.where(fire[..., None], picture[rows, columns], picture)
 
 
-def _hot(colours: Picture, behind: Picture) -> Mask:
-    """Whether light of a fire's colour and strength is added."""
-    return _warm(colours) & (colours[..., 0] - behind[..., 0] > MIN_FLAME_RED)
+def _hot(colors: Picture, behind: Picture) -> Mask:
+    """Whether light of a fire's color and strength is added."""
+    return _warm(colors) & (colors[..., 0] - behind[..., 0] > MIN_FLAME_RED)
 
 
-def _warm(colours: Picture) -> Mask:
-    red, green, blue = np.moveaxis(colours, -1, 0)
+def _warm(colors: Picture) -> Mask:
+    red, green, blue = np.moveaxis(colors, -1, 0)
     return np.asarray((green < WARM * red) & (blue < WARM * green))
 
 

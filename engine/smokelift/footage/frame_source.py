@@ -20,7 +20,7 @@ DEFAULT_FPS = 24.0
 """Frames a second if neither the file nor the user gives a rate: that of film."""
 
 FOCAL_LENGTHS = (4.0, 2000.0)
-"""Focal lengths in millimetres on 35 mm film, from a fisheye to a telescope; others, often 0, mean it is unknown."""
+"""Focal lengths in millimeters on 35 mm film, from a fisheye to a telescope; others, often 0, mean it is unknown."""
 
 MIDDLE = 0.5
 """sRGB value as far from black as from white."""
@@ -85,7 +85,7 @@ class StoredPicture:
         return _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
 
     def chequered(self, width: int, height: int, first: int) -> tuple[Picture, Picture]:
-        """Return two `averaged` pictures, one of either colour's pixels of a chequerboard.
+        """Return two `averaged` pictures, one of either color's pixels of a chequerboard.
 
         ``first`` is 0 if the top left pixel belongs to the first picture, 1 if to the second.
         """
@@ -97,10 +97,10 @@ class StoredPicture:
             weights.eliminate_zeros()
             sums.append(self.sum_lines(weights))
 
-        def average(colour: int) -> Picture:
-            light = sums[colour].copy()
-            light[:, 1::2] = sums[1 - colour][:, 1::2]
-            board = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == colour
+        def average(color: int) -> Picture:
+            light = sums[color].copy()
+            light[:, 1::2] = sums[1 - color][:, 1::2]
+            board = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == color
             share = np.maximum(area_average(board, width, height), np.float32(1e-6))
             return np.asarray(area_average(light, width, height) / share[..., None])
 
@@ -132,9 +132,9 @@ class FrameSource(Protocol):
     files
         The video, or one picture for each frame.
     lens
-        Focal length in millimetres on 35 mm film (of its diagonal, as CIPA DCG-001 defines it), if the file says it.
+        Focal length in millimeters on 35 mm film (of its diagonal, as CIPA DCG-001 defines it), if the file says it.
     backdrop
-        Linear grey shown behind pictures with an alpha channel; None if they are opaque.
+        Linear gray shown behind pictures with an alpha channel; None if they are opaque.
     """
 
     count: int
@@ -163,7 +163,7 @@ class FrameSource(Protocol):
 
 
 def focal_length(value: object) -> float | None:
-    """Return the focal length in millimetres that a file's value says; None if it says none."""
+    """Return the focal length in millimeters that a file's value says; None if it says none."""
     try:
         focal = float(str(value))
     except ValueError:
@@ -179,7 +179,7 @@ def sound_samples(count: int, read: Callable[[int], Sample]) -> Iterator[Sample]
 
 
 def shown_before(layer: Layer, backdrop: float | None) -> Picture:
-    """Return a picture over a linear grey, or over black if that is None."""
+    """Return a picture over a linear gray, or over black if that is None."""
     picture, alpha = layer
     if alpha is None or not backdrop:
         return picture
@@ -187,9 +187,9 @@ def shown_before(layer: Layer, backdrop: float | None) -> Picture:
 
 
 def backdrop_of(layers: Iterable[Layer]) -> float | None:
-    """Return the linear grey to show pictures of a clip over; None if they are opaque.
+    """Return the linear gray to show pictures of a clip over; None if they are opaque.
 
-    An alpha channel is the matte of the smoke, whatever stands behind it. Such pictures are shown over a colour that is
+    An alpha channel is the matte of the smoke, whatever stands behind it. Such pictures are shown over a color that is
     known for certain: white behind dark smoke, black behind bright smoke.
     """
     light, opacity, opaque = 0.0, 0.0, True

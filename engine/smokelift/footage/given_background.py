@@ -1,4 +1,4 @@
-"""The background that a scene gives: one colour, a clean plate, or one clean plate for each frame."""
+"""The background that a scene gives: one color, a clean plate, or one clean plate for each frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, Scene, shared_part
 
 ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.9
-"""Difference in sRGB values up to which a pixel has a backdrop's colour, and smallest share of such pixels: the others
+"""Difference in sRGB values up to which a pixel has a backdrop's color, and smallest share of such pixels: the others
 are a nozzle, a floor, a logo."""
 
 
@@ -76,7 +76,7 @@ def _mean_of_frames(numbers: Sequence[int], clip: Clip) -> Picture:
 
 
 def background_picture(scene: Scene, camera: Camera | None = None) -> Picture:
-    """Return the linear background as a camera sees it: (rows, columns, 3), or (3,) if it is one colour.
+    """Return the linear background as a camera sees it: (rows, columns, 3), or (3,) if it is one color.
 
     A plate that changes is shown at the clip's first frame; without a background it is black. The camera is by default
     the scene's own; `behind` says what another one sees of a clean plate. ImageError or ClipError is raised if the
@@ -103,7 +103,7 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
     """Return what a camera sees of a clean plate (rows, columns, 3) that its ``own`` camera filmed.
 
     A camera at the same place whose picture is a part of the plate's, at any resolution, sees that part,
-    (rows, columns, 3). Any other sees the plate's mean colour, (3,).
+    (rows, columns, 3). Any other sees the plate's mean color, (3,).
     """
     part = shared_part(own, camera)
     if part is None:
@@ -111,8 +111,8 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
     return area_average(area_average(plate, *own.size)[part], *camera.size)
 
 
-def backdrop_colour(plate: Picture) -> Picture | None:
-    """Return the linear colour (3,) of a clean plate (rows, columns, 3) of one colour; None of any other plate."""
-    colour = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
-    alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(colour)) <= ALIKE).all(-1)
-    return colour if alike.mean() >= MIN_ALIKE_SHARE else None
+def backdrop_color(plate: Picture) -> Picture | None:
+    """Return the linear color (3,) of a clean plate (rows, columns, 3) of one color; None of any other plate."""
+    color = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
+    alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(color)) <= ALIKE).all(-1)
+    return color if alike.mean() >= MIN_ALIKE_SHARE else None

@@ -63,7 +63,7 @@ class ImageSequence:
 
     @property
     def notes(self) -> tuple[Finding, ...]:
-        """How colours are held beside alpha, and that the pictures are reduced, if they are."""
+        """How colors are held beside alpha, and that the pictures are reduced, if they are."""
         held = association_notes(self._held)
         if self._size is None or self._size == (small := readable_size(*self._size)):
             return held
@@ -168,7 +168,7 @@ def _found(path: Path, prefix: str, digits: int, suffix: str) -> dict[int, Path]
 
 
 def _focal_length(path: Path) -> float | None:
-    """The focal length in a picture's EXIF, in millimetres on 35 mm film; None if there is none."""
+    """The focal length in a picture's EXIF, in millimeters on 35 mm film; None if there is none."""
     try:
         with Image.open(path) as picture:
             return focal_length(picture.getexif().get_ifd(_EXIF).get(_FOCAL_LENGTH_IN_35MM_FILM))

@@ -1,7 +1,7 @@
 """Single pictures as linear float32 arrays [row, column, rgb], row 0 at the top.
 
-Integer pictures (PNG, JPEG, TIFF, DPX) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets
-three equal channels. Alpha is shown over black: EXR colours are premultiplied in linear light, by the format's rule;
+Integer pictures (PNG, JPEG, TIFF, DPX) are sRGB unless said otherwise, EXR and HDR are linear. A gray picture gets
+three equal channels. Alpha is shown over black: EXR colors are premultiplied in linear light, by the format's rule;
 those of integer pictures are read by one of the three conventions of `alpha`.
 """
 
@@ -37,7 +37,7 @@ from PIL.TiffImagePlugin import (
 
 import smokelift._core as _core
 from smokelift.footage.alpha import Association
-from smokelift.footage.colour import Encoding, hlg_to_linear, pq_to_linear
+from smokelift.footage.color import Encoding, hlg_to_linear, pq_to_linear
 from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
@@ -145,7 +145,7 @@ def decode_integers(
     """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black.
 
     The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque. ``held``
-    says how colours are held beside alpha.
+    says how colors are held beside alpha.
     """
     alpha = decode_alpha(codes, white)
     if alpha is not None and held == "premultiplied in code values":
@@ -194,7 +194,7 @@ def read_layer(
 ) -> tuple[Picture, Picture | None]:
     """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one.
 
-    ``held`` says how integer pixels hold their colours beside alpha.
+    ``held`` says how integer pixels hold their colors beside alpha.
     """
     stored = _read(Path(path))
     if not isinstance(stored, tuple):
@@ -286,7 +286,7 @@ def _require_size(path: Path, size: tuple[int, int]) -> None:
 
 
 def _read_radiance(path: Path) -> npt.NDArray[Any]:
-    """Read a Radiance .hdr of the usual kind; FFmpeg reads the others upside down or in wrong colours."""
+    """Read a Radiance .hdr of the usual kind; FFmpeg reads the others upside down or in wrong colors."""
     with path.open("rb") as file:
         head = file.read(4096)
     if b"FORMAT=32-bit_rle_xyze" in head or re.search(rb"\n(\+Y|[+-]X) \d+ [+-][XY] \d+\n|\n-Y \d+ -X \d+\n", head):
@@ -307,7 +307,7 @@ def _read_integers(path: Path) -> Codes:
     else:
         by_ffmpeg = head.startswith((b"SDPX", b"XPDS")) or (head.startswith(b"\x89PNG") and head[24] == 16)
     if by_ffmpeg:
-        return _read_with_ffmpeg(path)  # Pillow would cut 16 bit colour to 8
+        return _read_with_ffmpeg(path)  # Pillow would cut 16 bit color to 8
     with Image.open(path) as picture:
         _require_size(path, picture.size)
         upright = ImageOps.exif_transpose(picture)
@@ -320,14 +320,14 @@ def _is_plain_tiff(path: Path, head: bytes) -> bool:
     with path.open("rb") as file:
         file.seek(tags.next)
         tags.load(file)
-    grey_or_rgb = tags.get(PHOTOMETRIC_INTERPRETATION) in (1, 2) and TILEWIDTH not in tags
+    gray_or_rgb = tags.get(PHOTOMETRIC_INTERPRETATION) in (1, 2) and TILEWIDTH not in tags
     wide = max(tags.get(BITSPERSAMPLE, (1,))) > 8
-    if FLOAT in tags.get(SAMPLEFORMAT, ()) or (wide and not grey_or_rgb):
+    if FLOAT in tags.get(SAMPLEFORMAT, ()) or (wide and not gray_or_rgb):
         raise PictureKindError(
-            f"{path}: is neither grey nor RGB in whole numbers, or is stored in tiles; save it as .exr, or as an "
+            f"{path}: is neither gray nor RGB in whole numbers, or is stored in tiles; save it as .exr, or as an "
             "ordinary TIFF of 8 or 16 bits"
         )
-    return grey_or_rgb
+    return gray_or_rgb
 
 
 @contextmanager
@@ -355,11 +355,11 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
         parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # so the library reports damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
-    part, colours = _exr_colours(path, parts)
+    part, colors = _exr_colors(path, parts)
     ((left, top), (width, height)), ((x0, y0), _) = (_window(part, name) for name in ("displayWindow", "dataWindow"))
     image = np.zeros((height, width, 4), np.float32)
-    opacity = [f"{_layer_of(colours[0])}A"] if f"{_layer_of(colours[0])}A" in part.channels else []
-    for channel, name in enumerate((*colours, *opacity)):
+    opacity = [f"{_layer_of(colors[0])}A"] if f"{_layer_of(colors[0])}A" in part.channels else []
+    for channel, name in enumerate((*colors, *opacity)):
         pixels = part.channels[name].pixels[max(0, top - y0) :, max(0, left - x0) :]
         target = image[max(0, y0 - top) :, max(0, x0 - left) :, channel]
         rows, columns = np.minimum(target.shape, pixels.shape)
@@ -374,10 +374,10 @@ def _window(part: Any, name: str) -> tuple[tuple[int, int], tuple[int, int]]:
     return (left, top), (right - left + 1, bottom - top + 1)
 
 
-def _exr_colours(path: Path, parts: Sequence[Any]) -> tuple[Any, tuple[str, str, str]]:
+def _exr_colors(path: Path, parts: Sequence[Any]) -> tuple[Any, tuple[str, str, str]]:
     """Choose the part, and in it red, green and blue: plain ones, else those of a `BEAUTY` pass, else the first.
 
-    Where no part has them, it is grey: luminance, or all that there is if that is no depth.
+    Where no part has them, it is gray: luminance, or all that there is if that is no depth.
     """
     named = [(part, name) for part in parts for name in part.channels]
 
@@ -458,7 +458,7 @@ def sum_lines(values: Picture, weights: scipy.sparse.csr_array) -> Picture:
 
 @lru_cache
 def _gaussian(deviation: float) -> npt.NDArray[np.float64]:
-    """The weights of a pixel and of its neighbours to one side, up to four standard deviations."""
+    """The weights of a pixel and of its neighbors to one side, up to four standard deviations."""
     away = np.arange(int(4.0 * deviation + 0.5) + 1)
     values = np.exp(-0.5 / deviation**2 * away**2)
     whole = np.concatenate([values[:0:-1], values])

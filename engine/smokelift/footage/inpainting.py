@@ -41,7 +41,7 @@ def push_pull(image: Picture, confidence: Picture) -> Picture:
 
 
 def continuation_errors(image: Picture, known: Mask) -> Picture:
-    """Return the covariance (3, 3) of the colours' errors where a linear picture is continued from what is known.
+    """Return the covariance (3, 3) of the colors' errors where a linear picture is continued from what is known.
 
     They are measured on known pixels, which the shifted outline of the unknown leaves out. The mean error is not
     subtracted: it says nothing of that behind the smoke (docs/experiments/background.md). Zero if nothing is

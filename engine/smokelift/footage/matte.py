@@ -29,7 +29,7 @@ MIN_DEVIATION, FULL_DEVIATION = 1.5, 3.0
 """Deviations above which a pixel counts, and counts fully, in units of noise (docs/experiments/density-profile.md)."""
 
 MEASURED_DEVIATION = 4.0
-"""Deviation, in units of noise, above which smoke is used to measure the box, the light and the colour."""
+"""Deviation, in units of noise, above which smoke is used to measure the box, the light and the color."""
 
 SMOOTHING = 1.5
 """Smallest standard deviation, in pixels, of the Gaussian that smooths deviations."""

@@ -3,7 +3,7 @@
 White noise differs from pixel to pixel: a mean over n pixels keeps the n-th part of its variance. Lasting noise, like a
 codec's, is shared by many pixels: a mean keeps all of it.
 
-Neither is measured on what moves, since smoke may fill the picture. White noise is how differences of neighbouring
+Neither is measured on what moves, since smoke may fill the picture. White noise is how differences of neighboring
 pixels change from frame to frame: smoke has hardly any detail so fine. Lasting noise is how far samples that agree on a
 background spread about it.
 """
@@ -30,7 +30,7 @@ BLOCKS_APART = 3
 """Blocks from one row or column to the next of those that white noise is measured in: its median needs no more."""
 
 MEDIAN_OF_BLOCK = 0.955
-"""Median over mean of a block's sum of squared differences. 20 differences of neighbours in rows of five have k = 14.5
+"""Median over mean of a block's sum of squared differences. 20 differences of neighbors in rows of five have k = 14.5
 degrees of freedom, and the median of chi-squared is (1 - 2 / (9 k))^3 of its mean."""
 
 LARGEST_LASTING = np.float32(4 / 255)

@@ -55,11 +55,11 @@ class Plate:
     image : (rows, columns, 3)
         Linear.
     confidence : (rows, columns)
-        From 0 (filled from neighbours) to 1 (seen clear in many frames).
+        From 0 (filled from neighbors) to 1 (seen clear in many frames).
     noise
         Noise of the clip's pictures.
     errors : (3, 3)
-        Covariance of the linear colour errors where it is filled in; 0 if they are unknown.
+        Covariance of the linear color errors where it is filled in; 0 if they are unknown.
     """
 
     image: Picture
@@ -117,7 +117,7 @@ class Plates(Protocol):
 def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
     """Return the plate, with the clip's noise, of a known background.
 
-    The background is a linear colour (3,), or a picture (rows, columns, 3), resized to the clip if need be. Noise that
+    The background is a linear color (3,), or a picture (rows, columns, 3), resized to the clip if need be. Noise that
     is clipped at black brightens a black one on the mean, and so its plate. ClipError is raised if a frame cannot be
     read, ValueError if the background is neither or not finite.
     """

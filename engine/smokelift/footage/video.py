@@ -4,7 +4,7 @@ The container is first read through, without decoding, for the times of all fram
 frames in a row cost one decode each.
 
 What a file says of its pictures is applied: matrix and range by FFmpeg's converter (an untagged video is read as
-BT.601, as FFmpeg writes one), transfer and primaries (`colour`), rotation and mirroring, the shape of pixels,
+BT.601, as FFmpeg writes one), transfer and primaries (`color`), rotation and mirroring, the shape of pixels,
 interlacing (one field of each frame is used) and alpha. The converter is set to round exactly: by default it is half an
 8 bit step too dark.
 
@@ -31,7 +31,7 @@ from av.video.stream import VideoStream
 
 from smokelift.checks import Finding
 from smokelift.footage.alpha import Association, association, association_notes
-from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
+from smokelift.footage.color import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
@@ -64,8 +64,8 @@ _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 SQUARE = 0.01
 """Largest difference of a pixel's shape from 1 that is ignored: half a pixel in fifty."""
 
-QUANTISED_FRAMES = 21
-"""Frames at a file's start whose quantisers are read: their median needs no more."""
+QUANTIZED_FRAMES = 21
+"""Frames at a file's start whose quantizers are read: their median needs no more."""
 
 
 class Video:
@@ -326,7 +326,7 @@ class Video:
         return good
 
     def _matted(self) -> float | None:
-        """Find out how colours are held beside alpha; return the grey to show them over, None without alpha."""
+        """Find out how colors are held beside alpha; return the gray to show them over, None without alpha."""
         frames = []
         for frame in sound_samples(self.count, lambda n: self._decode(self._shown[n])):
             if not _has_alpha(frame):
@@ -405,8 +405,8 @@ def _white(frame: av.VideoFrame) -> float:
     bits = max(component.bits for component in frame.format.components)
     if bits <= 8 or bits >= 16 or frame.format.is_rgb:
         return 1.0
-    grey = len(frame.format.components) < 3  # always read as full range
-    limited = frame.color_range != ColorRange.JPEG and not grey
+    gray = len(frame.format.components) < 3  # always read as full range
+    limited = frame.color_range != ColorRange.JPEG and not gray
     return 255 / 256 if limited else (2**bits - 1) * 2 ** (16 - bits) / 65535
 
 
@@ -466,11 +466,11 @@ def lacks_index(path: Path) -> bool:
     return True
 
 
-def median_quantiser(path: Path) -> float | None:
-    """Return the median of the mean quantisers, 0 to 51, of a video's first frames; None if it gives none.
+def median_quantizer(path: Path) -> float | None:
+    """Return the median of the mean quantizers, 0 to 51, of a video's first frames; None if it gives none.
 
     It tells how strongly a video is compressed: an encoder leaves a block unchanged where it differs by less than the
-    quantiser's step, which doubles every six. Only H.264 is read; other codecs have other scales.
+    quantizer's step, which doubles every six. Only H.264 is read; other codecs have other scales.
     """
     try:
         with open_container(path) as container:
@@ -478,7 +478,7 @@ def median_quantiser(path: Path) -> float | None:
             if stream is None or stream.codec_context is None or stream.codec_context.name != "h264":
                 return None
             stream.codec_context.options = {"export_side_data": "venc_params"}
-            frames = islice(container.decode(stream), QUANTISED_FRAMES)
+            frames = islice(container.decode(stream), QUANTIZED_FRAMES)
             sides = [_side_data(frame, SideData.VIDEO_ENC_PARAMS) for frame in frames]
             means = [float(side.qp_map().mean()) for side in sides if side is not None]
     except (av.FFmpegError, ValueError, RuntimeError):  # RuntimeError: the blocks do not cover the frame

@@ -57,7 +57,7 @@ class CameraError(ValueError):
 def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
     """Return the picture that a grid is fitted to.
 
-    A pixel is as wide as a voxel at the domain's centre, unless the footage is coarser: finer pixels hold detail that
+    A pixel is as wide as a voxel at the domain's center, unless the footage is coarser: finer pixels hold detail that
     the grid cannot show, coarser ones lose detail that it can. CameraError is raised if the picture shows no part of
     the domain.
     """

@@ -3,10 +3,10 @@
 What is left out or rounded does not show in a picture of 8 bits:
 
 - Smoke that is so thin that a box full of it hides less than `THIN` of what is behind is left out.
-- Quantised densities are multiples of a power of two; rounding errors along a ray are independent, so over n voxels of
+- Quantized densities are multiples of a power of two; rounding errors along a ray are independent, so over n voxels of
   h meters they change the optical depth by extinction * h * sqrt(n / 12) steps (root mean square), which is kept below
   `SHADE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
-- Quantised velocities move smoke by at most half of `VELOCITY_STEP` voxels per frame.
+- Quantized velocities move smoke by at most half of `VELOCITY_STEP` voxels per frame.
 
 Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
 """
@@ -50,7 +50,7 @@ SHADE = 1 / 510
 """Half a step of a picture of 8 bits."""
 
 VELOCITY_STEP = 1 / 16
-"""Step of a quantised velocity in voxels per frame."""
+"""Step of a quantized velocity in voxels per frame."""
 
 UNITS = {"length_unit": "m", "velocity_unit": "m/s", "extinction_unit": "1/m"}
 """Metadata of every grid."""
@@ -58,7 +58,7 @@ UNITS = {"length_unit": "m", "velocity_unit": "m/s", "extinction_unit": "1/m"}
 SAMPLED_FRAMES = 5
 """Frames that are written to estimate the size of all."""
 
-Precision = Literal["half", "quantised"]
+Precision = Literal["half", "quantized"]
 
 _OWN = re.compile(r"(smoke|proxy)_\d{4,}\.vdb")
 
@@ -70,7 +70,7 @@ class ExportSettings:
     Attributes
     ----------
     precision
-        ``"half"`` for floats of 16 bits; ``"quantised"`` for as few bits as a picture of 8 bits needs.
+        ``"half"`` for floats of 16 bits; ``"quantized"`` for as few bits as a picture of 8 bits needs.
     velocity
         Whether to export the velocity, which motion blur needs.
     proxy
@@ -225,7 +225,7 @@ class _Export:
         if FLAME in self.grids:
             found = sequence.flame(number)
             flame = np.zeros_like(rho) if found is None else found
-        if self.settings.precision == "quantised":
+        if self.settings.precision == "quantized":
             rho = _rounded(rho, density_step(domain, extinction))
             velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, sequence.fps))
             # radiance adds up along a ray as optical depth does
@@ -294,13 +294,13 @@ def write_proxies(sequence: Sequence) -> Iterator[int]:
 
 
 def density_step(domain: Domain, extinction: float) -> float:
-    """Step of a quantised density: the largest power of two whose rounding does not show (see the module)."""
+    """Step of a quantized density: the largest power of two whose rounding does not show (see the module)."""
     longest = max(domain.resolution)
     return _power_of_two(SHADE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
 
 
 def velocity_step(domain: Domain, fps: float) -> float:
-    """Step of a quantised velocity in m/s (see the module)."""
+    """Step of a quantized velocity in m/s (see the module)."""
     return _power_of_two(VELOCITY_STEP * domain.voxel_size * fps)
 
 

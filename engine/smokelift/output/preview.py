@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import backdrop_colour, background_picture
+from smokelift.footage.given_background import backdrop_color, background_picture
 from smokelift.footage.images import area_average
 from smokelift.output.files import CONTACT_SHEET, ORBIT, PREVIEW, STRIP
 from smokelift.output.framing import Framing, frame_smoke
@@ -133,7 +133,7 @@ class Preview:
         if absorbs and scene.background.estimated:
             return np.asarray(self.clip.frame(0).mean((0, 1)))
         plate = background_picture(scene)
-        color = plate if plate.ndim == 1 else backdrop_colour(plate)
+        color = plate if plate.ndim == 1 else backdrop_color(plate)
         if color is not None:
             return color
         return np.asarray(plate.mean((0, 1)) if absorbs else np.zeros(3), np.float32)

@@ -55,7 +55,7 @@ class Frame:
     steady : (nx, ny, nz) float32, optional
         What the next frame carries along, if not the density: see `smokelift.density.FittedDensity`.
     flame : (nx, ny, nz) float32, optional
-        Emission of fire, radiance per metre of the color ``flame_color`` of the scene's medium; None where the clip
+        Emission of fire, radiance per meter of the color ``flame_color`` of the scene's medium; None where the clip
         shows no fire.
     followed : (rows, columns), optional
         What is followed of the picture to the next one; None where no camera stands still alone, or sees nothing.
@@ -202,11 +202,11 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
     """The emission in a frame; None for a clip without fire."""
     if shot.fire is None:
         return None
-    seen, colour = shot.observe_fire(index), np.array(shot.scene.medium.flame_color, np.float32)
+    seen, color = shot.observe_fire(index), np.array(shot.scene.medium.flame_color, np.float32)
     if seen is None:
         return np.zeros_like(density)
     # least squares over the channels
-    return flame_emission(seen.image @ colour / (colour @ colour), seen.camera, density, shot.optics)
+    return flame_emission(seen.image @ color / (color @ color), seen.camera, density, shot.optics)
 
 
 def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:

@@ -39,7 +39,7 @@ def sources(shot: Shot) -> dict[str, dict[str, Any]]:
 
 
 def _background(given: Background | None, view: ShotView) -> tuple[Path, ...]:
-    """The files of a background; none where it is a colour, or estimated."""
+    """The files of a background; none where it is a color, or estimated."""
     if isinstance(view.plates, ChangingPlate):
         return view.plates.files
     return () if given is None or given.image is None else (given.image,)

@@ -206,7 +206,7 @@ def _coarse(domain: Domain) -> Domain:
     """The domain in few cubic voxels; where they do not fit its edges, to the nearest."""
     voxel = max(domain.size) / REFERENCE_VOXELS
     x, y, z = (max(round(edge / voxel), 1) for edge in domain.size)
-    return domain.about_centre((x, y, z), voxel)
+    return domain.about_center((x, y, z), voxel)
 
 
 def _coarse_camera(camera: Camera, domain: Domain) -> Camera:

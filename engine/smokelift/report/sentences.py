@@ -32,7 +32,7 @@ SENTENCES: Mapping[str, str] = {
     ),
     "other primaries": "The clip's primaries, {primaries}, are converted to BT.709.",
     "scaled pictures": "Pictures of {size} pixels are scaled to {scaled}: they are large, or their pixels not square.",
-    "premultiplied colours": (
+    "premultiplied colors": (
         "The clip's colors are read as {held} by its alpha channel, because its smoke then has most nearly one color."
     ),
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
@@ -92,7 +92,7 @@ SENTENCES: Mapping[str, str] = {
         "even smoke. Give a clean plate or a color as background."
     ),
     "strong compression": (
-        "The clip is strongly compressed (level {quantiser:.0f} of 51), so faint smoke may be missing from the result: "
+        "The clip is strongly compressed (level {quantizer:.0f} of 51), so faint smoke may be missing from the result: "
         "compression makes it stand still as the background does. Use a copy that is compressed less, or give a clean "
         "plate as background."
     ),

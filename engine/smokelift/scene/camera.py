@@ -223,7 +223,7 @@ def as_matrix(values: NDArray[np.float64]) -> Matrix:
 
 
 def orbit(camera: Camera, domain: Box, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
-    """Return the camera turned about the domain's centre, which stays at the same distance and place of the picture.
+    """Return the camera turned about the domain's center, which stays at the same distance and place of the picture.
 
     The yaw is about the world's Z, counter-clockwise seen from above: 90 looks from the right side. The pitch then
     raises the camera about its own horizontal axis; negative lowers it. A camera that moves is turned in every frame.
@@ -249,12 +249,12 @@ def shared_part(whole: Camera, camera: Camera) -> tuple[slice, slice] | None:
 
 def _turned(matrix: NDArray[np.float64], domain: Box, yaw_degrees: float, pitch_degrees: float) -> Matrix:
     """A camera's matrix after `orbit`."""
-    centre = np.array(domain.centre)
+    center = np.array(domain.centre)
     right = matrix[:3, 0]
     turn = _rotation(np.array([0.0, 0.0, 1.0]), yaw_degrees) @ _rotation(right, -pitch_degrees)
     moved = matrix.copy()
     moved[:3, :3] = turn @ matrix[:3, :3]
-    moved[:3, 3] = centre + turn @ (matrix[:3, 3] - centre)
+    moved[:3, 3] = center + turn @ (matrix[:3, 3] - center)
     return as_matrix(moved)
 
 

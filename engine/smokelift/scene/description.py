@@ -1,7 +1,7 @@
 """What a user describes of a shot; whatever is left out is estimated or defaulted.
 
 Conventions: right-handed world, Z up, meters. Cameras look along their local -Z with +Y up, as Blender's do.
-Image coordinates are in pixels, x to the right and y down from the top left corner, pixel centres at half
+Image coordinates are in pixels, x to the right and y down from the top left corner, pixel centers at half
 integers. Directions of lights are directions of travel.
 
 Every class of a scene checks its values where it is made, so a scene built in Python and one read from a file are

@@ -123,8 +123,8 @@ class Domain(Box):
         """Shape of an array of voxels, the same as ``resolution``."""
         return self.resolution
 
-    def about_centre(self, resolution: tuple[int, int, int], voxel_size: float) -> Domain:
-        """Return the domain about the same centre with other voxels, whose size is in meters."""
+    def about_center(self, resolution: tuple[int, int, int], voxel_size: float) -> Domain:
+        """Return the domain about the same center with other voxels, whose size is in meters."""
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
@@ -135,7 +135,7 @@ class Domain(Box):
         if times <= 1:
             return self
         x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in self.resolution)
-        return self.about_centre((x, y, z), times * self.voxel_size)
+        return self.about_center((x, y, z), times * self.voxel_size)
 
     def grown(self, below: tuple[int, ...], above: tuple[int, ...]) -> Domain:
         """Return the domain with so many voxels more on its low sides and on its high sides, along x, y and z."""
@@ -172,7 +172,7 @@ class Domain(Box):
         return Domain((a, b, c), (d, e, f), (x, y, z))
 
     def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the meters from a point to the voxels' centres along x, y and z, ready to be broadcast."""
+        """Return the meters from a point to the voxels' centers along x, y and z, ready to be broadcast."""
         places = zip(self.min, point, self.resolution, strict=True)
         x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * self.voxel_size - at for low, at, n in places))
         return x, y, z
@@ -204,7 +204,7 @@ class Inlet:
         return math.dist(self.centre, nearest) <= self.radius
 
     def voxels(self, domain: Domain) -> NDArray[np.bool_]:
-        """Return the voxels whose centres lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
+        """Return the voxels whose centers lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
         x, y, z = domain.offsets(self.centre)
         squares = x**2 + y**2 + z**2
         inside: NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())

@@ -36,7 +36,7 @@ def project_points(camera: Camera, points: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def ray_through_pixels(camera: Camera) -> tuple[Doubles, Doubles]:
-    """Origins and unit directions, each (rows, columns, 3), in world space, of the rays through pixel centres."""
+    """Origins and unit directions, each (rows, columns, 3), in world space, of the rays through pixel centers."""
     width, height = camera.size
     x = (np.arange(width) + 0.5 - camera.cx) / camera.fx
     y = -(np.arange(height) + 0.5 - camera.cy) / camera.fy
@@ -54,7 +54,7 @@ def ray_through_pixels(camera: Camera) -> tuple[Doubles, Doubles]:
 
 
 def voxel_width(camera: Camera, domain: Domain) -> float:
-    """Return the width in pixels of a voxel at the domain's centre."""
+    """Return the width in pixels of a voxel at the domain's center."""
     _, depth = project_points(camera, np.array(domain.centre))
     near = domain.voxel_size if camera.type == "perspective" else 1.0
     return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)

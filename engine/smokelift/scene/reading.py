@@ -144,9 +144,9 @@ class _Reader(TomlFile):
         width, height = picture_size(data["size"])
         matrices = _matrices(data)
         fx, fy = _scales(data, lens, height)
-        centre = data.get("cx", width / 2), data.get("cy", height / 2)
+        center = data.get("cx", width / 2), data.get("cy", height / 2)
         moving = matrices if "matrices" in data else ()
-        return Camera(kind, matrices[0], (width, height), fx, fy, *centre, moving)
+        return Camera(kind, matrices[0], (width, height), fx, fy, *center, moving)
 
 
 def _light_type(data: Table) -> Any:

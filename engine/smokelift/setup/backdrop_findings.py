@@ -29,7 +29,7 @@ MIN_SAME_FRAMES = 4
 """Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
 
 MIN_COARSE_QUANTIZER = 42.0
-"""Quantiser from which faint smoke is taken for background, if that has more than one color. Before a brick wall crf
+"""Quantizer from which faint smoke is taken for background, if that has more than one color. Before a brick wall crf
 32 has 37 at most, crf 36 has 41, and crf 45, which costs mass there, 44 to 50 (docs/experiments/background.md)."""
 
 
@@ -104,14 +104,14 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]
         said.append(doubt("cut", {"before": before, "after": after, "first": first, "last": last}))
     elif not samples.smoky:
         said.append(what_helps(clip, given))
-    if found.source == "colour around one frame":
+    if found.source == "color around one frame":
         said.append(doubt("background of one frame"))
     if found.source == "black for want of a picture":
         said.append(doubt("background never seen"))
     if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
         said.append(doubt("background of few frames", {"frames": found.frames}))
-    if found.quantiser is not None and found.quantiser >= MIN_COARSE_QUANTIZER:
-        said.append(doubt("strong compression", {"quantiser": found.quantiser}))
+    if found.quantizer is not None and found.quantizer >= MIN_COARSE_QUANTIZER:
+        said.append(doubt("strong compression", {"quantizer": found.quantizer}))
     unknown = samples.unknown
     if found.strokes is not None:  # what is painted as smoke is none of the background
         unknown = unknown & (area_average(found.strokes.smoke, *unknown.shape[::-1]) < MAJORITY)

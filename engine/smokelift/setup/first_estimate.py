@@ -12,8 +12,8 @@ from smokelift.extraction import plates_and_source, shows_transmittance
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
-from smokelift.footage.fire import HotPixels, fire_colour, firelight, hot_pixels, without_fire
-from smokelift.footage.given_background import backdrop_colour
+from smokelift.footage.fire import HotPixels, fire_color, firelight, hot_pixels, without_fire
+from smokelift.footage.given_background import backdrop_color
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates, evened, exposures
@@ -137,7 +137,7 @@ def first_estimate(
     if hot.burn or (flame_color is not None and hot.share):
         doused = without_fire(exposed, found.plates)
         light = firelight(exposed, doused)
-        fire, exposed = Fire(hot.share, light, flame_color or fire_colour(exposed, light)), doused
+        fire, exposed = Fire(hot.share, light, flame_color or fire_color(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
     plates, source = with_source(found, exposed, samples.smoky)
     if plates is not found.plates:
@@ -153,7 +153,7 @@ def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plat
     There is none before what does not show T: black, one color, or a picture that is as good as one; and without
     ``smoky`` frames, those with the most smoke first.
     """
-    if not smoky or backdrop_colour(visible_plate(found.plates, clip, smoky[0])) is not None:
+    if not smoky or backdrop_color(visible_plate(found.plates, clip, smoky[0])) is not None:
         return found.plates, None
     plates, source = plates_and_source(clip, found.shot_of(clip), found.plates, smoky)
     shown = visible_plate(plates, clip, smoky[0])

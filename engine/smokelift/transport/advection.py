@@ -30,7 +30,7 @@ def advect(
     Parameters
     ----------
     field
-        A scalar at voxel centres, shape (nx, ny, nz), or a velocity, each component of which is carried from
+        A scalar at voxel centers, shape (nx, ny, nz), or a velocity, each component of which is carried from
         its own positions.
     velocity
         What carries it, at the points of arrival.

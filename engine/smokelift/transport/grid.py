@@ -34,7 +34,7 @@ class StaggeredGrid:
         Normal components on x, y and z faces: float32 arrays of shape (nx+1, ny, nz), (nx, ny+1, nz) and
         (nx, ny, nz+1).
     voxel_size
-        Edge of a voxel, in metres or in any unit that suits the field.
+        Edge of a voxel, in meters or in any unit that suits the field.
     closed
         Sides of the box that are walls, some of `SIDES`. The others are open.
 
@@ -83,7 +83,7 @@ class StaggeredGrid:
         return [side in self.closed for side in SIDES]
 
     def centres(self) -> Array:
-        """The vectors at voxel centres, shape (nx, ny, nz, 3): the mean of opposite faces."""
+        """The vectors at voxel centers, shape (nx, ny, nz, 3): the mean of opposite faces."""
         return np.stack(at_centres(self.faces), -1)
 
     def with_faces(self, faces: Iterable[Array]) -> Self:
@@ -101,7 +101,7 @@ class Velocity(StaggeredGrid):
     Attributes
     ----------
     faces, voxel_size, closed
-        See `StaggeredGrid`; the voxel size is in metres.
+        See `StaggeredGrid`; the voxel size is in meters.
     figures
         How it was found, if it was estimated: see `smokelift.velocity.estimate_velocity`.
 
@@ -189,16 +189,16 @@ def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
 
 
 def at_centres(faces: Faces) -> Faces:
-    """The three components of a field on faces at voxel centres: the mean of opposite faces."""
+    """The three components of a field on faces at voxel centers: the mean of opposite faces."""
     x, y, z = faces
     half = np.float32(0.5)
     return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
 
 
-def on_faces(centres: Array) -> Faces:
-    """Vectors at voxel centres, shape (nx, ny, nz, 3), on faces: the mean of both sides, on the box's sides the one."""
+def on_faces(centers: Array) -> Faces:
+    """Vectors at voxel centers, shape (nx, ny, nz, 3), on faces: the mean of both sides, on the box's sides the one."""
     x, y, z = (
-        np.pad(centres[..., axis], [(1, 1) if d == axis else (0, 0) for d in range(3)], mode="edge")
+        np.pad(centers[..., axis], [(1, 1) if d == axis else (0, 0) for d in range(3)], mode="edge")
         for axis in range(3)
     )
     return at_centres((x, y, z))

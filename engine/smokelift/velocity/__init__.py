@@ -1,7 +1,7 @@
 """The velocity that carries one density into the next.
 
 Two densities show how fast smoke moves along their gradient. The rest follows from a flow that is smooth and has no
-divergence. The estimate minimises
+divergence. The estimate minimizes
 
     sum W (r + g . (u - u_k))^2 + R(u - u_p) + irrotational * sum outside the smoke of |curl u|^2
 
@@ -15,7 +15,7 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)
 
 on one grid after a prediction, which is coarse in a reconstruction; else from a coarse grid to the one that is asked
-for (`coarse_to_fine`). It is linearised anew after the first solve (`linearisation`). Before and after are as
+for (`coarse_to_fine`). It is linearized anew after the first solve (`linearization`). Before and after are as
 `preparation` makes them. Division by s makes every weight independent of the scales of density, space and time. k is
 `UNEXPLAINED` over the share of the change that u_p leaves unexplained: it grows as u_p gets better.
 
@@ -55,7 +55,7 @@ def estimate_velocity(
     dt
         Time between them in seconds.
     voxel_size
-        Edge of a voxel in metres.
+        Edge of a voxel in meters.
     settings
         See `VelocitySettings`.
     closed
@@ -73,8 +73,8 @@ def estimate_velocity(
     Velocity
         In m/s, without divergence, such that after(x) = before(x - u(x) dt). `figures` has ``iterations``, ``products``
         and ``projections`` of the whole estimate, the last ``residual`` of the solver, the ``divergence`` (max |div u|
-        voxel size / max |u|) on the estimate's grid, the ``unexplained`` share of the change that the centre of the
-        regulariser leaves, the ``trust`` in the prediction and the ``dissipation``, the share of the smoke that
+        voxel size / max |u|) on the estimate's grid, the ``unexplained`` share of the change that the center of the
+        regularizer leaves, the ``trust`` in the prediction and the ``dissipation``, the share of the smoke that
         dissolves in `dt`, below zero where all of it gets denser. Zero if there is no smoke, or none in one of the two,
         or no motion.
 

@@ -18,8 +18,8 @@ from smokelift.velocity.estimator import (
     predict_velocity,
     refined_to,
 )
-from smokelift.velocity.linearisation import SMOKE_THRESHOLD, least_squares, linearise
-from smokelift.velocity.momentum import fit_centre
+from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, linearize
+from smokelift.velocity.momentum import fit_center
 from smokelift.velocity.preparation import PreparedPair, prepare
 from smokelift.velocity.pyramid import coarsen, coarsened, smoothed
 from smokelift.velocity.solver import ProjectedCG, Solver
@@ -36,11 +36,11 @@ IRROTATIONAL = 0.05
 """Weight of vorticity where there is no smoke that could show it (docs/experiments/velocity-solver.md)."""
 
 KINETIC = 0.003
-"""Weight of what departs from the centre. It only holds what nothing else does
+"""Weight of what departs from the center. It only holds what nothing else does
 (docs/experiments/velocity-solver.md)."""
 
 UNEXPLAINED, MIN_UNEXPLAINED = 0.25, 0.04
-"""Share of the change, left unexplained by the centre, at which the weights apply unscaled: they grow in inverse
+"""Share of the change, left unexplained by the center, at which the weights apply unscaled: they grow in inverse
 proportion to that share, down to the second one (docs/experiments/velocity-solver.md)."""
 
 WORTHLESS = 0.5
@@ -48,7 +48,7 @@ WORTHLESS = 0.5
 (docs/experiments/velocity-solver.md)."""
 
 MAX_INCREMENT = 1.0
-"""Voxels of the grid at hand. A linearisation of the density holds no further, so the increment is clamped
+"""Voxels of the grid at hand. A linearization of the density holds no further, so the increment is clamped
 (docs/experiments/velocity-solver.md)."""
 
 
@@ -65,8 +65,8 @@ class VelocitySettings:
         How many times the grid of the estimate is halved. The velocity is interpolated to the densities' grid. None
         leaves at most 30 voxels along the longest side in a clip (see `smokelift.setup`), and the densities' own grid
         between two densities alone.
-    linearisations
-        Linearisations on each grid (docs/experiments/velocity-solver.md).
+    linearizations
+        Linearizations on each grid (docs/experiments/velocity-solver.md).
     smoothness
         Weight of the differences of vorticity.
     solver
@@ -74,20 +74,20 @@ class VelocitySettings:
     """
 
     coarsening: int | None = None
-    linearisations: int = 2
+    linearizations: int = 2
     smoothness: float = 0.03
     solver: Solver = field(default_factory=ProjectedCG)
 
     def __post_init__(self) -> None:
         """Check the counts; ValueError."""
-        integer(self.linearisations, "linearisations", "a whole number from 1", least=1)
+        integer(self.linearizations, "linearizations", "a whole number from 1", least=1)
         if self.coarsening is not None:
             integer(self.coarsening, "coarsening", "a whole number from 0, or None", least=0)
 
 
 @dataclass(frozen=True)
 class CoarseToFine:
-    """The default estimator (a `VelocityEstimator`); `smokelift.velocity` has the function that it minimises."""
+    """The default estimator (a `VelocityEstimator`); `smokelift.velocity` has the function that it minimizes."""
 
     settings: VelocitySettings = field(default_factory=VelocitySettings)
 
@@ -144,11 +144,11 @@ def _serving(given: Velocity | None, pair: DensityPair, prepared: PreparedPair, 
     if given is None or not any(component.any() for component in given.faces):
         return None
     u = replace(given, closed=pair.closed).displacement(pair.dt)
-    linear = linearise(prepared.before, prepared.after, weight, u)
+    linear = linearize(prepared.before, prepared.after, weight, u)
     if linear is None:
         return None
     unexplained, rest = linear.unexplained(u, prepared.noise)
-    # The linearised change grows with the prediction, however wrong that is, so that long runs would run away.
+    # The linearized change grows with the prediction, however wrong that is, so that long runs would run away.
     change = (prepared.after - prepared.before) / np.float32(linear.scale)
     serves = unexplained < WORTHLESS and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
     return u if serves else None
@@ -162,24 +162,24 @@ def _solved(
     prediction: StaggeredGrid | None,
     settings: VelocitySettings,
 ) -> Velocity | None:
-    """The estimate on one grid, linearised around `u` first; None where there is no structure to follow."""
+    """The estimate on one grid, linearized around `u` first; None where there is no structure to follow."""
     effort: Counter[str] = Counter()
-    for _ in range(settings.linearisations):
-        linear = linearise(prepared.before, prepared.after, weight, u)
+    for _ in range(settings.linearizations):
+        linear = linearize(prepared.before, prepared.after, weight, u)
         if linear is None:
             return None
-        centre = fit_centre(prediction, prepared.after, linear, u)
-        linear = linear.with_dissipation(centre.dissipation)
-        unexplained, _ = linear.unexplained(centre.motion, prepared.noise)
+        center = fit_center(prediction, prepared.after, linear, u)
+        linear = linear.with_dissipation(center.dissipation)
+        unexplained, _ = linear.unexplained(center.motion, prepared.noise)
         stiffness = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
         problem = least_squares(
             linear,
-            centre.motion,
+            center.motion,
             second_order=stiffness * settings.smoothness,
             kinetic=stiffness * KINETIC,
             irrotational=IRROTATIONAL,
         )
-        start = u if any(component.any() for component in u.faces) else centre.motion
+        start = u if any(component.any() for component in u.faces) else center.motion
         del linear  # the solver takes most of the memory
         solution, solved = settings.solver.solve(problem, start)
         effort.update({name: solved[name] for name in ("iterations", "products", "projections")})
@@ -188,8 +188,8 @@ def _solved(
         **effort,
         "residual": solved["residual"],
         "unexplained": unexplained,
-        "trust": centre.trust,
-        "dissipation": prepared.density_dissipation(centre.dissipation),
+        "trust": center.trust,
+        "dissipation": prepared.density_dissipation(center.dissipation),
     }
     return in_meters(u, pair, figures)
 

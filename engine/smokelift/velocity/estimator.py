@@ -49,7 +49,7 @@ class DensityPair:
     dt
         Time between them in seconds.
     voxel_size
-        Edge of a voxel in metres.
+        Edge of a voxel in meters.
     closed
         Sides of the box that are walls.
     inflow : (nx, ny, nz)

@@ -7,12 +7,12 @@ alone sets the whole box in motion at P(m), with P the pressure projection. From
 
 a and B are twelve numbers: enough for smoke that rises, leans, spreads or speeds up on its way. After a prediction m is
 only the momentum gained in one frame, by buoyancy say, and B = 0. The numbers are fitted by least squares to the same
-linearised change as the velocity itself, together with the trust t in the prediction and the dissipation d:
+linearized change as the velocity itself, together with the trust t in the prediction and the dissipation d:
 
     min sum W (r + d before + g . (t u_p + P(m) - u_k))^2
 
 d is the share of the smoke that dissolves. Below zero smoke gets denser, as in a clip that flickers. Without d either
-would be fitted as motion. The regulariser penalises the distance from the velocity that is fitted here.
+would be fitted as motion. The regularizer penalises the distance from the velocity that is fitted here.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.transport import Array, StaggeredGrid, without_divergence
-from smokelift.velocity.linearisation import Linearisation, directional_derivative
+from smokelift.velocity.linearization import Linearization, directional_derivative
 
 MOMENTUM = 0.8
 """Share of the fitted momentum that an estimate without a prediction starts from. Below one, because the fit is to
@@ -38,8 +38,8 @@ RIDGE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Centre:
-    """The motion around which the velocity is regularised: t u_p + P(m), in voxels a frame.
+class Center:
+    """The motion around which the velocity is regularized: t u_p + P(m), in voxels a frame.
 
     `trust` is t, from 0 to 1. `dissipation` is the share of the smoke that dissolves in a frame, at most 1, and below
     zero where all of it gets denser.
@@ -50,8 +50,8 @@ class Centre:
     dissipation: float
 
 
-def fit_centre(prediction: StaggeredGrid | None, density: Array, linear: Linearisation, grid: StaggeredGrid) -> Centre:
-    """Fit trust, momentum and dissipation to a linearised change.
+def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Linearization, grid: StaggeredGrid) -> Center:
+    """Fit trust, momentum and dissipation to a linearized change.
 
     The prediction is in voxels a frame, and the density (nx, ny, nz) is what momentum goes with. ``grid`` is any field
     on the estimate's grid.
@@ -65,7 +65,7 @@ def fit_centre(prediction: StaggeredGrid | None, density: Array, linear: Lineari
         columns.append(directional_derivative(linear.direction, prediction.faces))
     products = _weighted_products([*columns, linear.carried, linear.offset], linear.weight)
     found, rest = _least_squares(products)
-    dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearised change may ask for more than all
+    dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearized change may ask for more than all
     if dissipation < 0 and prediction is None:
         kept = np.delete(np.arange(len(products)), -2)
         steady, without = _least_squares(products[np.ix_(kept, kept)])
@@ -73,11 +73,11 @@ def fit_centre(prediction: StaggeredGrid | None, density: Array, linear: Lineari
             dissipation, found = 0.0, steady
     momentum = found[: 3 * rows].reshape(rows, 3)
     if prediction is None:
-        return Centre(_set_in_motion(density, MOMENTUM * momentum, grid), 0.0, dissipation)
+        return Center(_set_in_motion(density, MOMENTUM * momentum, grid), 0.0, dissipation)
     trust = float(np.clip(found[3], 0, 1))
     gained = _set_in_motion(density, momentum, grid)
     faces = zip(gained.faces, prediction.faces, strict=True)
-    return Centre(grid.with_faces(own + np.float32(trust) * before for own, before in faces), trust, dissipation)
+    return Center(grid.with_faces(own + np.float32(trust) * before for own, before in faces), trust, dissipation)
 
 
 def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:

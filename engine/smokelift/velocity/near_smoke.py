@@ -22,7 +22,7 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
     """Carry a density (nx, ny, nz), not negative, along by a velocity of its grid or of one that was halved from it.
 
     It gives what `advect` makes of it with `refined_to`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of the
-    density in metres; ``conserve`` is that of `advect`.
+    density in meters; ``conserve`` is that of `advect`.
     """
     x, y, z = density.shape
     result = np.zeros(density.shape, np.float32)
@@ -38,7 +38,7 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
 def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) -> Velocity:
     """Refine a velocity to the grid of the smoke where that can arrive; it is zero elsewhere.
 
-    ``smoke`` (nx, ny, nz) marks voxels of ``voxel_size`` metres; ``dt`` is in seconds. The velocity's grid was halved
+    ``smoke`` (nx, ny, nz) marks voxels of ``voxel_size`` meters; ``dt`` is in seconds. The velocity's grid was halved
     from that of the smoke; a velocity on the smoke's grid is returned as it is.
     """
     x, y, z = smoke.shape

@@ -1,6 +1,6 @@
 """Densities made ready before their motion is estimated: noise is blurred, contrast reduced.
 
-Noise: white noise is as strong in the finest scale, where neighbours alternate along all axes at once, as in any other.
+Noise: white noise is as strong in the finest scale, where neighbors alternate along all axes at once, as in any other.
 Smoke has next to nothing there. So the median of that scale's magnitude inside the smoke measures the noise and not the
 smoke (Donoho and Johnstone 1994). It chooses the blur: gradients have to stand out from what noise makes of them.
 
@@ -20,7 +20,7 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.transport import Array
-from smokelift.velocity.linearisation import SMOKE_THRESHOLD, gradient, rms_gradient
+from smokelift.velocity.linearization import SMOKE_THRESHOLD, gradient, rms_gradient
 
 BLUR = 0.5
 """Standard deviation (voxels) of the Gaussian that smooths densities which are neither smooth nor noisy."""

@@ -11,7 +11,7 @@ import smokelift._core as _core
 from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, faces_in, without_divergence
 
 SMOOTHING = 1 / 4
-"""Weight of each neighbour along an axis, which leaves nothing of what changes its sign from voxel to voxel.
+"""Weight of each neighbor along an axis, which leaves nothing of what changes its sign from voxel to voxel.
 
 What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-solver.md)."""
 
@@ -19,7 +19,7 @@ What a reconstruction's coarse grid shows of that is most often wrong (docs/expe
 def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
     """The faces of a velocity on the next finer grid, in the same unit, without divergence.
 
-    The formulas for a coarse voxel (Toth and Roe 2002) read only its neighbours. Along an odd number of voxels the last
+    The formulas for a coarse voxel (Toth and Roe 2002) read only its neighbors. Along an odd number of voxels the last
     coarse one is cut in half.
     """
     x, y, z = _core.prolong(u.faces)

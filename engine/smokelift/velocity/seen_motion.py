@@ -2,7 +2,7 @@
 
 The velocity's grid is coarse, because the depth of the smoke is assumed. What moves across the picture is not: the clip
 shows it pixel by pixel. So the velocity is corrected in the picture: with q its mean along each ray, in pixels a
-frame, the correction d of every cell, about as wide as a voxel of the velocity, minimises
+frame, the correction d of every cell, about as wide as a voxel of the velocity, minimizes
 
     sum over pixels (r + g . d)^2 / mean |g|^2  +  sum over cells pixels (CURVATURE |laplacian d|^2 + REST |d|^2)
 
@@ -126,7 +126,7 @@ class _Screen:
     shape
         Of the grid.
     pixels, voxels
-        Bilinear weights of the cells at every pixel and at every voxel's centre.
+        Bilinear weights of the cells at every pixel and at every voxel's center.
     moved : (voxels, 2, 3)
         Columns and rows that a voxel moves by in the picture for each voxel that it moves in the grid.
     least : (voxels, 3, 2)
@@ -145,12 +145,12 @@ class _Screen:
     @staticmethod
     @lru_cache(maxsize=2)
     def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> _Screen:
-        """The cells for a grid from the domain's low corner on, its voxels so many metres wide."""
-        centres = np.array(domain.min) + (np.indices(shape).reshape(3, -1).T + 0.5) * voxel_size
-        at, _ = project_points(camera, centres)
+        """The cells for a grid from the domain's low corner on, its voxels so many meters wide."""
+        centers = np.array(domain.min) + (np.indices(shape).reshape(3, -1).T + 0.5) * voxel_size
+        at, _ = project_points(camera, centers)
         halves = 0.5 * voxel_size * np.eye(3)
         steps = [
-            project_points(camera, centres + half)[0] - project_points(camera, centres - half)[0] for half in halves
+            project_points(camera, centers + half)[0] - project_points(camera, centers - half)[0] for half in halves
         ]
         moved = np.stack(steps, -1)
         width, height = camera.size

@@ -1,4 +1,4 @@
-"""Two solvers of the quadratic problem: minimise it over velocities without divergence."""
+"""Two solvers of the quadratic problem: minimize it over velocities without divergence."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smokelift.transport import StaggeredGrid
 
 
 class Solver(Protocol):
-    """A way to minimise a quadratic function over velocities without divergence."""
+    """A way to minimize a quadratic function over velocities without divergence."""
 
     def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
         """Return the minimum, and how it was found.
@@ -19,7 +19,7 @@ class Solver(Protocol):
         Parameters
         ----------
         problem
-            The quadratic function, see `smokelift.velocity.linearisation.least_squares`.
+            The quadratic function, see `smokelift.velocity.linearization.least_squares`.
         start
             Without divergence, in voxels a frame.
         """

@@ -60,7 +60,7 @@ def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
         assert "no OpenVDB module" in refused(capsys, "export", finished, "--out", tmp_path / "out")
         pytest.skip("there is no OpenVDB module")
     out = tmp_path / "out"
-    words = ("export", finished, "--out", out, "--precision", "quantised", "--proxy", 2, "--progress", "json")
+    words = ("export", finished, "--out", out, "--precision", "quantized", "--proxy", 2, "--progress", "json")
     assert command(*words, "--size") == 0
     (sent,) = events(capsys.readouterr().out)
     assert sent["event"] == "done" and sent["size"] > 0

@@ -12,16 +12,16 @@ from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 8, 10)
 DOMAIN = Domain((0.0, 0.0, 0.0), (0.9, 0.8, 1.0), SHAPE)
-CENTRE = (0.45, 0.4, 0.5)
+CENTER = (0.45, 0.4, 0.5)
 SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
 ABOVE = DirectionalLight((0.0, 0.0, -1.0), (3.0, 2.0, 1.0))
 MODELS = ("single", "unshadowed", "absorption")
 LIGHTS = {
     "directional": (SUN,),
-    "two colours": (SUN, DirectionalLight((-1.0, 0.2, 0.1), (0.0, 0.5, 2.0))),
+    "two colors": (SUN, DirectionalLight((-1.0, 0.2, 0.1), (0.0, 0.5, 2.0))),
     "all": (SUN, PointLight((2.0, -1.5, 2.5), (20.0, 15.0, 10.0)), PointLight((0.4, 0.4, -0.2), (0.1, 0.2, 0.9))),
 }
-LOOKING = Camera.look_at((1.9, -1.2, 1.4), CENTRE, fov_y_degrees=40, size=(14, 16))
+LOOKING = Camera.look_at((1.9, -1.2, 1.4), CENTER, fov_y_degrees=40, size=(14, 16))
 CAMERAS = {
     "perspective": replace(LOOKING, fx=20.0, cx=6.3),
     "orthographic": replace(LOOKING, type="orthographic", fx=11.0, fy=12.0, cx=6.3),
@@ -122,7 +122,7 @@ def test_error_against_finite_differences_grows_with_thickness(density):
 def test_thin_smoke_looks_and_derives_as_with_the_exact_renderer(density):
     """In the thin limit there is one picture and one derivative; the renderers sample it at different points."""
     far = replace(
-        CAMERAS["orthographic"], matrix=Camera.look_at((0.45, -2, 0.5), CENTRE, fov_y_degrees=9, size=(9, 9)).matrix
+        CAMERAS["orthographic"], matrix=Camera.look_at((0.45, -2, 0.5), CENTER, fov_y_degrees=9, size=(9, 9)).matrix
     )
     camera = replace(far, fx=10.0, fy=10.0, cx=4.5, cy=5.0, size=(9, 10))
     setup = (camera, DOMAIN, medium_of_depth(density, 1e-3), (SUN,), np.full(3, 0.1))

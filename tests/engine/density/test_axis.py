@@ -132,7 +132,7 @@ def test_columns_beside_one_another_have_depths_of_their_own() -> None:
     np.testing.assert_allclose(found.at(np.array([-1.4, -1.4]), np.array([-0.35, 0.45])), -0.3, atol=0.03)
 
 
-def test_what_nothing_shows_is_as_uncertain_as_the_box_is_badly_centred() -> None:
+def test_what_nothing_shows_is_as_uncertain_as_the_box_is_badly_centered() -> None:
     """Across the picture the smoke's distance from the middle is seen, and in depth it may be as large."""
     floating = column(0.3, low=1.0)
     offset, central = (estimate_axis(seen(np.roll(floating, by, 0)), FRONT, BOX) for by in (6, -3))

@@ -4,17 +4,17 @@ import numpy as np
 
 import smokelift._core as _core
 from smokelift.checks.array_types import Array
-from smokelift.density.descent import with_neighbours
+from smokelift.density.descent import with_neighbors
 
 
-def test_neighbours_share_a_step() -> None:
+def test_neighbors_share_a_step() -> None:
     """What one voxel wants reaches its cube, evenly both ways, and what all want alike stays as it is."""
     shape, random = (9, 7, 8), np.random.default_rng(5)
     where = _core.MarkedVoxels(random.random(shape) < 0.7)
     one, other = random.standard_normal((2, where.count)).astype(np.float32)
 
     def shared(values: Array) -> Array:
-        return with_neighbours(where, values, np.empty_like(values))
+        return with_neighbors(where, values, np.empty_like(values))
 
     np.testing.assert_allclose(shared(np.ones_like(one)), 1, rtol=1e-6)
     np.testing.assert_allclose(one @ shared(other), shared(one) @ other, rtol=1e-4)

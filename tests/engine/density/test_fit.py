@@ -332,7 +332,7 @@ def observed(density: np.ndarray, scene: Scene, degrees: float) -> Observation:
 
 
 def mean_place(density: np.ndarray) -> np.ndarray:
-    """Centre of mass, in voxels."""
+    """Center of mass, in voxels."""
     return np.average(np.indices(density.shape).reshape(3, -1), axis=1, weights=density.ravel())
 
 

@@ -14,9 +14,9 @@ OPTICS = Optics(DOMAIN, Medium(extinction=8.0), (), "absorption")
 PLACES = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)
 
 
-def ellipsoid(centre: tuple[float, float, float], widths: tuple[float, float, float]) -> np.ndarray:
+def ellipsoid(center: tuple[float, float, float], widths: tuple[float, float, float]) -> np.ndarray:
     """One in its middle, falling off smoothly, and nothing far away."""
-    values = np.exp(-(((PLACES - centre) / widths) ** 2).sum(-1))
+    values = np.exp(-(((PLACES - center) / widths) ** 2).sum(-1))
     return np.where(values > 0.02, values, 0).astype(np.float32)
 
 

@@ -9,7 +9,7 @@ from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (10, 10, 15))
-CENTRES = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)
+CENTERS = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)
 SIZE = (21, 17)
 
 CAMERAS = {
@@ -26,7 +26,7 @@ def camera(request):
 
 def _expected(camera):
     """Rows, columns and visibility of all voxels by NumPy alone."""
-    pixels, depth = project_points(camera, CENTRES)
+    pixels, depth = project_points(camera, CENTERS)
     columns, rows = pixels[..., 0] - 0.5, pixels[..., 1] - 0.5
     width, height = SIZE
     inside = (columns > -0.5) & (columns < width - 0.5) & (rows > -0.5) & (rows < height - 0.5)
@@ -54,7 +54,7 @@ def test_a_voxel_is_shown_where_its_nearest_pixel_is_marked(camera):
 
 def test_the_footprint_is_that_of_the_nearest_voxel():
     camera = CAMERAS["in front"]
-    _, depth = project_points(camera, CENTRES)
+    _, depth = project_points(camera, CENTERS)
     assert project_voxels(camera, DOMAIN).footprint == pytest.approx(camera.fy * 0.2 * np.sqrt(3) / depth.min())
 
 

@@ -9,7 +9,7 @@ from scipy import ndimage
 import smokelift._core as _core
 from smokelift.density import DetailedDepth, GradientFit, RoundDepth, ViewSet
 from smokelift.density import levels as module
-from smokelift.density.levels import Level, any_of_two, with_neighbours
+from smokelift.density.levels import Level, any_of_two, with_neighbors
 from smokelift.footage.clip import Clip
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
@@ -126,6 +126,6 @@ def test_values_scale_as_coarse_ones_do_where_they_are_marked_alone() -> None:
     np.testing.assert_allclose(result[2], np.where(voxels, values, 0)[2] * 0.75, rtol=1e-6)
 
 
-def test_neighbours_are_those_of_a_dilation() -> None:
+def test_neighbors_are_those_of_a_dilation() -> None:
     voxels = np.random.default_rng(0).random((6, 7, 9)) > 0.95
-    np.testing.assert_array_equal(with_neighbours(voxels), ndimage.binary_dilation(voxels))
+    np.testing.assert_array_equal(with_neighbors(voxels), ndimage.binary_dilation(voxels))

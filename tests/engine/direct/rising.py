@@ -33,9 +33,9 @@ SCENE = completed(
 )
 
 
-def blob(centre=(0.0, 0.0, 0.8), width=0.3) -> np.ndarray:
+def blob(center=(0.0, 0.0, 0.8), width=0.3) -> np.ndarray:
     """A Gaussian of smoke, cut off at a thousandth."""
-    places = zip(DOMAIN.min, centre, DOMAIN.resolution, strict=True)
+    places = zip(DOMAIN.min, center, DOMAIN.resolution, strict=True)
     x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * DOMAIN.voxel_size - at for low, at, n in places))
     density = np.exp(-(x**2 + y**2 + z**2) / (2 * width**2)).astype(np.float32)
     return np.where(density > 1e-3, density, np.float32(0))

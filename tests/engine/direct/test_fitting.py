@@ -35,7 +35,7 @@ def test_buoyancy_is_found_from_velocities_that_are_too_slow():
 
 
 def test_a_head_that_dissolves_above_a_base_that_is_fed_rises():
-    """Its centre of mass sinks."""
+    """Its center of mass sinks."""
     share = np.linspace(0, 1, DOMAIN.resolution[2])
     states = [
         replace(state, density=(state.density * np.exp(-6 * DT * number * share)).astype(np.float32))

@@ -34,8 +34,8 @@ def cube(low, high) -> np.ndarray:
     return hull(list(product(*zip(low, high, strict=True))))
 
 
-def octahedron(centre, radius) -> np.ndarray:
-    return hull(np.array(centre) + radius * np.concatenate([np.eye(3), -np.eye(3)]))
+def octahedron(center, radius) -> np.ndarray:
+    return hull(np.array(center) + radius * np.concatenate([np.eye(3), -np.eye(3)]))
 
 
 def written(path, triangles) -> None:
@@ -54,10 +54,10 @@ def test_a_cube_is_the_box_of_its_corners():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_voxels_are_inside_whichever_way_the_triangles_turn(turned):
-    centre = (0.11, -0.06, 1.42)
-    triangles = octahedron(centre, 0.6)
+    center = (0.11, -0.06, 1.42)
+    triangles = octahedron(center, 0.6)
     inside = Mesh(triangles[:, ::-1] if turned else triangles).voxels(DOMAIN)
-    np.testing.assert_array_equal(inside, sum(map(np.abs, DOMAIN.offsets(centre))) < 0.6)
+    np.testing.assert_array_equal(inside, sum(map(np.abs, DOMAIN.offsets(center))) < 0.6)
 
 
 def test_parts_of_a_mesh_may_overlap_and_leave_the_box():

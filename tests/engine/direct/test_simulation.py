@@ -16,7 +16,7 @@ def mass(state: SmokeState) -> float:
 
 
 def height(state: SmokeState, axis: int = 2) -> float:
-    """Centre of mass in metres."""
+    """Center of mass in meters."""
     sums = state.density.sum(axis=tuple(d for d in range(3) if d != axis), dtype=float)
     return float((sums * np.arange(len(sums))).sum() / sums.sum()) * DOMAIN.voxel_size
 

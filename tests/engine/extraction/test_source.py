@@ -12,7 +12,7 @@ SIZE = (96, 80)
 
 
 def plate(texture: float) -> Plate:
-    """A wall of a warm grey with so much texture."""
+    """A wall of a warm gray with so much texture."""
     shape = SIZE[1], SIZE[0]
     detail = texture * np.random.default_rng(1).standard_normal((*shape, 1)) * np.array((1.0, 0.8, 0.6))
     return Plate((0.2 + detail).astype("f4"), np.ones(shape, np.float32), lasting_noise(0.004))

@@ -24,8 +24,8 @@ def wall(low: float, high: float) -> np.ndarray:
 def puff(n: float) -> np.ndarray:
     """Return the opacity of a round puff that rises through the picture."""
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    centre = HEIGHT - 2.5 * n, WIDTH / 2 + 6 * np.sin(n / 3)
-    distance = np.hypot(rows - centre[0], columns - centre[1])
+    center = HEIGHT - 2.5 * n, WIDTH / 2 + 6 * np.sin(n / 3)
+    distance = np.hypot(rows - center[0], columns - center[1])
     return 0.7 * np.clip(1.5 - distance / 9, 0.0, 1.0) * (1.0 + 0.2 * np.sin(0.9 * n + rows / 3))
 
 
@@ -33,14 +33,14 @@ def film(
     folder: Path,
     plate: np.ndarray,
     opacity: Callable[[int], np.ndarray],
-    colour: float | np.ndarray,
+    color: float | np.ndarray,
     noise: float = 1.0,
 ) -> Clip:
-    """Write and open a clip of smoke of a colour before a plate, with sensor noise in 8 bit codes."""
+    """Write and open a clip of smoke of a color before a plate, with sensor noise in 8 bit codes."""
     random = np.random.default_rng(1)
     for n in range(COUNT):
         alpha = np.clip(opacity(n), 0.0, 1.0)[..., None]
-        clean = plate * (1.0 - alpha) + colour * alpha
+        clean = plate * (1.0 - alpha) + color * alpha
         codes = linear_to_srgb(clean) + random.normal(0.0, noise / 255, clean.shape)
         write_image(folder / f"frame_{n:03d}.png", srgb_to_linear(np.clip(codes, 0.0, 1.0)))
     return Clip.open(folder / "frame_###.png", fps=24)
@@ -50,12 +50,12 @@ def coded(
     path: Path,
     plate: np.ndarray,
     opacity: Callable[[int], np.ndarray],
-    colour: float,
+    color: float,
     qp: int | None = None,
     codec: str = "libx264",
     **options: str | int,
 ) -> Path:
-    """Write a video of smoke of a colour before a plate, coded with a quantiser or with a codec's options."""
+    """Write a video of smoke of a color before a plate, coded with a quantizer or with a codec's options."""
     with av.open(path, "w") as out:
         stream = out.add_stream(codec, rate=24)
         stream.height, stream.width = plate.shape[:2]
@@ -64,7 +64,7 @@ def coded(
         stream.options = {name: str(value) for name, value in given.items()}
         for n in range(COUNT):
             alpha = np.clip(opacity(n), 0.0, 1.0)[..., None]
-            codes = np.rint(255 * linear_to_srgb(plate * (1.0 - alpha) + colour * alpha)).astype(np.uint8)
+            codes = np.rint(255 * linear_to_srgb(plate * (1.0 - alpha) + color * alpha)).astype(np.uint8)
             out.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb24")))
         out.mux(stream.encode())
     return path

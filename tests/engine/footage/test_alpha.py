@@ -1,4 +1,4 @@
-"""Colours beside alpha: straight, premultiplied in linear light, premultiplied in code values; all are read alike."""
+"""Colors beside alpha: straight, premultiplied in linear light, premultiplied in code values; all are read alike."""
 
 from pathlib import Path
 
@@ -23,16 +23,16 @@ def opacity(n: int, most: float = 0.9) -> np.ndarray:
     return (most * np.clip(1.4 - distance / 12, 0, 1) * (1 + 0.1 * np.sin(n + rows / 3)))[..., None].clip(0, 1)
 
 
-def stored(held: str, n: int, grey: float, shade: float = 0.0, most: float = 0.9) -> np.ndarray:
-    """Encoded values (rows, columns, rgba) of smoke of a linear grey whose light varies by a share."""
+def stored(held: str, n: int, gray: float, shade: float = 0.0, most: float = 0.9) -> np.ndarray:
+    """Encoded values (rows, columns, rgba) of smoke of a linear gray whose light varies by a share."""
     alpha, (rows, columns) = opacity(n, most), np.mgrid[:HEIGHT, :WIDTH]
-    own = np.clip(grey * (1 + shade * np.sin(columns / 7 + n) * np.cos(rows / 9))[..., None] * TINT, 0, 1)
-    colours = {
+    own = np.clip(gray * (1 + shade * np.sin(columns / 7 + n) * np.cos(rows / 9))[..., None] * TINT, 0, 1)
+    colors = {
         STRAIGHT: linear_to_srgb(own) * (alpha > 0),
         IN_LIGHT: linear_to_srgb(own * alpha),
         IN_CODES: linear_to_srgb(own) * alpha,
     }[held]
-    return np.concatenate([colours, alpha], -1)
+    return np.concatenate([colors, alpha], -1)
 
 
 def written(folder: Path, kind: str, pictures: list[np.ndarray]) -> Path:
@@ -62,24 +62,24 @@ def encode(path: Path, codec: str, pixels: str, pictures: list[np.ndarray]) -> N
 
 @pytest.mark.parametrize("kind", ["png", "tif", "tiff", "dpx", "mov"])
 @pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
-@pytest.mark.parametrize("grey", [0.715, 0.1])
-def test_smoke_is_as_bright_however_a_program_held_it(tmp_path: Path, kind: str, held: str, grey: float) -> None:
-    path = written(tmp_path, kind, [stored(held, n, grey) for n in range(COUNT)])
+@pytest.mark.parametrize("gray", [0.715, 0.1])
+def test_smoke_is_as_bright_however_a_program_held_it(tmp_path: Path, kind: str, held: str, gray: float) -> None:
+    path = written(tmp_path, kind, [stored(held, n, gray) for n in range(COUNT)])
     with Clip.open(path, fps=24) as clip:
-        assert clip.backdrop == float(grey < 0.2)
+        assert clip.backdrop == float(gray < 0.2)
         for n in range(COUNT):
             alpha = opacity(n)
-            shown = grey * TINT * alpha + (1 - alpha) * clip.backdrop
+            shown = gray * TINT * alpha + (1 - alpha) * clip.backdrop
             np.testing.assert_allclose(clip.frame(n), shown, atol=0.012)
         assert [note.figures.get("held") for note in clip.findings()] == ([] if held == STRAIGHT else [held])
 
 
 @pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
-@pytest.mark.parametrize("grey", [0.1, 0.3, 0.7])
+@pytest.mark.parametrize("gray", [0.1, 0.3, 0.7])
 @pytest.mark.parametrize("noise", [0.0, 0.005])
-def test_shading_and_grain_do_not_hide_the_convention(held: str, grey: float, noise: float) -> None:
+def test_shading_and_grain_do_not_hide_the_convention(held: str, gray: float, noise: float) -> None:
     random = np.random.default_rng(0)
-    pictures = [stored(held, n, grey, shade=0.5) for n in range(COUNT)]
+    pictures = [stored(held, n, gray, shade=0.5) for n in range(COUNT)]
     for picture in pictures:
         picture[..., :3] += random.normal(0, noise, picture[..., :3].shape)
     assert association([picture.clip(0, 1) for picture in pictures], srgb_to_linear) == held

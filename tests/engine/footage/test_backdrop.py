@@ -9,7 +9,7 @@ from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, pl
 from scipy import ndimage
 
 from smokelift.footage.backdrop import Backdrop, find_backdrop
-from smokelift.footage.background_kind import colour_around
+from smokelift.footage.background_kind import color_around
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
@@ -47,14 +47,14 @@ def test_fog_that_fills_black_is_no_noise(tmp_path: Path, frames: tuple[int, int
     """Most of its light is in the matte, also of a part of the file in which no pixel is ever black."""
     with fog(tmp_path, frames) as clip:
         found = find_backdrop(clip, None, None)
-        assert (found.source, found.plates.at(0).image.max()) == ("colour", 0)
+        assert (found.source, found.plates.at(0).image.max()) == ("color", 0)
         assert found.plates.noise.total.max() < 2 / 255
         picture = clip.frame(len(clip) // 2)
         share = matte(picture, found.plates.at(0)).share[..., None]
         assert (share * picture).sum() > 0.98 * picture.sum()
 
 
-def test_faint_fog_before_one_colour_is_no_noise(tmp_path: Path) -> None:
+def test_faint_fog_before_one_color_is_no_noise(tmp_path: Path) -> None:
     random = np.random.default_rng(2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     for n in range(COUNT):
@@ -64,7 +64,7 @@ def test_faint_fog_before_one_colour_is_no_noise(tmp_path: Path) -> None:
         write_image(tmp_path / f"faint_{n:02d}.png", srgb_to_linear((60 + faint)[..., None].repeat(3, -1) / 255))
     with Clip.open(tmp_path / "faint_##.png", fps=24) as clip:
         found = find_backdrop(clip, None, None)
-    assert found.source == "colour"
+    assert found.source == "color"
     assert found.plates.noise.lasting.max() * 255 < 1.3
 
 
@@ -105,9 +105,9 @@ def test_what_follows_a_cut_is_not_behind_the_smoke(tmp_path: Path) -> None:
     assert np.percentile(codes_apart(found.plates.at(0).image, truth), 95) < 8
 
 
-@pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
-def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
-    truth = np.full((HEIGHT, WIDTH, 3), colour)
+@pytest.mark.parametrize(("color", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on gray"])
+def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, color: float, ink: float) -> None:
+    truth = np.full((HEIGHT, WIDTH, 3), color)
     clip = film(tmp_path, truth, spreading_ink, ink)
     plate = plate_of(clip)
     assert (plate.confidence == 1).all()
@@ -160,29 +160,29 @@ def moving(clip: Clip) -> Backdrop:
     return find_backdrop(clip, replace(cameras[0], matrices=tuple(each.matrix for each in cameras)), None)
 
 
-@pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
-def test_one_colour_behind_a_moving_camera_is_found(tmp_path: Path, colour: tuple[float, float, float]) -> None:
-    wide = np.broadcast_to(colour, (HEIGHT, WIDTH + 2 * COUNT, 3))
+@pytest.mark.parametrize("color", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
+def test_one_color_behind_a_moving_camera_is_found(tmp_path: Path, color: tuple[float, float, float]) -> None:
+    wide = np.broadcast_to(color, (HEIGHT, WIDTH + 2 * COUNT, 3))
     found = moving(pan(tmp_path, wide, 1.0)).background
     assert found is not None
-    assert found.color == pytest.approx(colour, abs=0.003)
+    assert found.color == pytest.approx(color, abs=0.003)
 
 
 @pytest.mark.parametrize("smoke", [0.0, 1.0])
-def test_more_than_one_colour_behind_a_moving_camera_is_refused(tmp_path: Path, smoke: float) -> None:
+def test_more_than_one_color_behind_a_moving_camera_is_refused(tmp_path: Path, smoke: float) -> None:
     with pytest.raises(ValueError, match="The camera moves"):
         moving(pan(tmp_path, passing_wall(), smoke))
 
 
-def test_a_single_picture_has_a_colour_around_it() -> None:
+def test_a_single_picture_has_a_color_around_it() -> None:
     """In noise, too, behind smoke that covers most of it and comes in from one side; not a wall, and no black bars."""
     picture = np.full((60, 80, 3), 0.2, np.float32)
     picture += np.random.default_rng(0).normal(0, 0.004, picture.shape).astype(np.float32)
     picture[5:, 10:70] = np.linspace(0.3, 0.9, 60)[:, None]
-    assert colour_around(picture) == pytest.approx((0.2, 0.2, 0.2), abs=0.002)
+    assert color_around(picture) == pytest.approx((0.2, 0.2, 0.2), abs=0.002)
     picture[:, 10:70] = np.linspace(0.3, 0.9, 60)[:, None]
-    assert colour_around(picture) is None
+    assert color_around(picture) is None
     bars = np.kron(np.random.default_rng(0).uniform(0.1, 0.6, (12, 16, 1)), np.ones((5, 5, 3))).astype(np.float32)
-    assert colour_around(bars) is None
+    assert color_around(bars) is None
     bars[:10] = bars[-10:] = 0
-    assert colour_around(bars) is None
+    assert color_around(bars) is None

@@ -132,7 +132,7 @@ def test_a_camera_that_hardly_moves_does_not() -> None:
     assert found(filmed(shifts(NONE, 0.6 * ALONG))) is None
 
 
-def test_smoke_before_one_colour_is_no_camera() -> None:
+def test_smoke_before_one_color_is_no_camera() -> None:
     assert found(filmed(shifts(*SHAKE), smoke=1.0, contrast=0.0)) is None
 
 

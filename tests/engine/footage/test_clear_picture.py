@@ -11,13 +11,13 @@ from smokelift.footage.matte import matte
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "colour"),
+    ("low", "high", "color"),
     [(0.2, 0.5, 0.6), (0.6, 0.9, 0.02), (0.2, 0.9, 0.25)],
     ids=["brightening", "darkening", "both"],
 )
-def test_plate_and_matte(tmp_path: Path, low: float, high: float, colour: float) -> None:
+def test_plate_and_matte(tmp_path: Path, low: float, high: float, color: float) -> None:
     truth = wall(low, high)
-    clip = film(tmp_path, truth, puff, colour)
+    clip = film(tmp_path, truth, puff, color)
     plate = plate_of(clip)
     assert plate.image.shape == truth.shape
     assert plate.confidence.shape == truth.shape[:2]
@@ -27,7 +27,7 @@ def test_plate_and_matte(tmp_path: Path, low: float, high: float, colour: float)
     assert np.percentile(apart, 95) < 5.0
     for n in (4, 12, 20):
         result = matte(clip.frame(n), plate)
-        contrast = puff(n) * np.abs(linear_to_srgb(truth) - linear_to_srgb(colour)).mean(axis=2) * 255
+        contrast = puff(n) * np.abs(linear_to_srgb(truth) - linear_to_srgb(color)).mean(axis=2) * 255
         assert result.deviation.dtype == np.float32
         assert result.mask[contrast > 12].mean() > 0.95
         assert result.mask[puff(n) == 0.0].mean() < 0.08
@@ -63,9 +63,9 @@ def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> No
     assert all(matte(clip.frame(n), plate).mask[inner].all() for n in (0, 11, 23))
 
 
-@pytest.mark.parametrize(("colour", "edge"), [(0.9, 0.1), (0.02, 0.9)])
+@pytest.mark.parametrize(("color", "edge"), [(0.9, 0.1), (0.02, 0.9)])
 def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
-    tmp_path: Path, colour: float, edge: float
+    tmp_path: Path, color: float, edge: float
 ) -> None:
     truth = np.linspace(0.2, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
@@ -76,7 +76,7 @@ def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
         thickness = np.random.default_rng(n).uniform(0.3, 0.9, (HEIGHT, 1))
         return np.where(column, thickness, 0.5 * (shred & (n == 5)))
 
-    shown = np.where(column, colour, edge)[..., None].astype(np.float32)
+    shown = np.where(column, color, edge)[..., None].astype(np.float32)
     plate = plate_of(film(tmp_path, truth, opacity, shown, 0.5))
     inner = np.abs(columns - WIDTH / 2) < 6
     assert plate.confidence[inner].max() < 0.5

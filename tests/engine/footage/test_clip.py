@@ -1,4 +1,4 @@
-"""Clips: every frame is the right one, upright, in the right colours; what cannot be read is said."""
+"""Clips: every frame is the right one, upright, in the right colors; what cannot be read is said."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -58,7 +58,7 @@ def flat(value: int | tuple[int, int, int], width: int = 32, height: int = 16) -
 
 
 def codes(clip: Clip) -> list[int]:
-    """Return the level of each frame of a clip of flat grey frames."""
+    """Return the level of each frame of a clip of flat gray frames."""
     return [round(float(linear_to_srgb(image[8, 8, 1])) * 255) for image in clip]
 
 
@@ -125,15 +125,15 @@ def codes_of(clip: Clip, n: int) -> int:
 
 
 @pytest.mark.parametrize("colorspace", [1, 5])
-def test_the_colour_matrix_is_honoured(tmp_path: Path, colorspace: int) -> None:
-    colour = (200, 60, 30)
-    path = encode(tmp_path / "a.mp4", [flat(colour, 64, 64)] * 2, colorspace=colorspace, pixels="yuv444p")
+def test_the_color_matrix_is_honored(tmp_path: Path, colorspace: int) -> None:
+    color = (200, 60, 30)
+    path = encode(tmp_path / "a.mp4", [flat(color, 64, 64)] * 2, colorspace=colorspace, pixels="yuv444p")
     found = linear_to_srgb(Clip.open(path).frame(0)[32, 32]) * 255
-    np.testing.assert_allclose(found, colour, atol=2.1)
+    np.testing.assert_allclose(found, color, atol=2.1)
 
 
 @pytest.mark.parametrize("full", [False, True])
-def test_the_colour_range_is_honoured_and_rounding_is_unbiased(tmp_path: Path, full: bool) -> None:
+def test_the_color_range_is_honored_and_rounding_is_unbiased(tmp_path: Path, full: bool) -> None:
     luma = np.arange(16, 236, dtype=np.uint8)
     planes = np.full((6, 220), 128, np.uint8)  # four rows of luma over two of chroma, as yuv420p is packed
     planes[:4] = luma

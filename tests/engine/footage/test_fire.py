@@ -1,4 +1,4 @@
-"""Fire is distinguished from coloured smoke, and smoke is continued over it."""
+"""Fire is distinguished from colored smoke, and smoke is continued over it."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.fire import fire_colour, firelight, hot_pixels, without_fire
+from smokelift.footage.fire import fire_color, firelight, hot_pixels, without_fire
 from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 
@@ -70,15 +70,15 @@ def test_what_is_no_fire(what) -> None:
 
 @pytest.mark.parametrize("smoke", [(0.5, 0.5, 0.5), (0.0, 0.0, 0.0)])
 def test_a_flame_is_fire_whatever_the_smoke_is(smoke) -> None:
-    """What is as bright as white and has the colour of soot shines, in bright smoke and without smoke as well."""
+    """What is as bright as white and has the color of soot shines, in bright smoke and without smoke as well."""
     assert fire_share(*pixels(smoke=np.array(smoke))) > 0.01
 
 
 def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:
     wall = np.broadcast_to(np.float32((0.9, 0.5, 0.2)), (100, 3))
-    colours = np.concatenate([0.9 * wall + 0.006, np.full((50, 3), 0.06, np.float32)])
+    colors = np.concatenate([0.9 * wall + 0.006, np.full((50, 3), 0.06, np.float32)])
     behind = np.concatenate([wall, np.zeros((50, 3), np.float32)])
-    assert fire_share(colours, behind) == 0
+    assert fire_share(colors, behind) == 0
 
 
 def test_what_is_added_to_the_background_counts() -> None:
@@ -102,12 +102,12 @@ def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> Non
 
 
 def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
-    """Where it is and nowhere else, in its own colour; the smoke that is continued is thinner than that in the fire."""
+    """Where it is and nowhere else, in its own color; the smoke that is continued is thinner than that in the fire."""
     for number in range(3):
         write_image(tmp_path / f"fire_{number:02d}.exr", picture(number))
     with Clip.open(tmp_path / "fire_##.exr") as clip:
         light = firelight(clip, without_fire(clip, known_plate(np.zeros(3), clip)))
-        assert fire_colour(clip, light) == pytest.approx(FLAME, abs=0.04)
+        assert fire_color(clip, light) == pytest.approx(FLAME, abs=0.04)
         added = light.frame(1)
         np.testing.assert_allclose(added[44, 32], picture(1)[44, 32] - SMOKE, atol=0.045)
         assert not added[:20].any() and added.min() == 0

@@ -40,19 +40,19 @@ def test_exif(tmp_path: Path, said: int | None) -> None:
     assert Clip.open(tmp_path / "a#.jpg").lens == (said or None)
 
 
-def layer(grey: float, alpha: float | None) -> Layer:
-    """Smoke of a linear grey over the left half."""
+def layer(gray: float, alpha: float | None) -> Layer:
+    """Smoke of a linear gray over the left half."""
     picture, opacity = np.zeros((4, 6, 3), np.float32), np.zeros((4, 6), np.float32)
-    picture[:, :3], opacity[:, :3] = grey * (1.0 if alpha is None else alpha), alpha or 0.0
+    picture[:, :3], opacity[:, :3] = gray * (1.0 if alpha is None else alpha), alpha or 0.0
     return picture, None if alpha is None else opacity
 
 
-@pytest.mark.parametrize(("grey", "backdrop"), [(0.05, 1.0), (0.9, 0.0)])
-def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(grey: float, backdrop: float) -> None:
-    clip = [layer(grey, 0.0), layer(grey, 0.5)]
+@pytest.mark.parametrize(("gray", "backdrop"), [(0.05, 1.0), (0.9, 0.0)])
+def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray: float, backdrop: float) -> None:
+    clip = [layer(gray, 0.0), layer(gray, 0.5)]
     assert backdrop_of(clip) == backdrop
     shown = shown_before(clip[1], backdrop)
-    np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * grey + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
+    np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
 
 
 def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path) -> None:
@@ -93,12 +93,12 @@ def test_averages_of_a_chequerboard_are_those_of_its_pixels_to_the_last_bit(size
         top = np.iinfo(dtype).max
         picture = StoredPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
         linear = picture.linear()
-        for colour in (0, 1):
-            share = ((rows + columns) % 2 == (first + colour) % 2).astype(np.float32)
+        for color in (0, 1):
+            share = ((rows + columns) % 2 == (first + color) % 2).astype(np.float32)
             weight = np.maximum(area_average(share, *size), np.float32(1e-6))
             expected = area_average(linear * share[..., None], *size) / weight[..., None]
             for image in (picture, StoredPicture(linear)):
-                assert np.array_equal(image.chequered(*size, first)[colour], expected)
+                assert np.array_equal(image.chequered(*size, first)[color], expected)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_colour_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
+def test_a_color_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
     plates = given_plates(Background(color=(0.1, 0.2, 0.3)), None, clip)
     assert isinstance(plates, Plate)
@@ -86,7 +86,7 @@ def test_a_camera_sees_its_own_plate_and_others_its_mean(folder: Path) -> None:
         np.testing.assert_allclose(part, own[3:11, 2:12], rtol=1e-5)
 
 
-def test_a_colour_is_seen_by_every_camera_and_nothing_is_black() -> None:
+def test_a_color_is_seen_by_every_camera_and_nothing_is_black() -> None:
     scene = Scene(background=Background(color=(0.1, 0.2, 0.3)))
     np.testing.assert_array_equal(background_picture(scene, CAMERA), np.float32([0.1, 0.2, 0.3]))
     np.testing.assert_array_equal(background_picture(Scene(camera=CAMERA)), np.zeros(3))

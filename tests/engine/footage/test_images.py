@@ -25,7 +25,7 @@ from smokelift.footage.images import (
 from smokelift.output.images import write_image
 
 
-def colours(height: int = 6, width: int = 5) -> np.ndarray:
+def colors(height: int = 6, width: int = 5) -> np.ndarray:
     return np.random.default_rng(1).random((height, width, 3), np.float32)
 
 
@@ -39,7 +39,7 @@ def test_srgb_is_the_standard_curve() -> None:
 
 
 def test_png_of_8_bits(tmp_path: Path) -> None:
-    codes = np.rint(colours() * 255).astype(np.uint8)
+    codes = np.rint(colors() * 255).astype(np.uint8)
     Image.fromarray(codes).save(tmp_path / "a.png")
     image = read_image(tmp_path / "a.png")
     assert image.dtype == np.float32
@@ -60,9 +60,9 @@ def test_png_of_16_bits_keeps_them(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_image(tmp_path / "a.png", "linear"), codes / 65535, atol=1e-6)
 
 
-def test_grey_palette_and_transparent_png(tmp_path: Path) -> None:
-    Image.fromarray(np.full((2, 3), 128, np.uint8)).save(tmp_path / "grey.png")
-    np.testing.assert_allclose(read_image(tmp_path / "grey.png"), np.full((2, 3, 3), 0.2158605), rtol=1e-5)
+def test_gray_palette_and_transparent_png(tmp_path: Path) -> None:
+    Image.fromarray(np.full((2, 3), 128, np.uint8)).save(tmp_path / "gray.png")
+    np.testing.assert_allclose(read_image(tmp_path / "gray.png"), np.full((2, 3, 3), 0.2158605), rtol=1e-5)
     Image.fromarray(np.full((2, 3, 3), 255, np.uint8)).convert("P").save(tmp_path / "palette.png")
     np.testing.assert_allclose(read_image(tmp_path / "palette.png"), np.ones((2, 3, 3)))
     half = np.full((2, 3, 4), 255, np.uint8)
@@ -85,7 +85,7 @@ def test_jpeg_is_turned_upright(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("half", [True, False])
 def test_exr_comes_back(tmp_path: Path, half: bool) -> None:
-    image = 30.0 * colours() - 1.0
+    image = 30.0 * colors() - 1.0
     write_image(tmp_path / "a.exr", image, half=half)
     read = read_image(tmp_path / "a.exr")
     assert read.dtype == np.float32
@@ -103,10 +103,10 @@ def exr(path: Path, channels: dict[str, np.ndarray], **header: object) -> Path:
 
 
 def test_exr_channels_and_tiles(tmp_path: Path) -> None:
-    rgb = colours(40, 50)
-    grey = rgb[..., 0].copy()
-    np.testing.assert_array_equal(read_image(exr(tmp_path / "y.exr", {"Y": grey})), np.repeat(grey[..., None], 3, 2))
-    np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"A": grey})), np.repeat(grey[..., None], 3, 2))
+    rgb = colors(40, 50)
+    gray = rgb[..., 0].copy()
+    np.testing.assert_array_equal(read_image(exr(tmp_path / "y.exr", {"Y": gray})), np.repeat(gray[..., None], 3, 2))
+    np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"A": gray})), np.repeat(gray[..., None], 3, 2))
     alpha = np.full((40, 50), 0.25, np.float32)
     premultiplied = np.dstack([rgb * 0.25, alpha])
     np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"RGBA": premultiplied})), premultiplied[..., :3])
@@ -120,13 +120,13 @@ def test_exr_channels_and_tiles(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_image(exr(tmp_path / "layers.exr", layers)), rgb)
     for names in (("N.X", "N.Y"), ("Z",), ("View.Z",), ("A", "Z")):
         with pytest.raises(PictureKindError, match=rf"x\.exr: holds neither RGB nor Y channels, but {names[0]}"):
-            read_image(exr(tmp_path / "x.exr", dict.fromkeys(names, grey)))
+            read_image(exr(tmp_path / "x.exr", dict.fromkeys(names, gray)))
 
 
 @pytest.mark.parametrize(
     "parts",
     [
-        [("depth", "Z"), ("colour", "RGB")],
+        [("depth", "Z"), ("color", "RGB")],
         [("normal", "X Y Z"), ("beauty", "R G B A")],
         [("albedo", "R G B"), ("Beauty", "R G B")],
         [("", "albedo.R albedo.G albedo.B beauty.R beauty.G beauty.B beauty.A Z")],
@@ -137,7 +137,7 @@ def test_exr_channels_and_tiles(tmp_path: Path) -> None:
 def test_the_picture_of_an_exr_is_found_among_parts_and_layers(tmp_path: Path, parts: list[tuple[str, str]]) -> None:
     """The part or layer that is the picture has the value 0.5, every other one 0.1."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    wanted = ("colour", "beauty", "Beauty", "beauty.", "light.", "")
+    wanted = ("color", "beauty", "Beauty", "beauty.", "light.", "")
 
     def is_wanted(part: str, channel: str) -> bool:
         layer = channel.rpartition(".")[0]
@@ -199,10 +199,10 @@ def test_tiff_and_dpx_keep_their_bits(tmp_path: Path, name: str, codec: str, pix
 @pytest.mark.parametrize("mode", ["L", "P", "CMYK", "1", "I;16"])
 @pytest.mark.parametrize("compression", [None, "tiff_lzw", "tiff_deflate"])
 def test_tiff_of_other_kinds(tmp_path: Path, mode: str, compression: str | None) -> None:
-    grey = np.kron(np.array([[0, 255], [255, 0]], np.uint8), np.ones((8, 8), np.uint8))
-    picture = Image.fromarray(grey * np.uint16(257)) if mode == "I;16" else Image.fromarray(grey).convert(mode)
+    gray = np.kron(np.array([[0, 255], [255, 0]], np.uint8), np.ones((8, 8), np.uint8))
+    picture = Image.fromarray(gray * np.uint16(257)) if mode == "I;16" else Image.fromarray(gray).convert(mode)
     picture.save(tmp_path / "a.tif", compression=compression)
-    np.testing.assert_allclose(read_image(tmp_path / "a.tif"), np.repeat(grey[..., None] / 255, 3, -1), atol=0.01)
+    np.testing.assert_allclose(read_image(tmp_path / "a.tif"), np.repeat(gray[..., None] / 255, 3, -1), atol=0.01)
 
 
 def test_log_dpx_and_floating_tiff_are_named(tmp_path: Path) -> None:
@@ -214,12 +214,12 @@ def test_log_dpx_and_floating_tiff_are_named(tmp_path: Path) -> None:
         with pytest.raises(PictureKindError, match=r"a\.dpx: holds the densities of film or .*; save it as \.exr"):
             read_image(path)
     Image.fromarray(np.zeros((6, 8), np.float32)).save(tmp_path / "a.tif")
-    with pytest.raises(PictureKindError, match=r"a\.tif: is neither grey nor RGB in whole numbers.*; save it as \.exr"):
+    with pytest.raises(PictureKindError, match=r"a\.tif: is neither gray nor RGB in whole numbers.*; save it as \.exr"):
         read_image(tmp_path / "a.tif")
 
 
 def test_exr_gives_the_display_window(tmp_path: Path) -> None:
-    rgb = colours(4, 6)
+    rgb = colors(4, 6)
     window = (np.array([-1, 2], np.int32), np.array([4, 5], np.int32))
     display = (np.array([0, 0], np.int32), np.array([7, 3], np.int32))
     path = exr(tmp_path / "a.exr", {"RGB": rgb}, dataWindow=window, displayWindow=display)
@@ -248,14 +248,14 @@ def test_damaged_and_missing_pictures_are_named(tmp_path: Path, name: str) -> No
 
 def test_what_cannot_be_written_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
-    write_image(path, colours())
+    write_image(path, colors())
     before = path.read_bytes()
     with pytest.raises(ImageError, match="not finite"):
         write_image(path, np.full((2, 2, 3), np.nan))
     with pytest.raises(ImageError, match="shape"):
         write_image(path, np.zeros((2, 2, 5)))
     with pytest.raises(ImageError, match=r"only write \.exr and \.png"):
-        write_image(tmp_path / "a.bmp", colours())
+        write_image(tmp_path / "a.bmp", colors())
     with pytest.raises(ImageError, match="is none of"):
         read_image(tmp_path / "a.bmp")
     assert path.read_bytes() == before
@@ -312,7 +312,7 @@ def test_radiance_pictures_of_a_rare_kind_are_refused(tmp_path, kind, size):
 def test_a_damaged_exr_leaves_the_standard_streams_alone(tmp_path, capfd) -> None:
     """OpenEXR writes of pixels that it cannot decode to standard output, where the command line writes its events."""
     path = tmp_path / "damaged.exr"
-    write_image(path, colours())
+    write_image(path, colors())
     content = path.read_bytes()
     path.write_bytes(content.replace(b"B\0\x01\0\0\0", b"B\0\0\0\0\0", 1))
     with pytest.raises(ImageError, match="cannot be read"):

@@ -7,7 +7,7 @@ from scipy import ndimage
 from smokelift.footage.inpainting import continuation_errors, in_one_piece, mostly_beside, push_pull
 
 HEIGHT, WIDTH = 40, 60
-COLOUR = np.array([0.3, 0.2, 0.1], np.float32)
+COLOR = np.array([0.3, 0.2, 0.1], np.float32)
 
 
 def hole() -> np.ndarray:
@@ -44,9 +44,9 @@ def test_what_most_of_a_square_shows_is_its_median() -> None:
 
 
 def bricks(deviation: float) -> np.ndarray:
-    """A wall of one colour, whose bricks of 16 x 16 pixels are brighter and darker."""
+    """A wall of one color, whose bricks of 16 x 16 pixels are brighter and darker."""
     light = 1 + deviation * np.random.default_rng(4).standard_normal((8, 14, 1))
-    return (np.kron(light, np.ones((16, 16, 1))) * COLOUR).astype(np.float32)
+    return (np.kron(light, np.ones((16, 16, 1))) * COLOR).astype(np.float32)
 
 
 def column(width: int, shape: tuple[int, ...]) -> np.ndarray:
@@ -56,12 +56,12 @@ def column(width: int, shape: tuple[int, ...]) -> np.ndarray:
     return known
 
 
-def test_errors_are_along_the_walls_colour_and_as_large_as_behind_the_smoke() -> None:
+def test_errors_are_along_the_walls_color_and_as_large_as_behind_the_smoke() -> None:
     wall = bricks(0.15)
     known = column(32, wall.shape)
     variances, axes = np.linalg.eigh(continuation_errors(wall, known))
-    assert abs(axes[:, 2] @ COLOUR) > 0.999 * np.linalg.norm(COLOUR)
-    assert np.sqrt(variances[2]) == pytest.approx(0.15 * np.linalg.norm(COLOUR), rel=0.5)
+    assert abs(axes[:, 2] @ COLOR) > 0.999 * np.linalg.norm(COLOR)
+    assert np.sqrt(variances[2]) == pytest.approx(0.15 * np.linalg.norm(COLOR), rel=0.5)
     assert variances[1] < 1e-3 * variances[2]
     # what is hidden has no part in it
     wall[~known] = 0.9

@@ -70,7 +70,7 @@ def test_noise_is_hardly_ever_smoke() -> None:
         plate = Plate(np.full((*size, 3), 0.2, np.float32), np.ones(size, np.float32), lasting_noise(2 / 255))
         encoded = linear_to_srgb(plate.image)
         for _ in range(50):
-            # as neighbours share it
+            # as neighbors share it
             shared = ndimage.gaussian_filter(random.standard_normal(size), SMOOTHING) * SMOOTHING * np.sqrt(4 * np.pi)
             noisy = encoded + np.float32(2 / 255) * shared[..., None].astype(np.float32)
             alarms += bool(matte(srgb_to_linear(noisy), plate).share.any())

@@ -33,7 +33,7 @@ def test_the_spread_of_what_is_clear_is_told_from_smoke(codes: float, smoke: flo
     assert 255 * peak_spread(deviations) == pytest.approx(codes, rel=0.3)
 
 
-def test_what_neighbours_share_lasts(codes: float = 3.0) -> None:
+def test_what_neighbors_share_lasts(codes: float = 3.0) -> None:
     random = np.random.default_rng(3)
     blocks = random.normal(0, codes / 255, (12, 20, 30, 3))
     pixels = blocks.repeat(BLOCK, 1).repeat(BLOCK, 2) + random.normal(0, 2 / 255, (12, 20 * BLOCK, 30 * BLOCK, 3))

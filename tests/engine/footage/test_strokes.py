@@ -138,8 +138,8 @@ def test_green_before_black_is_before_black(tmp_path: Path, given: tuple[float, 
 
 def test_an_alpha_channel_leaves_nothing_to_strokes(tmp_path: Path) -> None:
     for n in range(4):
-        grey = np.full((HEIGHT, WIDTH), 128)
-        pixels = np.stack([grey, grey, grey, 255 * PLUME], -1).astype(np.uint8)
+        gray = np.full((HEIGHT, WIDTH), 128)
+        pixels = np.stack([gray, gray, gray, 255 * PLUME], -1).astype(np.uint8)
         Image.fromarray(pixels).save(tmp_path / f"smoke_{n}.png")
     with Clip.open(tmp_path / "smoke_#.png", fps=24) as clip:
         found = find_backdrop(clip, None, Background(strokes=tmp_path / "no.png"))

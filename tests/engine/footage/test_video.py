@@ -16,7 +16,7 @@ from films import coded, film, puff, wall
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
-from smokelift.footage.video import lacks_index, median_quantiser
+from smokelift.footage.video import lacks_index, median_quantizer
 from smokelift.output.images import write_video
 
 FRAMES = [np.full((16, 32, 3), value, np.float32) for value in (0.1, 0.3, 0.5)]
@@ -110,15 +110,15 @@ def test_what_has_no_boxes_lacks_no_index(tmp_path: Path, content: bytes) -> Non
     assert not lacks_index(tmp_path / "clip.mp4")
 
 
-@pytest.mark.parametrize("quantiser", [10, 30, 48])
-def test_the_quantiser_is_that_of_the_encoder(tmp_path: Path, quantiser: int) -> None:
-    path = coded(tmp_path / "clip.mp4", wall(0.2, 0.5), puff, 0.6, quantiser)
-    assert median_quantiser(path) == pytest.approx(quantiser, abs=3)
+@pytest.mark.parametrize("quantizer", [10, 30, 48])
+def test_the_quantizer_is_that_of_the_encoder(tmp_path: Path, quantizer: int) -> None:
+    path = coded(tmp_path / "clip.mp4", wall(0.2, 0.5), puff, 0.6, quantizer)
+    assert median_quantizer(path) == pytest.approx(quantizer, abs=3)
 
 
 @pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mpeg4"), ("a.mkv", "ffv1"), ("a.webm", "libvpx-vp9")])
 def test_other_codecs_tell_nothing(tmp_path: Path, name: str, codec: str) -> None:
-    assert median_quantiser(coded(tmp_path / name, wall(0.2, 0.5), puff, 0.6, codec=codec)) is None
+    assert median_quantizer(coded(tmp_path / name, wall(0.2, 0.5), puff, 0.6, codec=codec)) is None
 
 
 def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path: Path) -> None:
@@ -126,4 +126,4 @@ def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path: Path) -> No
     text = tmp_path / "a.mp4"
     text.write_text("no video")
     for path in (clip.path, *clip.files[:1], text, tmp_path, tmp_path / "absent.mp4"):
-        assert median_quantiser(path) is None
+        assert median_quantizer(path) is None

@@ -8,7 +8,7 @@ from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
-CENTRE = np.array([0, 0, 0.8])
+CENTER = np.array([0, 0, 0.8])
 PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
 ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
 TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
@@ -24,12 +24,12 @@ def points(count: int = 50) -> np.ndarray:
 
 
 @both
-def test_a_working_pixel_is_a_voxel_wide_at_the_centre(camera: Camera) -> None:
+def test_a_working_pixel_is_a_voxel_wide_at_the_center(camera: Camera) -> None:
     small = working_picture(camera, DOMAIN).camera
     h = DOMAIN.voxel_size
-    origin, _ = project_points(small, CENTRE)
+    origin, _ = project_points(small, CENTER)
     for step in ((h, 0, 0), (0, 0, h)):
-        moved, _ = project_points(small, CENTRE + np.array(step))
+        moved, _ = project_points(small, CENTER + np.array(step))
         assert np.linalg.norm(moved - origin) == pytest.approx(1.0, rel=0.05)
 
 

@@ -75,8 +75,8 @@ def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Pa
 
 
 @needs_vdb
-def test_quantised_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: Path) -> None:
-    exported(sequence, tmp_path / "out", precision="quantised")
+def test_quantized_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: Path) -> None:
+    exported(sequence, tmp_path / "out", precision="quantized")
     rho, u = (vdb.read_grid(tmp_path / "out" / "smoke_0001.vdb", name, DOMAIN) for name in ("density", "velocity"))
     true = sequence.density(1)
     assert not np.array_equal(rho, true)
@@ -103,7 +103,7 @@ def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> 
 
 
 @needs_vdb
-@pytest.mark.parametrize("precision", ["half", "quantised"])
+@pytest.mark.parametrize("precision", ["half", "quantized"])
 def test_fire_is_exported(tmp_path: Path, precision: str) -> None:
     burning = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
     flame = frame(7)[0]

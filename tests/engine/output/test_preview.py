@@ -92,7 +92,7 @@ def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
     ],
 )
 def test_a_plate_does_not_turn_along(plume, tmp_path, plate, scattering, behind) -> None:
-    """The turning view has one colour behind it, from its first frame on; the front has the plate."""
+    """The turning view has one color behind it, from its first frame on; the front has the plate."""
     picture = np.repeat(np.float32(plate), 28)[:, None, None] * np.ones((1, 40, 3), np.float32)
     write_image(tmp_path / "plate.exr", picture)
     scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"), scattering=scattering)

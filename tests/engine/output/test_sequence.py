@@ -35,17 +35,17 @@ def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
     for found, written in zip(opened.velocity(2).faces, faces, strict=True):
         np.testing.assert_array_equal(found, written)
     assert opened.velocity(2).voxel_size == SCENE.domain.voxel_size
-    centres = Velocity(faces, 1.0).centres()
-    np.testing.assert_array_equal(opened.velocity_at_centres(2), centres)
+    centers = Velocity(faces, 1.0).centres()
+    np.testing.assert_array_equal(opened.velocity_at_centres(2), centers)
     assert opened.figures(2) == {"loss": 0.5}
     grid = vdb.vdb_module().read(str(tmp_path / "out" / "smoke_0002.vdb"), gridname="density")
     assert json.loads(grid.metadata[vdb.SETTINGS]) == SETTINGS
     for n in (1, 2, 3):
         (tmp_path / "out" / f"smoke_000{n}.npz").unlink()
     np.testing.assert_allclose(opened.density(2), rho, rtol=1e-3)
-    for found, mean in zip(opened.velocity(2).faces, on_faces(centres), strict=True):
+    for found, mean in zip(opened.velocity(2).faces, on_faces(centers), strict=True):
         np.testing.assert_allclose(found, mean, rtol=1e-3, atol=2e-3)
-    np.testing.assert_allclose(opened.velocity_at_centres(2), centres, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(opened.velocity_at_centres(2), centers, rtol=1e-3, atol=1e-6)
 
 
 @pytest.mark.parametrize("npz", [True, pytest.param(False, marks=needs_vdb)])

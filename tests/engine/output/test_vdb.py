@@ -52,8 +52,8 @@ def test_grids_are_what_blender_expects(tmp_path: Path) -> None:
     assert json.loads(grid.metadata[vdb.SETTINGS]) == {"quality": "draft", "steps": 3}
     for grid in grids.values():
         for voxel in ((0, 0, 0), (3, 4, 5)):
-            centre = [low + (i + 0.5) * DOMAIN.voxel_size for low, i in zip(DOMAIN.min, voxel, strict=True)]
-            assert grid.transform.indexToWorld(voxel) == pytest.approx(centre)
+            center = [low + (i + 0.5) * DOMAIN.voxel_size for low, i in zip(DOMAIN.min, voxel, strict=True)]
+            assert grid.transform.indexToWorld(voxel) == pytest.approx(center)
 
 
 @needs_vdb

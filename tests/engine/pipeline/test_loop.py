@@ -229,7 +229,7 @@ def test_frames_that_are_the_background_are_kept_as_its_picture(plume, draft, tm
 
 
 def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
-    """Where the smoke is, in metres."""
+    """Where the smoke is, in meters."""
     assert scene.domain is not None
     places = np.broadcast_arrays(*scene.domain.offsets((0, 0, 0)))
     return np.array([np.average(place, weights=density) for place in places])

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def texels(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (rows, columns, 3) towards texel centres by the convention's formula, and solid angles (rows, 1)."""
+    """Unit vectors (rows, columns, 3) towards texel centers by the convention's formula, and solid angles (rows, 1)."""
     u = (np.arange(columns) + 0.5) / columns
     elevation = np.pi * (0.5 - (np.arange(rows)[:, None] + 0.5) / rows)
     azimuth = 2 * np.pi * (0.5 - u)

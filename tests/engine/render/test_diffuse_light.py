@@ -36,7 +36,7 @@ def exact(density, lights=(SUN,), medium=MEDIUM):
     return reference.render(density, CAMERA, DOMAIN, medium, lights, WALL.astype(float), "multiple")
 
 
-@pytest.mark.parametrize("lights", [(SUN,), (SUN, SKY)], ids=["one light", "several colours"])
+@pytest.mark.parametrize("lights", [(SUN,), (SUN, SKY)], ids=["one light", "several colors"])
 @pytest.mark.parametrize("extinction", [0.1, 12.0, 100.0])
 def test_image_equals_the_sums_in_double_precision(density, lights, extinction):
     medium = replace(MEDIUM, extinction=extinction)
@@ -44,7 +44,7 @@ def test_image_equals_the_sums_in_double_precision(density, lights, extinction):
     np.testing.assert_allclose(image, exact(density.astype(float), lights, medium), rtol=5e-4)
 
 
-def test_coloured_smoke_in_white_light_is_deeper_in_colour_where_light_is_scattered_again(density):
+def test_colored_smoke_in_white_light_is_deeper_in_color_where_light_is_scattered_again(density):
     thick = replace(MEDIUM, extinction=100.0, color=(1.0, 0.8, 0.5))
     image = renderer(medium=thick, background=np.zeros(3, np.float32)).image(density)
     black = np.zeros(3)
@@ -57,13 +57,13 @@ def test_coloured_smoke_in_white_light_is_deeper_in_colour_where_light_is_scatte
 
 
 @pytest.mark.parametrize(
-    ("hull", "lights", "colour"),
+    ("hull", "lights", "color"),
     [(False, (SUN,), (1.0, 1.0, 1.0)), (True, (SUN, SKY), (1.0, 1.0, 1.0)), (True, (SUN,), (0.4, 1.0, 0.7))],
-    ids=["one light", "several, hull", "coloured smoke"],
+    ids=["one light", "several, hull", "colored smoke"],
 )
-def test_gradient_equals_a_complex_step(density, lights, hull, colour):
+def test_gradient_equals_a_complex_step(density, lights, hull, color):
     """In voxels at random, those that light reaches late among them, and in empty ones, near the smoke and far."""
-    medium = replace(MEDIUM, color=colour)
+    medium = replace(MEDIUM, color=color)
     rng = np.random.default_rng(5)
     support = density > 0.2 if hull else None
     values = np.where(support, density, 0) if hull else density

@@ -22,7 +22,7 @@ NEAR = Camera.look_at((1.2, -1.1, 1.4), (0, 0, 0.5), fov_y_degrees=50, size=(30,
 
 
 def box(low: float, high: float, value: float) -> np.ndarray:
-    """A volume that has a value between two depths, in metres from the middle, all over the box."""
+    """A volume that has a value between two depths, in meters from the middle, all over the box."""
     depth = DOMAIN.min[1] + (np.arange(20) + 0.5) * DOMAIN.voxel_size
     within = (depth > low) & (depth < high)
     return np.broadcast_to(np.where(within, value, 0)[None, :, None], DOMAIN.resolution).astype(np.float32)

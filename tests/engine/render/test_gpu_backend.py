@@ -15,7 +15,7 @@ SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
 LIGHTS = {
     "directional": (SUN,),
     "point close by": (PointLight((-0.06, 0.5, 0.9), (1.5, 1.0, 0.5)),),
-    "all, in colour": (SUN, PointLight((4.0, -3.0, 5.0), (60, 50, 40)), DirectionalLight((0, 1, 0.1), (0, 1, 2))),
+    "all, in color": (SUN, PointLight((4.0, -3.0, 5.0), (60, 50, 40)), DirectionalLight((0, 1, 0.1), (0, 1, 2))),
     "none": (),
 }
 

@@ -15,7 +15,7 @@ from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium
 SHAPE = (14, 12, 16)
 DOMAIN = Domain((0.0, 0.0, 0.0), (1.4, 1.2, 1.6), SHAPE)
 SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
-CENTRE = np.array([0.7, 0.6, 0.8])
+CENTER = np.array([0.7, 0.6, 0.8])
 EYES = {
     "along an axis": (0.3, -2.0, 0.9),
     "along a diagonal": (2.5, -1.2, 2.4),
@@ -26,8 +26,8 @@ MODELS = ("single", "unshadowed", "absorption")
 FAR, CLOSE = (4.0, -3.0, 5.0), (-0.06, 0.5, 0.9)  # CLOSE: half a voxel before the box
 LIGHTS = {
     "directional": (SUN,),
-    "several directions of one colour": (SUN, DirectionalLight((-0.2, 0.9, 0.1), (1.5, 1.0, 0.5))),
-    "several colours": (
+    "several directions of one color": (SUN, DirectionalLight((-0.2, 0.9, 0.1), (1.5, 1.0, 0.5))),
+    "several colors": (
         SUN,
         DirectionalLight((-1.0, 0.2, 0.1), (0.0, 0.5, 2.0)),
         DirectionalLight((0, 0, 1), (1, 1, 1)),
@@ -40,8 +40,8 @@ LIGHTS = {
 
 
 def make_camera(eye, kind="perspective", size=(20, 22)):
-    """A slightly rolled camera with its axis off the picture's centre."""
-    looking = Camera.look_at(eye, tuple(CENTRE), up=(0.1, 0.03, 1.0), fov_y_degrees=50, size=size)
+    """A slightly rolled camera with its axis off the picture's center."""
+    looking = Camera.look_at(eye, tuple(CENTER), up=(0.1, 0.03, 1.0), fov_y_degrees=50, size=size)
     if kind == "orthographic":
         return replace(looking, type="orthographic", fx=11.0, fy=12.0, cx=10.3, cy=10.8)
     return replace(looking, fx=30.0, fy=33.0, cx=10.3, cy=10.8)
@@ -177,7 +177,7 @@ def voxels_of_three_kinds(density, camera, medium):
 def test_image_is_finite_and_creates_no_light(density, yaw, pitch, light, anisotropy, depth):
     """From any side, for any light: no NaN, nothing negative, never brighter than source plus background."""
     yaw, pitch = np.radians([yaw, pitch])
-    eye = CENTRE + 3 * np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    eye = CENTER + 3 * np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
     medium = replace(medium_of_depth(density, depth), anisotropy=anisotropy, albedo=1.0)
     sun = DirectionalLight(tuple(light), (1.0, 1.0, 1.0))
     image = Renderer(make_camera(tuple(eye)), DOMAIN, medium, (sun,), np.full(3, 0.5, np.float32)).image(density)

@@ -11,7 +11,7 @@ from smokelift.scene import Camera, Domain, SceneError, orbit
 from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
-CENTRE = np.array([0, 0, 0.8])
+CENTER = np.array([0, 0, 0.8])
 PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
 ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
 TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
@@ -80,9 +80,9 @@ def test_a_moving_camera_stands_still_in_every_frame() -> None:
 @pytest.mark.parametrize(("yaw", "pitch"), [(33, 0), (0, 25), (-120, -10)])
 def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: float) -> None:
     moved = orbit(camera, DOMAIN, yaw, pitch)
-    distance = [np.linalg.norm(np.array(c.position) - CENTRE) for c in (camera, moved)]
+    distance = [np.linalg.norm(np.array(c.position) - CENTER) for c in (camera, moved)]
     assert distance[1] == pytest.approx(distance[0])
-    for before, after in zip(project_points(camera, CENTRE), project_points(moved, CENTRE), strict=True):
+    for before, after in zip(project_points(camera, CENTER), project_points(moved, CENTER), strict=True):
         np.testing.assert_allclose(after, before, atol=1e-9)
     assert (moved.size, moved.fx, moved.fy, moved.type) == (camera.size, camera.fx, camera.fy, camera.type)
 
@@ -99,8 +99,8 @@ def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
 
 @all_three
 def test_pitch_raises_the_camera(camera: Camera) -> None:
-    x, y, z = np.array(camera.position) - CENTRE
+    x, y, z = np.array(camera.position) - CENTER
     elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
     for pitch in (20.0, -20.0):
-        x, y, z = np.array(orbit(camera, DOMAIN, 70, pitch).position) - CENTRE
+        x, y, z = np.array(orbit(camera, DOMAIN, 70, pitch).position) - CENTER
         assert np.degrees(np.arctan2(z, np.hypot(x, y))) == pytest.approx(elevation + pitch)

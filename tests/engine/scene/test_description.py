@@ -28,17 +28,17 @@ def test_an_inlet_is_the_voxels_in_its_ball() -> None:
     domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
     inlet = Inlet((0.1, -0.2, 0), 0.4)
     found = inlet.voxels(domain)
-    centres = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in found.shape), indexing="ij"), -1) / 32 + domain.min
-    np.testing.assert_array_equal(found, np.linalg.norm(centres - inlet.centre, axis=-1) <= 0.4)
+    centers = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in found.shape), indexing="ij"), -1) / 32 + domain.min
+    np.testing.assert_array_equal(found, np.linalg.norm(centers - inlet.centre, axis=-1) <= 0.4)
     assert found.sum() / 32**3 == pytest.approx(2 / 3 * math.pi * 0.4**3, rel=0.02)
 
 
 @pytest.mark.parametrize(
-    ("centre", "voxel"), [((0.01, 0.02, 0.05), (32, 32, 1)), ((-1.005, 0.99, 3), (0, 63, 95))], ids=["in", "beside"]
+    ("center", "voxel"), [((0.01, 0.02, 0.05), (32, 32, 1)), ((-1.005, 0.99, 3), (0, 63, 95))], ids=["in", "beside"]
 )
-def test_a_small_inlet_is_the_nearest_voxel(centre, voxel) -> None:
+def test_a_small_inlet_is_the_nearest_voxel(center, voxel) -> None:
     domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
-    np.testing.assert_array_equal(np.argwhere(Inlet(centre, 0.006).voxels(domain)), [voxel])
+    np.testing.assert_array_equal(np.argwhere(Inlet(center, 0.006).voxels(domain)), [voxel])
 
 
 def test_the_box_around_marked_voxels_ends_at_the_grid() -> None:

@@ -103,11 +103,11 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
     assert found.kind == "background partly seen"
 
 
-@pytest.mark.parametrize(("quantiser", "said"), [(36, False), (46, True)])
-def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -> None:
+@pytest.mark.parametrize(("quantizer", "said"), [(36, False), (46, True)])
+def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantizer, said) -> None:
     """Where the codec's smoke that stands still may be in the background, which is not so before black."""
     for plate, doubted in ((wall(0.2, 0.5), said), (np.zeros((72, 56, 3)), False)):
-        path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantiser)
+        path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantizer)
         with Clip.open(path) as clip:
             assert kinds(find_backdrop(clip, None, None)) == ["strong compression"] * doubted
             assert not kinds(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))

@@ -42,7 +42,7 @@ def test_a_color_of_its_own_is_found(source, behind):
 @pytest.mark.parametrize("thickest", [0.3, 0.9])
 @pytest.mark.parametrize("behind", [BLACK, SKY, BRICK], ids=["black", "sky", "brick"])
 @pytest.mark.parametrize("source", [0.8 * WHITE, 0.02 * WHITE, BLACK], ids=["white", "soot", "black"])
-def test_grey_smoke_stays_grey_before_anything(source, behind, thickest):
+def test_gray_smoke_stays_gray_before_anything(source, behind, thickest):
     color, choice = smoke_color(samples(source, behind, thickest), WHITE)
     assert (color, choice.value) == ((1, 1, 1), UNDETERMINED)
 

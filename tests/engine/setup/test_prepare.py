@@ -121,9 +121,9 @@ def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) ->
     assert shot.scene.camera == given.resized(*shot.clip.size)
     assert Finding("assumed scale", {"height": 2.0}, source="assumed") in shot.findings
     low, high = (np.array(corner) for corner in (shot.scene.domain.min, shot.scene.domain.max))
-    centre = (low + high) / 2
+    center = (low + high) / 2
     camera = given.resized(*shot.clip.size)
-    ends = [project_points(camera, np.array([*centre[:2], z]))[0] for z in (low[2], centre[2])]
+    ends = [project_points(camera, np.array([*center[:2], z]))[0] for z in (low[2], center[2])]
     box = level.scene.domain
     right = [project_points(level.scene.camera, np.array([*box.centre[:2], z]))[0] for z in (box.min[2], box.centre[2])]
     # the smoke's lower end and its middle show where they do before a level camera

@@ -8,7 +8,7 @@ from smokelift.transport import Velocity, advect, project
 from tests.engine.transport.random_fields import SHAPE, random_velocity, uniform
 
 
-def test_centres_are_means_of_faces():
+def test_centers_are_means_of_faces():
     velocity = uniform((1, 2, 3))
     np.testing.assert_array_equal(velocity.centres(), np.broadcast_to(np.float32([1, 2, 3]), (*SHAPE, 3)))
     assert velocity.shape == SHAPE

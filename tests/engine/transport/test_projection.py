@@ -24,10 +24,10 @@ def inner_product(a, b, closed):
 def minus_laplacian(p, closed):
     result = np.zeros_like(p)
     for axis, high in itertools.product(range(3), (0, 1)):
-        neighbour = np.roll(p, -1 if high else 1, axis)
+        neighbor = np.roll(p, -1 if high else 1, axis)
         side = tuple(-high if d == axis else slice(None) for d in range(3))
-        neighbour[side] = p[side] if closed[2 * axis + high] else -p[side]
-        result += p - neighbour
+        neighbor[side] = p[side] if closed[2 * axis + high] else -p[side]
+        result += p - neighbor
     return result
 
 

@@ -55,7 +55,7 @@ def uniform(motion, shape=SHAPE):
 
 
 def voxels_a_frame(velocity):
-    """At voxel centres."""
+    """At voxel centers."""
     return velocity.centres() * (DT / VOXEL)
 
 

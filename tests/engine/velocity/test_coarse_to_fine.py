@@ -102,8 +102,8 @@ def test_default_finds_the_motion_of_a_smooth_blob(motion):
     x, y, z = positions((48, 48, 48))
 
     def blob(x, y, z):
-        centres = ((3, -2, 1, 70, 1.0), (-4, -3, 5, 50, 0.8), (1, 6, -4, 60, 0.6))
-        return sum(a * np.exp(-((x - i) ** 2 + (y - j) ** 2 + (z - k) ** 2) / s) for i, j, k, s, a in centres)
+        centers = ((3, -2, 1, 70, 1.0), (-4, -3, 5, 50, 0.8), (1, 6, -4, 60, 0.6))
+        return sum(a * np.exp(-((x - i) ** 2 + (y - j) ** 2 + (z - k) ** 2) / s) for i, j, k, s, a in centers)
 
     before, after = blob(x, y, z), blob(x - motion[0], y - motion[1], z - motion[2])
     off = mean_motion(estimate_velocity(before, after, DT, VOXEL), after) - motion
@@ -216,8 +216,8 @@ def test_bad_input_is_refused(change, message):
         estimate_velocity(**arguments)
 
 
-@pytest.mark.parametrize("counts", [{"linearisations": 0}, {"coarsening": -1}, {"linearisations": 2.5}])
-def test_grids_and_linearisations_are_counted(counts):
+@pytest.mark.parametrize("counts", [{"linearizations": 0}, {"coarsening": -1}, {"linearizations": 2.5}])
+def test_grids_and_linearizations_are_counted(counts):
     (name,) = counts
     with pytest.raises(ValueError, match=f"{name} must be a whole number from"):
         VelocitySettings(**counts)

@@ -49,7 +49,7 @@ def rest() -> Velocity:
 
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
 def test_smoke_at_rest_is_moved_as_the_picture_moves(kind: str) -> None:
-    """By metres that look as wide as the pixels, somewhat fewer; by none along the line of sight."""
+    """By meters that look as wide as the pixels, somewhat fewer; by none along the line of sight."""
     found = seen(rest(), 0.6, 0.9, kind).centres()[BOX] * DT
     (pixels, *_) = project_points(camera(kind), np.array([[0.0, 0.0, 0.75], [0.01, 0.0, 0.75]]))
     pixel = 0.01 / float(pixels[1, 0] - pixels[0, 0])

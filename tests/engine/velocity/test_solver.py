@@ -21,12 +21,12 @@ def tiny_faces(rng):
     return list(random_faces(rng, TINY))
 
 
-def problem_of(shape, centre, **given):
-    """The linear problem of a centre alone, but for what is given."""
+def problem_of(shape, center, **given):
+    """The linear problem of a center alone, but for what is given."""
     zero = np.zeros(shape, np.float32)
     cells = {"direction": [zero] * 3, "offset": zero, "weight": zero, "irrotational": zero}
     terms = {"first_order": 0.0, "second_order": 0.0, "kinetic": 0.0, "closed": OPEN}
-    return _core.LeastSquares(centre=centre, **cells | terms | given)
+    return _core.LeastSquares(center=center, **cells | terms | given)
 
 
 def tiny_problem(rng, first_order=0.05, second_order=0.03, closed=OPEN):
@@ -105,7 +105,7 @@ def test_the_quadratic_is_symmetric_and_positive():
 
 @pytest.mark.parametrize("closed", [OPEN, [True] * 6, [True, False, False, True, True, True]])
 def test_the_preconditioner_knows_long_lines(closed):
-    """With kinetic energy alone the minimum is the part of the centre without divergence; the rest is a gradient.
+    """With kinetic energy alone the minimum is the part of the center without divergence; the rest is a gradient.
 
     Sides of the box apart, the preconditioner is then exact: a few steps are enough, on lines of any length.
     """

@@ -29,7 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--precision",
         choices=get_args(Precision),
         default="half",
-        help="half (default): floats of 16 bits; quantised: as few bits as a picture of 8 bits needs",
+        help="half (default): floats of 16 bits; quantized: as few bits as a picture of 8 bits needs",
     )
     parser.add_argument("--no-velocity", action="store_true", help="leave out the velocity, which motion blur needs")
     parser.add_argument(

@@ -40,7 +40,7 @@ def start(backend: str) -> None:
     """
     global _running
     if _running is None:
-        _initialise(GPU_BACKENDS.get(backend, ti.cpu))
+        _initialize(GPU_BACKENDS.get(backend, ti.cpu))
         _running = backend
     elif _running != backend:
         raise RuntimeError(f"Taichi already runs on {_running} in this process; start a new one.")
@@ -51,7 +51,7 @@ def _cache_directory() -> Path:
     return (Path(base) if base else Path.home() / ".cache") / "smokelift" / "taichi"
 
 
-def _initialise(arch: Any) -> None:
+def _initialize(arch: Any) -> None:
     cache = _cache_directory()
     try:
         cache.mkdir(parents=True, exist_ok=True)

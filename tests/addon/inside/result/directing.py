@@ -183,7 +183,7 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
     obj.matrix_basis, fan.matrix_basis = there @ obj.matrix_basis, there @ fan.matrix_basis
     after, found = (part for part in directing.engine_request(result)[:0:-1])
     np.testing.assert_array_equal(solid(*after, tmp_path), solid(*before, tmp_path))
-    # one metre in the scene is half a metre of the smoke's own
+    # one meter in the scene is half a meter of the smoke's own
     np.testing.assert_allclose(words(found, "--fan")[0][:4], words(options, "--fan")[0][:4], atol=1e-5)
     np.testing.assert_allclose(words(found, "--fan")[0][4:], [0.5, 0.0, 0.0], atol=1e-5)
 

@@ -170,8 +170,8 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
     settings.first, settings.last, settings.longest_side, settings.plate_mode = 1, 4, LONGEST, "ESTIMATE"
     known = scene_from_dict({**shot_tables(smoke(shot)), "medium": {"extinction": 3.0}})
     points = np.stack(np.broadcast_arrays(*known.domain.offsets((0, 0, 0))), -1)
-    centre = np.array([0.2, -0.1, 1.3])
-    blob = np.maximum(np.exp(-np.sum((points - centre) ** 2, -1) / 0.3**2) - 0.05, 0).astype(np.float32)
+    center = np.array([0.2, -0.1, 1.3])
+    blob = np.maximum(np.exp(-np.sum((points - center) ** 2, -1) / 0.3**2) - 0.05, 0).astype(np.float32)
     for frame in range(4):
         write_image(tmp_path / f"clip_{frame}.png", smokelift.render(blob, known, known.camera.at(frame)))
     settings.clip = bpy.data.movieclips.load(str(tmp_path / "clip_0.png"))
@@ -182,7 +182,7 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
     sequence = Sequence.open(run.take.directory)
     for number in sequence.frames:
         found = np.average(points.reshape(-1, 3), axis=0, weights=sequence.density(number).ravel())
-        assert np.abs(found - centre)[[0, 2]].max() < known.domain.voxel_size
+        assert np.abs(found - center)[[0, 2]].max() < known.domain.voxel_size
     assert bpy.ops.smokelift.set_up() == {"FINISHED"}
     shot.render.resolution_percentage, shot.cycles.samples, shot.cycles.use_denoising = 10, 32, False
     for frame in (1, 4):

@@ -17,7 +17,7 @@ NOISE = 0.05
 
 @pytest.fixture
 def filmed(scene, tmp_path) -> bpy.types.Scene:
-    """Smoke of `made` in front of a grey plate, its clip the plate with grain; the camera sees the floor below it."""
+    """Smoke of `made` in front of a gray plate, its clip the plate with grain; the camera sees the floor below it."""
     rng = np.random.default_rng(0)
     for frame in range(1, 7):
         grain = rng.normal(0.0, NOISE, (SIZE, SIZE, 3)).astype(np.float32)

@@ -20,7 +20,7 @@ MEDIUM = Medium(4.0, 0.8, 0.3)
 
 @pytest.fixture
 def lit(scene) -> bpy.types.Scene:
-    """A camera close to the smoke of `made`, a sun and a grey background; 8 x 8 pixels in Cycles."""
+    """A camera close to the smoke of `made`, a sun and a gray background; 8 x 8 pixels in Cycles."""
     scene.render.engine = "CYCLES"
     scene.render.resolution_x = scene.render.resolution_y = 8
     scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.seed = 64, False, 1

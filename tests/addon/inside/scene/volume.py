@@ -154,7 +154,7 @@ def test_grids_and_their_place(shot, tmp_path) -> None:
     voxel = 0.125
     shift = -voxel / 2 if HALF_VOXEL_TOO_FAR else 0.0
     # Blender knows the blocks of 8 voxels that hold something (velocity two voxels beyond the smoke); from their first
-    # voxel's centre to their last's, and since 5.0 with the half voxel around them.
+    # voxel's center to their last's, and since 5.0 with the half voxel around them.
     around = 0.0 if HALF_VOXEL_TOO_FAR else voxel / 2
     blocks = [((first - 2) // 8 * 8, (last + 2) // 8 * 8 + 7) for first, last in ((10, 12), (3, 4), (12, 13))]
     low = np.array([-1.0, -1.0, 0.0]) + (np.array([first for first, _ in blocks]) + 0.5) * voxel

@@ -15,13 +15,13 @@ SMOKE_THRESHOLD = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Linearisation:
+class Linearization:
     """The change between two densities around a velocity u_k: r + g . (u - u_k) = offset + direction . u.
 
     Attributes
     ----------
     direction
-        g at voxel centres, one array (nx, ny, nz) for each component.
+        g at voxel centers, one array (nx, ny, nz) for each component.
     offset : (nx, ny, nz) float32
         r - g . u_k.
     carried : (nx, ny, nz) float32
@@ -41,7 +41,7 @@ class Linearisation:
     smoke: npt.NDArray[np.bool_]
     scale: float
 
-    def with_dissipation(self, share: float) -> Linearisation:
+    def with_dissipation(self, share: float) -> Linearization:
         """The change that is left where a share of the smoke dissolves."""
         return replace(self, offset=self.offset + np.float32(share) * self.carried) if share else self
 
@@ -53,7 +53,7 @@ class Linearisation:
         return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
 
 
-def linearise(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> Linearisation | None:
+def linearize(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> Linearization | None:
     """The change between densities around `u` (voxels per frame); None where there is no structure to follow."""
     carried = _core.advect_cells(before, u.faces, False, True)
     density = np.maximum(carried, after)
@@ -67,11 +67,11 @@ def linearise(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> L
         component *= inverse
     offset = inverse * (after - carried) - directional_derivative(direction, u.faces)
     carried *= inverse
-    return Linearisation(direction, offset, carried, np.ascontiguousarray(weight), smoke, scale)
+    return Linearization(direction, offset, carried, np.ascontiguousarray(weight), smoke, scale)
 
 
 def gradient(cells: Array) -> Faces:
-    """Central differences (nx, ny, nz) at voxel centres along x, y and z, one-sided at the sides of the box."""
+    """Central differences (nx, ny, nz) at voxel centers along x, y and z, one-sided at the sides of the box."""
     x, y, z = (np.gradient(cells, axis=axis) if cells.shape[axis] > 1 else np.zeros_like(cells) for axis in range(3))
     return x, y, z
 
@@ -84,34 +84,34 @@ def rms_gradient(components: Faces, smoke: npt.NDArray[np.bool_]) -> float:
 
 
 def directional_derivative(direction: Faces, faces: Faces) -> Array:
-    """direction . u (nx, ny, nz), with the velocity u on faces taken to voxel centres."""
-    x, y, z = (g * centred for g, centred in zip(direction, at_centres(faces), strict=True))
+    """direction . u (nx, ny, nz), with the velocity u on faces taken to voxel centers."""
+    x, y, z = (g * centered for g, centered in zip(direction, at_centres(faces), strict=True))
     x += y
     x += z
     return x
 
 
 def least_squares(
-    linear: Linearisation,
-    centre: StaggeredGrid,
+    linear: Linearization,
+    center: StaggeredGrid,
     *,
     kinetic: float,
     first_order: float = 0.0,
     second_order: float = 0.0,
     irrotational: float = 0.0,
 ) -> _core.LeastSquares:
-    """The quadratic function of a velocity u: data term and regularisation around a centre.
+    """The quadratic function of a velocity u: data term and regularization around a center.
 
-    With v = u - centre the weights are those of |v|^2, |grad v|^2, |grad curl v|^2, and |curl u|^2 outside the smoke.
+    With v = u - center the weights are those of |v|^2, |grad v|^2, |grad curl v|^2, and |curl u|^2 outside the smoke.
     """
     return _core.LeastSquares(
         direction=linear.direction,
         offset=linear.offset,
         weight=linear.weight,
         irrotational=np.where(linear.smoke, np.float32(0), np.float32(irrotational)),
-        centre=centre.faces,
+        center=center.faces,
         first_order=first_order,
         second_order=second_order,
         kinetic=kinetic,
-        closed=centre.walls,
+        closed=center.walls,
     )

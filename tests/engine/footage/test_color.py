@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.footage.colour import hlg_to_linear, pq_to_linear, primaries_name, to_bt709
+from smokelift.footage.color import hlg_to_linear, pq_to_linear, primaries_name, to_bt709
 
 
 def test_hlg_is_light_at_the_camera() -> None:
@@ -25,7 +25,7 @@ def test_white_stays_white(primaries: int) -> None:
     assert (primaries_name(primaries) is None) == (primaries in (1, 2))
 
 
-def test_wider_colours() -> None:
+def test_wider_colors() -> None:
     # BT.2087, the inverse of its matrix; what BT.709 cannot show is clipped
     found = to_bt709(np.array([[[0.5, 0.4, 0.3], [0.0, 1.0, 0.0]]], np.float32), 9)[0]
     matrix = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]])

@@ -48,7 +48,7 @@ def hlg_to_linear(signal: npt.ArrayLike) -> Array:
 
 
 def pq_to_linear(signal: npt.ArrayLike) -> Array:
-    """Decode the perceptual quantiser (BT.2100 and SMPTE ST 2084, EOTF)."""
+    """Decode the perceptual quantizer (BT.2100 and SMPTE ST 2084, EOTF)."""
     m1, m2, c1, c2, c3 = _PQ
     e = np.maximum(np.asarray(signal, np.float64), 0.0) ** (1 / m2)
     screen = (np.maximum(e - c1, 0.0) / (c2 - c3 * e)) ** (1 / m1)
@@ -61,7 +61,7 @@ def primaries_name(primaries: int) -> str | None:
 
 
 def to_bt709(linear: Array, primaries: int) -> Array:
-    """Convert linear colours [row, column, rgb] to BT.709; colours outside it are clipped at 0."""
+    """Convert linear colors [row, column, rgb] to BT.709; colors outside it are clipped at 0."""
     if primaries not in _PRIMARIES:
         return linear
     matrix = np.linalg.solve(_to_xyz(_BT709), _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)

@@ -1,10 +1,10 @@
-"""Tests of the change between two densities, linearised."""
+"""Tests of the change between two densities, linearized."""
 
 import numpy as np
 import pytest
 
 from smokelift.transport import StaggeredGrid
-from smokelift.velocity.linearisation import directional_derivative, gradient, linearise
+from smokelift.velocity.linearization import directional_derivative, gradient, linearize
 
 
 def test_gradient_of_a_plane_is_exact():
@@ -19,7 +19,7 @@ def test_what_a_shift_explains_is_linear_in_it(shape):
     y, z = np.indices(shape[1:]).astype(np.float32)
     before = np.broadcast_to(10 + y + 2 * z, shape).copy()
     rest = StaggeredGrid.zero(shape, 1.0)
-    linear = linearise(before, before - 1, np.ones(shape, np.float32), rest)
+    linear = linearize(before, before - 1, np.ones(shape, np.float32), rest)
     assert linear is not None
     assert linear.scale == pytest.approx(5**0.5)
     np.testing.assert_allclose(linear.offset * linear.scale, -1, rtol=1e-5)
@@ -30,6 +30,6 @@ def test_what_a_shift_explains_is_linear_in_it(shape):
     assert linear.with_dissipation(0.1).offset.shape == shape
 
 
-def test_nothing_is_linearised_where_there_is_no_structure():
+def test_nothing_is_linearized_where_there_is_no_structure():
     nothing = np.zeros((4, 4, 4), np.float32)
-    assert linearise(nothing, nothing, nothing + 1, StaggeredGrid.zero((4, 4, 4), 1.0)) is None
+    assert linearize(nothing, nothing, nothing + 1, StaggeredGrid.zero((4, 4, 4), 1.0)) is None
