@@ -73,6 +73,14 @@ def test_the_architecture_names_what_there_is() -> None:
     assert missing == []
 
 
+def test_the_map_of_the_architecture_names_modules_that_there_are() -> None:
+    _, engine, addon = re.split(r"## What is where in the engine|## The add-on", (ROOT / "ARCHITECTURE.md").read_text())
+    for folder, text in ((ENGINE, engine), (ROOT / "addon", addon.partition("## The core")[0])):
+        for package, modules in re.findall(r"^\| `([a-z]+)`: [^|]*\|(.*)", text, re.MULTILINE):
+            there = {path.stem for path in (folder / package).iterdir()} | {"engine_command"}
+            assert set(re.findall(r"`([a-z]+(?:_[a-z]+)*)`", modules)) - there == set(), package
+
+
 @pytest.mark.parametrize("page", [*sorted(ROOT.glob("*.md")), *MEASURED], ids=name)
 def test_files_of_the_code_that_a_page_names_exist(page: Path) -> None:
     named = {file for file in FILE.findall(page.read_text()) if "NAME" not in file}
