@@ -5,7 +5,7 @@ Image coordinates are in pixels, x to the right and y down from the top left cor
 integers. Directions of lights are directions of travel.
 
 Every class of a scene checks its values where it is made, so a scene built in Python and one read from a file are
-refused for the same reasons; `smokelift.scene.reading` adds the file and the line to the message.
+refused for the same reasons; `smokelift.scene.tables` adds the file and the line to the message.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
 from smokelift.scene.lights import EnvironmentLight, Light, PointLight
 from smokelift.scene.medium import Medium, Scattering, checked_scattering
 from smokelift.scene.projection import sees
-from smokelift.scene.reading import from_tables, read_file
+from smokelift.scene.tables import from_tables, to_tables
+from smokelift.scene.toml_files import TomlFile, read_toml, write_toml
 from smokelift.scene.view import Background, ClipSource, View
-from smokelift.scene.writing import write_file
 
 MAX_LISTED = 256
 """Lights, inlets or views of a scene, at most: the time of a run grows with their number."""
@@ -147,8 +147,8 @@ class Scene:
             views.append(view)
         return replace(self, clip=replace(self.clip, frames=(first, last)), views=tuple(views))
 
-    @classmethod
-    def load(cls, path: str | Path) -> Scene:
+    @staticmethod
+    def load(path: str | Path) -> Scene:
         """Read a scene file.
 
         Relative paths in it are relative to the file; the returned ones are absolute.
@@ -158,7 +158,7 @@ class Scene:
         SceneError
             With the file, the line, the key, what was expected and what was found.
         """
-        return read_file(file_path(path, "path"), cls)
+        return _read(*read_toml(file_path(path, "path")))
 
     def save(self, path: str | Path, comments: Sequence[str] = ()) -> None:
         """Write a scene file that :meth:`load` reads back as an equal scene.
@@ -172,7 +172,8 @@ class Scene:
         OSError
             If the file cannot be written.
         """
-        write_file(self, file_path(path, "path"), comments)
+        path = file_path(path, "path")
+        write_toml(path, scene_to_dict(self, path.absolute().parent), comments)
 
 
 class CompleteScene(Scene):
@@ -236,4 +237,22 @@ def scene_from_dict(data: Mapping[str, Any], name: str = "scene", base: Path | N
     `name` is what messages call the source, and relative paths are relative to `base`, by default the current folder.
     It raises SceneError for the same reasons as `Scene.load`.
     """
-    return from_tables(data, Scene, name, base)
+    return _read(data, TomlFile(name, (base or Path()).absolute(), {}))
+
+
+def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
+    """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
+
+    A complete scene is what `completed` makes of the description that is read back. Paths below the folder `base`
+    become relative to it; all others absolute.
+    """
+    return to_tables(vars(scene), base)
+
+
+def _read(data: Mapping[str, Any], file: TomlFile) -> Scene:
+    parts = from_tables(data, file)
+    try:
+        return Scene(**parts)
+    except SceneError as error:
+        place = tuple(int(part) if part.isdigit() else part for part in error.table.split("."))
+        raise file.error(place, str(error), error.key) from error

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from smokelift.checks import shown
+import tomli_w
+
+from smokelift.checks import listed, printable, shown
 from smokelift.scene.checks import SceneError
 
 Place = tuple[str | int, ...]
@@ -62,6 +66,23 @@ def read_toml(path: Path) -> tuple[dict[str, Any], TomlFile]:
     except ValueError as error:  # an integer of 5000 digits is no error of TOML's
         advice = "; write a path with / or between single quotes" if "\\" in text else ""
         raise SceneError(f"{path.name}: is not valid TOML: {error}{advice}") from error
+
+
+def write_toml(path: Path, data: Mapping[str, Any], comments: Sequence[str] = ()) -> None:
+    """Write a TOML file, whole or not at all, with comments as lines at its top; SceneError if that is a folder."""
+    if path.is_dir():
+        raise SceneError(f"{path}: is a folder; give the name of a file")
+    top = "".join(f"# {printable(line)}\n" for line in listed(comments, str, "comments", "a list of lines"))
+    aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        aside.write_text(top + tomli_w.dumps(data), encoding="utf-8")
+        aside.replace(path)
+    except OSError as error:
+        error.filename = str(path)  # the name that was asked for
+        raise
+    finally:
+        with suppress(OSError):  # what failed before says why
+            aside.unlink(missing_ok=True)
 
 
 def read_text(path: Path) -> str:

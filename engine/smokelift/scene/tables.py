@@ -1,0 +1,212 @@
+"""The tables of a scene file and the parts of a scene, both ways; what is wrong is named with file, line and key.
+
+A scene file holds the tables [clip], [camera], [domain], [[inlet]], [medium], [[lights]], [background] and [[views]],
+each of them optional. Their keys are the fields of the classes of the same names, with these exceptions:
+
+- ``[domain] closed`` lists the walls of the box. A ``[domain]`` that holds nothing else leaves the box to be estimated,
+  one without ``resolution`` leaves that to the quality.
+- ``[medium] scattering`` is how light is scattered: ``"multiple"`` (any number of times), ``"single"`` (once, with
+  shadows), ``"unshadowed"`` (once, without) or ``"absorption"`` (not at all). A ``[medium]`` that holds nothing else
+  leaves the medium to be estimated.
+- ``[camera]`` takes ``position``, ``target`` and ``up`` in place of ``matrix``, and ``fov_y_degrees``, or the
+  ``height`` in meters of an orthographic picture, in place of ``fx`` and ``fy``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from smokelift.checks import one_of, shown
+from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
+from smokelift.scene.checks import SceneError, file_path, positive, unexpected
+from smokelift.scene.domain import Box, Domain, Inlet
+from smokelift.scene.lights import LIGHT_TYPES, Light
+from smokelift.scene.medium import Medium
+from smokelift.scene.toml_files import Place, TomlFile
+from smokelift.scene.view import Background, ClipSource, View
+
+Table = Mapping[str, Any]
+
+
+TABLES: Mapping[str, Any] = {
+    "clip": ClipSource,
+    "camera": Camera,
+    "domain": Domain,
+    "inlet": Inlet,
+    "medium": Medium,
+    "lights": Light,
+    "background": Background,
+    "views": View,
+}
+"""What the tables of a scene file describe."""
+
+LISTS = ("inlet", "lights", "views")
+"""Tables that may be given again."""
+
+BESIDE: Mapping[str, str] = {"domain": "closed", "medium": "scattering"}
+"""A key of a table that is a field of the scene, by the table."""
+
+_FIELDS = {name: "inlets" if name == "inlet" else name for name in TABLES}
+"""The field of a scene that a table describes."""
+
+_LIGHT_NAMES = {kind: name for name, kind in LIGHT_TYPES.items()}
+
+
+def to_tables(scene: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
+    """Return the tables of a scene from its fields; see `smokelift.scene.scene_to_dict`."""
+    tables: dict[str, Any] = {}
+    for name, field in _FIELDS.items():
+        part, beside = scene[field], {key: scene[key] for table, key in BESIDE.items() if table == name}
+        if name in LISTS:
+            tables[name] = [_plain(each, base) for each in part]
+        else:
+            tables[name] = _plain_table({**({} if part is None else _values(part)), **beside}, base)
+    return {name: table for name, table in tables.items() if table or scene[_FIELDS[name]]}
+
+
+def _values(part: Any) -> dict[str, Any]:
+    """Return the keys of a part's table with their values."""
+    values = {each.name: getattr(part, each.name) for each in fields(part)}
+    if isinstance(part, Camera) and part.moves:
+        del values["matrix"]  # the first of its matrices
+    return {"type": _LIGHT_NAMES[type(part)], **values} if type(part) in _LIGHT_NAMES else values
+
+
+def _plain_table(values: Table, base: Path | None) -> dict[str, Any]:
+    return {key: _plain(value, base) for key, value in values.items() if value not in (None, ())}
+
+
+def _plain(value: Any, base: Path | None) -> Any:
+    """Return a value as TOML and JSON know it; paths below the folder ``base`` become relative to it."""
+    if isinstance(value, tuple):
+        return [_plain(item, base) for item in value]
+    if isinstance(value, Path):
+        whole = value.absolute()  # links are not followed: their names may carry the number of a frame
+        return (whole.relative_to(base) if base is not None and whole.is_relative_to(base) else whole).as_posix()
+    return _plain_table(_values(value), base) if is_dataclass(value) else value
+
+
+def from_tables(data: Table, file: TomlFile) -> dict[str, Any]:
+    """Return the fields of the scene that the tables of a file describe.
+
+    It raises SceneError with the file, the line, the key, what was expected and what was found.
+    """
+    file.require_known((), data, tuple(TABLES))
+    found: dict[str, Any] = {}
+    for name, value in data.items():
+        if name not in LISTS:
+            found[name] = _described(file, (name,), value, TABLES[name])
+        elif isinstance(value, list):
+            found[_FIELDS[name]] = tuple(
+                _described(file, (name, n), each, TABLES[name]) for n, each in enumerate(value)
+            )
+        else:
+            raise file.error((name,), f"must be a list of tables, written [[{name}]]")
+    return found | {key: data[table][key] for table, key in BESIDE.items() if key in data.get(table, {})}
+
+
+def _described(file: TomlFile, place: Place, data: Any, kind: Any) -> Any:
+    """Return what a table describes; a SceneError without a place becomes one with it."""
+    if not isinstance(data, dict):
+        raise file.error(place, f"must be a table, not {shown(data)}")
+    try:
+        return _camera(file, place, data) if kind is Camera else _part(file, place, data, kind)
+    except SceneError as error:
+        if error.table:
+            raise
+        raise file.error(place, str(error), error.key) from error
+
+
+def _part(file: TomlFile, place: Place, data: Table, kind: Any) -> Any:
+    """Return a dataclass whose fields are the keys of its table.
+
+    A field without a default has to be given; a path is relative to the file. A table that holds nothing but a key
+    `BESIDE` leaves the part open.
+    """
+    if kind is Light:
+        kind, data = _light_type(data), {key: value for key, value in data.items() if key != "type"}
+    beside = [key for table, key in BESIDE.items() if place == (table,)]
+    file.require_known(place, data, (*(each.name for each in fields(kind)), *beside))
+    if kind is Domain and "resolution" not in data:
+        kind = Box
+    values = {key: value for key, value in data.items() if key not in beside}
+    if data and not values:
+        return None
+    _require(values, *(each.name for each in fields(kind) if each.default is MISSING))
+    for key, hint in get_type_hints(kind).items():
+        kinds = (hint, *get_args(hint))
+        if Path in kinds and isinstance(values.get(key), str):
+            values[key] = file.base / file_path(values[key], key)
+        for table in (Camera, ClipSource, Background):
+            if table in kinds and key in values:
+                values[key] = _described(file, (*place, key), values[key], table)
+    return kind(**values)
+
+
+def _camera(file: TomlFile, place: Place, data: Table) -> Camera:
+    kind = data.get("type", "perspective")
+    lens = "height" if kind == "orthographic" else "fov_y_degrees"
+    pose = ("matrices", "matrix", "position", "target", "up")
+    file.require_known(place, data, ("type", "size", *pose, "fx", "fy", "cx", "cy", lens))
+    _require(data, "size")
+    width, height = picture_size(data["size"])
+    matrices = _matrices(data)
+    fx, fy = _scales(data, lens, height)
+    center = data.get("cx", width / 2), data.get("cy", height / 2)
+    moving = matrices if "matrices" in data else ()
+    return Camera(kind, matrices[0], (width, height), fx, fy, *center, moving)
+
+
+def _light_type(data: Table) -> Any:
+    _require(data, "type")
+    name = data["type"]
+    if not isinstance(name, str) or name not in LIGHT_TYPES:
+        raise unexpected(name, "type", f"one of {one_of(LIGHT_TYPES)}")
+    return LIGHT_TYPES[name]
+
+
+def _require(data: Table, *keys: str) -> None:
+    for key in keys:
+        if key not in data:
+            raise SceneError(f"lacks {key}")
+
+
+def _exclude(data: Table, given: str, *others: str) -> None:
+    """Refuse what would say the same as a key that is given."""
+    for key in others:
+        if key in data:
+            raise SceneError(f"takes {given} or {key}, not both", key=key)
+
+
+def _matrices(data: Table) -> tuple[Any, ...]:
+    """Return the camera to world matrix of every frame, or the one of a camera that stands still."""
+    look_at = ("position", "target", "up")
+    if "matrices" in data:
+        _exclude(data, "matrices", "matrix", *look_at)
+        matrices = data["matrices"]
+        if not isinstance(matrices, list) or not matrices:
+            raise unexpected(matrices, "matrices", "a list of 4x4 matrices, camera to world, one a frame")
+        return tuple(matrices)
+    if "matrix" in data:
+        _exclude(data, "matrix", *look_at)
+        return (data["matrix"],)
+    if "position" not in data or "target" not in data:
+        raise SceneError("needs matrix, or position and target")
+    return (look_at_matrix(data["position"], data["target"], data.get("up", (0.0, 0.0, 1.0))),)
+
+
+def _scales(data: Table, lens: str, height: int) -> tuple[Any, Any]:
+    """Return fx and fy of a camera whose picture is ``height`` pixels high."""
+    if lens not in data:
+        if "fx" not in data:
+            raise SceneError(f"needs {lens} or fx")
+        return data["fx"], data.get("fy", data["fx"])
+    _exclude(data, lens, "fx", "fy")
+    if lens == "fov_y_degrees":
+        focal = focal_length(data[lens], height)
+    else:
+        focal = height / positive(data[lens], lens, "a number of meters above 0")
+    return focal, focal
