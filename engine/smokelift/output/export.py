@@ -30,7 +30,7 @@ from smokelift.output.files import INDEX, atomic_path, frame_path, proxy_path
 from smokelift.output.host import HOSTS, Host, HostName
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
-from smokelift.output.usd import UsdVolume, light_properties, usd_text
+from smokelift.output.usd import light_properties, usd_text
 from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
 from smokelift.scene import Domain, Medium
 from smokelift.transport import Array
@@ -252,13 +252,8 @@ class _Export:
     def usd(self) -> str:
         """The text of the USD file."""
         numbers = [self.sequence.file_number(number) for number in self.sequence.frames]
-        purpose = "default" if self.settings.proxy == 1 else "render"
-        files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
-        volumes = [UsdVolume("Volume", purpose, files, self.grids, self.domain)]
-        if self.settings.proxy > 1:
-            proxies = {number: proxy_path(Path(), number).name for number in numbers}
-            volumes.append(UsdVolume("Proxy", "proxy", proxies, ("density",), self.domain))
-        return usd_text(volumes, self.sequence.fps, self.medium, self.host.velocity, self.host.up_axis)
+        proxy = self.settings.proxy > 1
+        return usd_text(numbers, self.grids, self.domain, self.medium, self.sequence.fps, self.host, proxy=proxy)
 
     def note(self) -> dict[str, Any]:
         """What the export is and how it was made."""

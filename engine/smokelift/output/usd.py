@@ -7,55 +7,47 @@ the material, which USD has no shader of its own for, the nodes of MaterialX 1.3
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
+from smokelift.output.files import frame_path, proxy_path
+from smokelift.output.host import Host
 from smokelift.scene import Domain, Medium
 
 MATERIAL = "/Smoke/Material"
 
 
-@dataclass(frozen=True)
-class UsdVolume:
-    """A volume of the file.
-
-    Attributes
-    ----------
-    name
-        Of its prim.
-    purpose
-        ``"render"``, ``"proxy"``, or ``"default"`` for both.
-    files
-        Name of the OpenVDB file of every frame, by its number.
-    grids
-        Names of the grids in the files: ``"density"``, and that of the velocity and ``"flame"`` if there are such.
-    domain
-        The box of the smoke.
-    """
-
-    name: str
-    purpose: str
-    files: Mapping[int, str]
-    grids: Sequence[str]
-    domain: Domain
-
-
 def usd_text(
-    volumes: Sequence[UsdVolume], fps: float, medium: Medium, velocity: str = "velocity", up_axis: str = "Z"
+    numbers: Sequence[int], grids: Sequence[str], domain: Domain, medium: Medium, fps: float, host: Host, *, proxy: bool
 ) -> str:
-    """Return the text of a ``.usda`` file of volumes with the same frames each.
+    """Return the text of a ``.usda`` file of the frames of an export, which lie beside it.
 
-    Smoke of density 1 is the medium, for the material and custom data; `velocity` names the grid that holds vectors,
-    and `up_axis` is ``"Z"`` or ``"Y"``.
+    Parameters
+    ----------
+    numbers
+        Of the files, in order.
+    grids
+        Names of the grids in them: ``"density"``, and that of the velocity and ``"flame"`` if there are such.
+    domain
+        The box of the smoke in the host's axes.
+    medium
+        What smoke of density 1 is, for the material and custom data.
+    proxy
+        Whether there is a coarse copy of each frame, which viewports show.
     """
-    numbers = sorted(volumes[0].files)
-    known = light_properties(medium).items()
-    properties = "".join(f"            double {name} = {value:.9g}\n" for name, value in known)
-    prims = "\n".join(_prim(volume, velocity) for volume in volumes)
+    properties = "".join(
+        f"            double {name} = {value:.9g}\n" for name, value in light_properties(medium).items()
+    )
+    files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
+    prims = [_prim("Volume", "render" if proxy else "default", files, grids, domain, host.velocity)]
+    if proxy:
+        files = {number: proxy_path(Path(), number).name for number in numbers}
+        prims.append(_prim("Proxy", "proxy", files, ("density",), domain, host.velocity))
+    volumes = "\n".join(prims)
     return f"""#usda 1.0
 (
     defaultPrim = "Smoke"
     metersPerUnit = 1
-    upAxis = "{up_axis}"
+    upAxis = "{host.up_axis}"
     startTimeCode = {numbers[0]}
     endTimeCode = {numbers[-1]}
     timeCodesPerSecond = {fps:.9g}
@@ -70,7 +62,7 @@ def Xform "Smoke" (
     }}
 )
 {{
-{prims}
+{volumes}
 {_material(medium)}}}
 """
 
@@ -80,16 +72,19 @@ def light_properties(medium: Medium) -> dict[str, float]:
     return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
 
 
-def _prim(volume: UsdVolume, velocity: str) -> str:
-    path = f"/Smoke/{volume.name}"
-    low, high = (_numbers(corner) for corner in (volume.domain.min, volume.domain.max))
-    fields = "".join(f"        rel field:{grid} = <{path}/{grid}>\n" for grid in volume.grids)
-    assets = "\n".join(_asset(grid, volume.files, vector=grid == velocity) for grid in volume.grids)
-    return f"""    def Volume "{volume.name}" (
+def _prim(
+    name: str, purpose: str, files: Mapping[int, str], grids: Sequence[str], domain: Domain, velocity: str
+) -> str:
+    """A volume with a purpose: ``"render"``, ``"proxy"``, or ``"default"`` for both; ``files`` are by frame number."""
+    path = f"/Smoke/{name}"
+    low, high = _numbers(domain.min), _numbers(domain.max)
+    fields = "".join(f"        rel field:{grid} = <{path}/{grid}>\n" for grid in grids)
+    assets = "\n".join(_asset(grid, files, vector=grid == velocity) for grid in grids)
+    return f"""    def Volume "{name}" (
         prepend apiSchemas = ["MaterialBindingAPI"]
     )
     {{
-        uniform token purpose = "{volume.purpose}"
+        uniform token purpose = "{purpose}"
         float3[] extent = [({low}), ({high})]
         rel material:binding = <{MATERIAL}>
 {fields}
@@ -99,7 +94,7 @@ def _prim(volume: UsdVolume, velocity: str) -> str:
 
 def _asset(grid: str, files: Mapping[int, str], *, vector: bool) -> str:
     kind, role = ("half3", '            token vectorDataRoleHint = "Vector"\n') if vector else ("half", "")
-    samples = "".join(f"                {number}: @./{files[number]}@,\n" for number in sorted(files))
+    samples = "".join(f"                {number}: @./{name}@,\n" for number, name in files.items())
     return f"""        def OpenVDBAsset "{grid}"
         {{
             token fieldClass = "{"unknown" if vector else "fogVolume"}"

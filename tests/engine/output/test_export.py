@@ -11,11 +11,12 @@ from small_sequence import SCENE, SETTINGS, frame, needs_vdb, write
 
 from smokelift.output import export, vdb
 from smokelift.output.export import ExportSettings, export_sequence
+from smokelift.output.host import HOSTS
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
-from smokelift.output.usd import UsdVolume, usd_text
+from smokelift.output.usd import usd_text
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Domain, Medium
+from smokelift.scene import Medium
 
 DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction
 
@@ -170,16 +171,9 @@ def test_files_for_unreal(sequence: Sequence, tmp_path: Path) -> None:
         assert density["extinction"] == pytest.approx(EXTINCTION * peak)
 
 
-DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12))
-
-
 def test_every_frame_has_its_file() -> None:
-    files = {3: "smoke_0003.vdb", 4: "smoke_0004.vdb"}
-    volumes = [
-        UsdVolume("Volume", "render", files, ("density", "velocity"), DOMAIN),
-        UsdVolume("Proxy", "proxy", {n: f"proxy_{n:04d}.vdb" for n in files}, ("density",), DOMAIN),
-    ]
-    text = usd_text(volumes, 23.976, Medium(5.0, 0.8, 0.1, color=(1.0, 0.5, 0.25)))
+    medium = Medium(5.0, 0.8, 0.1, color=(1.0, 0.5, 0.25))
+    text = usd_text((3, 4), ("density", "velocity"), DOMAIN, medium, 23.976, HOSTS["blender"], proxy=True)
     assert text.startswith("#usda 1.0\n")
     for line in (
         "startTimeCode = 3",

@@ -35,6 +35,24 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
         raise CutOffError
 
 
+def test_numpy_files_alone_need_no_vdb_module_and_are_not_overwritten(tmp_path: Path, no_vdb: None) -> None:
+    write(tmp_path / "out", [1], resume=True)
+    before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
+    assert sorted(before) == ["sequence.json", "smoke_0001.npz"]
+    with pytest.raises(SequenceError):
+        write(tmp_path / "out", [1])
+    assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
+    with pytest.raises(SequenceError):
+        write(tmp_path / "other", [1], npz=False)
+    assert not (tmp_path / "other").exists()
+
+
+def finished(directory: Path) -> tuple[int, ...]:
+    """Frames from which the run goes on; it leaves no lock behind."""
+    with SequenceWriter(directory, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        return writer.finished
+
+
 @pytest.mark.parametrize("renames", [0, 1])
 def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: None, monkeypatch, renames) -> None:
     out, background = tmp_path / "out", np.full((48, 32, 3), 0.2, np.float32)
@@ -66,23 +84,6 @@ def test_choices_and_provenance_are_kept_and_not_compared(tmp_path: Path, no_vdb
     other, assumed = ({"what": "scattering", "measured": {"error": 0.2}},), ({"origin": "assumed"},)
     write(tmp_path, [2], resume=True, choices=other, provenance=assumed)
     assert (Sequence.open(tmp_path).choices, Sequence.open(tmp_path).provenance) == (other, assumed)
-
-
-def test_numpy_files_alone_need_no_vdb_module(tmp_path: Path, no_vdb: None) -> None:
-    write(tmp_path / "out", [1])
-    assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.npz"]
-    np.testing.assert_array_equal(Sequence.open(tmp_path / "out").density(1), frame(1)[0])
-    with pytest.raises(SequenceError):
-        write(tmp_path / "other", [1], npz=False)
-    assert not (tmp_path / "other").exists()
-
-
-def test_finished_frames_are_not_overwritten(tmp_path: Path, no_vdb: None) -> None:
-    write(tmp_path, [1, 2])
-    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    with pytest.raises(SequenceError):
-        write(tmp_path, [1])
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 def test_a_directory_of_other_files_is_refused(tmp_path: Path, no_vdb: None) -> None:
@@ -159,15 +160,6 @@ def test_an_index_without_a_start_number_starts_at_1(tmp_path: Path, no_vdb: Non
             Sequence.open(tmp_path)
 
 
-def test_resuming_before_the_first_frame_starts(tmp_path: Path, no_vdb: None) -> None:
-    cut_off(tmp_path, [])
-    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
-        assert writer.finished == ()
-        assert writer.state is None
-        writer.write(1, *frame(1))
-    write(tmp_path / "new", [1], resume=True)
-
-
 def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -> None:
     cut_off(tmp_path, [1, 2])
     older = (tmp_path / "resume.npz").read_bytes()
@@ -196,8 +188,7 @@ def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
     finer = {**other, "quality": "fine"}  # which is why the scene is another one
     with pytest.raises(SequenceError, match=r"settings\.quality"):
         SequenceWriter(tmp_path, scene, finer, npz=True, resume=True).__enter__()
-    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
-        assert writer.finished == (1,)  # the refusals left no lock behind
+    assert finished(tmp_path) == (1,)
 
 
 def test_other_files_and_other_software_are_not_resumed(
@@ -276,15 +267,6 @@ def test_lost_files_and_damaged_states_are_not_resumed(tmp_path: Path, no_vdb: N
         write(tmp_path, [3], resume=True)
 
 
-def test_two_runs_in_one_directory_are_kept_apart(tmp_path: Path, no_vdb: None) -> None:
-    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
-        for resume in (False, True):
-            with pytest.raises(SequenceError):
-                write(tmp_path, [1], resume=resume)
-        writer.write(1, *frame(1))
-    assert names(tmp_path) == ["sequence.json", "smoke_0001.npz"]
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
 def test_a_killed_run_leaves_frames_and_no_lock(tmp_path: Path) -> None:
     code = f"""
@@ -299,12 +281,12 @@ with SequenceWriter({str(tmp_path / "out")!r}, SCENE, SETTINGS, npz=True) as wri
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as run:
         assert run.stdout is not None
         assert any(line == "written\n" for line in run.stdout)
-        with pytest.raises(SequenceError):
-            write(tmp_path / "out", [2], resume=True)
+        for resume in (False, True):
+            with pytest.raises(SequenceError):
+                write(tmp_path / "out", [2], resume=resume)
         os.kill(run.pid, signal.SIGKILL)
-    assert Sequence.open(tmp_path / "out").frames == (1,)
-    with SequenceWriter(tmp_path / "out", SCENE, SETTINGS, npz=True, resume=True) as writer:
-        assert writer.finished == (1,)
+    assert Sequence.open(tmp_path / "out").frames == finished(tmp_path / "out") == (1,)
+    assert "run.lock" not in names(tmp_path / "out")
 
 
 @pytest.mark.parametrize("kind", ["writer.write_arrays", "index.Index.write", "resume.ResumeState.write"])
@@ -322,8 +304,7 @@ def test_a_full_disk_counts_the_frames_that_stay(
         writer.write(1, *frame(1))
         patch.setattr(f"smokelift.output.{kind}", full)
         writer.write(2, *frame(2))
-    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
-        assert writer.finished == (1,)
+    assert finished(tmp_path) == (1,)
 
 
 def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:

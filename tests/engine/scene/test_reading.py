@@ -2,8 +2,6 @@
 
 import math
 import os
-import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +10,13 @@ from scene_examples import FRONT, GOOD, load
 
 from smokelift.scene import (
     Background,
-    Box,
     ClipSource,
     DirectionalLight,
     Domain,
-    Inlet,
     Medium,
     PointLight,
     Scene,
     SceneError,
-    completed,
 )
 
 AIMED = "position = [0, -7, 1.5]\ntarget = [0, 0, 1.5]"
@@ -48,50 +43,11 @@ def test_every_table_is_read(tmp_path: Path) -> None:
     assert view.background is None
     (view,) = load(tmp_path, f'{GOOD}[views.background]\nimage = "wall.png"\n').views
     assert view.background == Background(image=tmp_path / "wall.png")
-
-
-def test_every_clip_may_have_a_mask(tmp_path: Path) -> None:
-    own = load(tmp_path, '[clip]\npath = "a.mp4"\nmask = "masks/mask_##.png"\n').clip
-    assert own == ClipSource(tmp_path / "a.mp4", mask=tmp_path / "masks" / "mask_##.png")
-    text = GOOD.replace("[views.clip]", '[views.clip]\nmask = "side.png"', 1)
-    (view,) = load(tmp_path, text).views
-    assert view.clip.mask == tmp_path / "side.png"
-
-
-def test_frames_free_of_smoke_and_strokes_are_read(tmp_path: Path) -> None:
-    for text, frame in (("98", (98,)), ("[98, 102]", (98, 102))):
-        background = load(tmp_path, f'[background]\nframe = {text}\nstrokes = "strokes.png"\n').background
-        assert background == Background(frame=frame, strokes=tmp_path / "strokes.png")
-        assert not background.estimated
+    walls = load(tmp_path, GOOD.replace("[domain]", '[domain]\nclosed = ["z-", "x+"]'))
+    assert (walls.closed, walls.domain) == (("x+", "z-"), scene.domain)
     alone = load(tmp_path, '[background]\nstrokes = "strokes.png"\n').background
-    assert alone is not None and alone.estimated
-
-
-def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
-    inlets = "[[inlet]]\ncentre = [0, 0, 0]\nradius = 0.5\n[[inlet]]\ncentre = [1, 0, 1]\nradius = 0.25\n"
-    text = GOOD.replace("[domain]", '[domain]\nclosed = ["z-", "x+"]').replace("[medium]", f"{inlets}[medium]")
-    scene = load(tmp_path, text)
-    assert scene.closed == ("x+", "z-")
-    assert scene.inlets == (Inlet((0, 0, 0), 0.5), Inlet((1, 0, 1), 0.25))
-    assert scene.domain == load(tmp_path, GOOD).domain
-
-
-def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
-    scene = load(tmp_path, '[domain]\nclosed = ["z-"]\n')
-    assert scene == Scene(closed=("z-",))
-
-
-def test_a_box_without_a_resolution(tmp_path: Path) -> None:
-    scene = load(tmp_path, re.sub(r"resolution = \[[^]]*\]", "", GOOD))
-    assert scene.domain == Box((-1, -1, 0), (1, 1, 3))
-    with pytest.raises(ValueError, match="a domain without a resolution; give"):
-        completed(scene)
-
-
-def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
-    scene = load(tmp_path, GOOD.replace("[medium]", '[medium]\nscattering = "unshadowed"'))
-    assert scene == replace(load(tmp_path, GOOD), scattering="unshadowed")
-    assert load(tmp_path, GOOD).scattering is None
+    frame = load(tmp_path, "[background]\nframe = 98\n").background
+    assert alone is not None and alone.estimated and frame == Background(frame=(98,)) and not frame.estimated
 
 
 @pytest.mark.parametrize(
@@ -182,11 +138,17 @@ def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
         ("size = [256, 384]", "size = [256, 100000]", "line 11: [camera] size"),
         ("[-1, -1, 0]\nmax = [1, 1, 3]", "[0, 0, 0]\nmax = [4e-8, 4e-8, 6e-8]", "voxels must be from 1e-6 to 1e6 m"),
         ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\nradius = 1\n" * 300 + "[medium]", "[inlet] is given 300 times"),
+        ("", "# one\nmedium = { albedo = 3 }\n", "line 2: [medium] albedo"),
+        ("", "medium.albedo = 3\n", "line 1: [medium] albedo"),
+        ("", "[lights]\n", "line 1: [lights] must be a list of tables"),
+        ("", "medium = 3\n", "line 1: [medium] must be a table, not 3"),
+        ("", "[domain]\n", "lacks min"),
+        ("", "[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 0]\n", "max must be above min"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str) -> None:
-    assert old in GOOD
-    text = GOOD.replace(old, new, 1)
+    text = GOOD.replace(old, new, 1) if old else new
+    assert text != GOOD
     with pytest.raises(SceneError) as caught:
         load(tmp_path, text)
     assert message in str(caught.value)
@@ -194,34 +156,11 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str
 
 
 def test_what_cannot_be_read_is_named_and_not_waited_for(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"nothing\.toml: cannot be read"):
-        Scene.load(tmp_path / "nothing.toml")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SceneError, match="not a text file"):
-        Scene.load(tmp_path / "binary.toml")
-    pipe = tmp_path / "pipe.toml"
+    binary, pipe, large = (tmp_path / f"{name}.toml" for name in ("binary", "pipe", "large"))
+    binary.write_bytes(b"\xff\xfe\x00")
     os.mkfifo(pipe)
-    for path in (pipe, Path("/dev/zero"), tmp_path):
-        with pytest.raises(SceneError, match="cannot be read: it is a folder, a pipe or a device"):
-            Scene.load(path)
-    large = tmp_path / "large.toml"
     with large.open("wb") as file:
         file.truncate(2**40)
-    with pytest.raises(SceneError, match=r"large\.toml: cannot be read: it holds more than 64 MiB"):
-        Scene.load(large)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("# one\nmedium = { albedo = 3 }\n", r"line 2: \[medium\] albedo"),
-        ("medium.albedo = 3\n", r"line 1: \[medium\] albedo"),
-        ("[lights]\n", r"line 1: \[lights\] must be a list of tables"),
-        ("medium = 3\n", r"line 1: \[medium\] must be a table, not 3"),
-        ("[domain]\n", "lacks min"),
-        ("[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 0]\n", "max must be above min"),
-    ],
-)
-def test_a_short_file_is_wrong_in_its_own_line(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(SceneError, match=message):
-        load(tmp_path, text)
+    for path in (tmp_path / "nothing.toml", binary, pipe, Path("/dev/zero"), tmp_path, large):
+        with pytest.raises(SceneError, match=str(path)):
+            Scene.load(path)
