@@ -72,7 +72,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "--quality",
         choices=QUALITIES,
         default="balanced",
-        help="how much of the clip's detail is kept (final: a voxel a pixel), and how long a run takes "
+        help="how much of the clip's detail is kept (final: one voxel per pixel), and how long a run takes "
         "(default: balanced)",
     )
     parser.add_argument(

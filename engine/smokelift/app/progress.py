@@ -1,4 +1,4 @@
-"""What a command says while it runs: a bar for people, one JSON object a line for programs."""
+"""What a command says while it runs: a bar for people, one JSON object per line for programs."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from smokelift.report.views import message, sentence
 Style = Literal["text", "json"]
 Made = TypeVar("Made")
 
-PACE_FRAMES = 10
-"""Frames by whose pace the rest is forecast, the newest. The forecast before the first counts as one of them until that
+FORECAST_FRAMES = 10
+"""Newest frames by whose seconds the rest is forecast. The forecast before the first counts as one of them until that
 many are there: so it hardly matters after a few, and one slow frame is not taken for all."""
 
 
@@ -205,14 +205,14 @@ class _Text(Reporter):
 
 
 class _Json(Reporter):
-    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, one a line.
+    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, one per line.
 
     What is said has its ``text``; a finding has its ``kind`` and ``figures`` too. A note says if it is a ``doubt``.
     """
 
     def __init__(self) -> None:
         self._total = self._done = 0
-        self._pace: deque[float] = deque(maxlen=PACE_FRAMES)
+        self._seconds: deque[float] = deque(maxlen=FORECAST_FRAMES)
         self._before = time.monotonic()
 
     def note(self, said: Finding | str) -> None:
@@ -222,7 +222,7 @@ class _Json(Reporter):
         self._total, self._done, self._before = total, done, time.monotonic()
         known = {}
         if seconds is not None and total > done:
-            self._pace.append(seconds / (total - done))
+            self._seconds.append(seconds / (total - done))
             known = {"seconds_left": round(seconds, 1)}
         self._say("start", total=total, done=done, **known)
 
@@ -230,9 +230,9 @@ class _Json(Reporter):
         self._done += 1
         now = time.monotonic()
         # all that passed, with the files; of a first frame that was under way at the start, what it says itself
-        self._pace.append(max(now - self._before, work_seconds(figures)))
+        self._seconds.append(max(now - self._before, work_seconds(figures)))
         self._before = now
-        left = (self._total - self._done) * sum(self._pace) / len(self._pace)
+        left = (self._total - self._done) * sum(self._seconds) / len(self._seconds)
         self._say(
             "frame",
             frame=number,

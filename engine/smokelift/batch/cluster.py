@@ -1,4 +1,4 @@
-"""A batch on a cluster that Dask distributed runs, a task a shot; needs Dask.
+"""A batch on a cluster that Dask distributed runs, a task per shot; needs Dask.
 
 Dask gives the shots to workers, and those of a lost worker to another one. What it cannot know is on the storage: a
 shot that two workers hold is done by one (`smokelift.batch.work`), and after a restart of the scheduler, which forgets
@@ -18,7 +18,7 @@ from typing import Any
 import distributed
 
 from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import Needs, Record, Task, read_record
+from smokelift.batch.work import Record, ShotMemory, Task, read_record
 
 CONNECT_SECONDS, RETURN_SECONDS = 30, 1800
 """Time for the scheduler to answer, and to return if it goes away; set by hand."""
@@ -40,7 +40,7 @@ class Stop(distributed.WorkerPlugin):  # type: ignore[misc]  # Dask is not follo
 
 
 def run_on_cluster(
-    shots: Needs, task: Task, address: str, say: Callable[[str], None]
+    shots: ShotMemory, task: Task, address: str, say: Callable[[str], None]
 ) -> Iterator[tuple[BatchShot, Record]]:
     """Run shots on the workers of the scheduler at an address, as ``tcp://host:8786``, and yield each at its end.
 

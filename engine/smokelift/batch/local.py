@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
 from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import Needs, Record, Task
+from smokelift.batch.work import Record, ShotMemory, Task
 
 WAKE_SECONDS = 0.5
 """Python handles no signal while it waits on some systems, so that no wait is longer."""
 
 
-def run_here(shots: Needs, task: Task, memory: int, workers: int) -> Iterator[tuple[BatchShot, Record]]:
+def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterator[tuple[BatchShot, Record]]:
     """Run shots side by side, `workers` at most, and yield each when it has ended.
 
     A shot starts as soon as its part of `memory` is left, in the order of the list; a small one may overtake a large

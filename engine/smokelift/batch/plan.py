@@ -1,4 +1,4 @@
-"""What a batch still takes on so many workers, and its page: a row a shot, with its picture."""
+"""What a batch still takes on so many workers, and its page: a row per shot, with its picture."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _HEADINGS = ("clip and smoke", "shot", "state", "frames", "fit (dB)", "time (s)"
 class Remaining(NamedTuple):
     """What is left of a shot: how many frames, their seconds, and bytes at the peak, as measured or foretold.
 
-    The basis is ``"measured"``: at the pace of the shot's own frames; ``"scaled"``: as foretold, times what other shots
-    of the batch took over what was foretold of them; or ``"foretold"``, where nothing was measured yet.
+    The basis is ``"measured"``: from the seconds of the shot's own frames; ``"scaled"``: as foretold, times what other
+    shots of the batch took over what was foretold of them; or ``"foretold"``, where nothing was measured yet.
     """
 
     shot: BatchShot

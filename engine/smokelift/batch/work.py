@@ -68,7 +68,7 @@ class Record:
 Task = Callable[[BatchShot, threading.Event], Record]
 """Work on a shot, and what ends it; a worker of a cluster has to be able to import it."""
 
-Needs = Sequence[tuple[BatchShot, int]]
+ShotMemory = Sequence[tuple[BatchShot, int]]
 """Shots with the bytes of memory that each needs; 0 if that is not known."""
 
 

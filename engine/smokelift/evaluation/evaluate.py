@@ -157,7 +157,8 @@ def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:
     fps = sequence.scene.clip.fps if sequence.scene.clip else None
     if fps is not None and abs(fps - truth.fps) > 0.01 * truth.fps:
         raise ValueError(
-            f"{path}: has {truth.fps:g} frames a second, but the sequence has {fps:g}; give fps in the scene's [clip]."
+            f"{path}: has {truth.fps:g} frames per second, but the sequence has {fps:g}; give fps in the scene's "
+            "[clip]."
         )
 
 

@@ -17,7 +17,7 @@ from smokelift.transport import Array
 
 Figures = dict[str, Any]
 
-SMOKE_SHARE = 0.01
+SMOKE_FRACTION = 0.01
 """Fraction of a frame's largest true density above which a voxel counts as smoke."""
 
 SURROUNDING_VOXELS = 2
@@ -63,7 +63,7 @@ class VolumeMeans:
             "height_mass_error": metrics.height_mass_error(found, true),
             "mass_ratio": float(found.sum(dtype=float) / max(true.sum(dtype=float), 1e-30)),
         }
-        smoke = true > SMOKE_SHARE * true.max()
+        smoke = true > SMOKE_FRACTION * true.max()
         before, self._before = self._before, (frame, found)
         if velocity is not None and before is not None and before[0] == frame - 1 and smoke.any():
             figures |= self._motion(frame, before[1], found, resampled(velocity, truth.shape), smoke)

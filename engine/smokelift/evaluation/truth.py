@@ -37,7 +37,7 @@ class Truth:
     voxel_size
         Edge of a voxel (m).
     fps
-        Frames a second.
+        Frames per second.
     closed
         Names of the sides that are walls.
     """

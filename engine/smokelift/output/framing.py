@@ -14,7 +14,7 @@ from smokelift.scene.projection import project_points
 VISIBLE = 0.01
 """Optical depth from which smoke is seen: it changes what is behind it by as much, which is a step or two of 8 bits."""
 
-MARGIN_SHARE = 0.05
+MARGIN_FRACTION = 0.05
 """Margin on each side, as a fraction of the smoke's longer side in the picture."""
 
 MIN_ASPECT = 0.5
@@ -75,7 +75,7 @@ def frame_smoke(sequence: Sequence) -> Framing:
         return Framing(box, 0, 0, width, height)
     points = np.concatenate(seen)
     low, high = points.min(0), points.max(0)
-    low, high = low - MARGIN_SHARE * (high - low).max(), high + MARGIN_SHARE * (high - low).max()
+    low, high = low - MARGIN_FRACTION * (high - low).max(), high + MARGIN_FRACTION * (high - low).max()
     least = MIN_ASPECT * (high - low)[::-1]
     lacking = np.maximum(least - (high - low), 0) / 2
     left, top = np.clip(np.floor(low - lacking), 0, [width - 1, height - 1]).astype(int)

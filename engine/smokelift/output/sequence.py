@@ -20,7 +20,7 @@ from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
 DEFAULT_FPS = 24.0
-"""Frames a second of a sequence whose scene does not say the clip's."""
+"""Frames per second of a sequence whose scene does not say the clip's."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Sequence:
 
     @property
     def fps(self) -> float:
-        """Frames a second: those of the clip, or `DEFAULT_FPS` where the scene does not say them."""
+        """Frames per second: those of the clip, or `DEFAULT_FPS` where the scene does not say them."""
         clip = self.scene.clip
         return (clip.fps if clip is not None else None) or DEFAULT_FPS
 

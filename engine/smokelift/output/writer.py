@@ -1,4 +1,4 @@
-"""Writes a sequence: one OpenVDB file a frame, of a large one a coarse copy beside it, and one `sequence.json`.
+"""Writes a sequence: one OpenVDB file per frame, of a large one a coarse copy beside it, and one `sequence.json`.
 
 A frame counts once `sequence.json` lists it, which is written after the frame's files. Every file appears whole or not
 at all. So a killed run leaves a directory that opens, and the same run can go on from it.

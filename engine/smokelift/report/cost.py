@@ -53,27 +53,27 @@ EXTRA_FRAMES = 2.0
 PAPER_VOXEL_SOLVES = 1100.0
 """A frame's time for each voxel by the paper's method, in solves."""
 
-BYTES_A_SMOKY_VOXEL_ON_DISK = 16
+BYTES_PER_SMOKY_VOXEL_ON_DISK = 16
 """Bytes on disk for each voxel that may hold smoke: a density and three velocities at 16 bits, and velocities around.
 8.6 to 16 are usual."""
 
 BASE_BYTES = 190 * 2**20
 """Bytes of memory for the interpreter, libraries and kernels."""
 
-BYTES_A_PIXEL = 210
+BYTES_PER_PIXEL = 210
 """Bytes of memory for each pixel of the clips' frames: decoded frames and estimates from them."""
 
-BYTES_A_VOXEL = 12, 230
+BYTES_PER_VOXEL = 12, 230
 """Bytes at a run's peak for each voxel of the box, and in addition for each that may hold smoke."""
 
 SMALL = 2**23
 """Voxels whose array takes 32 MiB. Smaller arrays get memory that the C library kept and has to clear, so they take all
 of it whether there is smoke or not."""
 
-BYTES_A_VOXEL_OF_SMALL = 80, 100
-"""`BYTES_A_VOXEL` of grids below `SMALL`."""
+BYTES_PER_VOXEL_OF_SMALL = 80, 100
+"""`BYTES_PER_VOXEL` of grids below `SMALL`."""
 
-BYTES_A_VOXEL_OF_SOLVER = 145
+BYTES_PER_VOXEL_OF_SOLVER = 145
 """Bytes for each voxel of the box that a velocity on the density's grid adds."""
 
 TIMED, TIMES = (64, 64, 64), 40
@@ -82,7 +82,7 @@ TIMED, TIMES = (64, 64, 64), 40
 WORKERS = 2
 """Threads of a run, which share the processor time of a solve."""
 
-BYTES_A_SIMULATED_VOXEL = 170
+BYTES_PER_SIMULATED_VOXEL = 170
 """Bytes at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a ball, less
 without an obstacle."""
 
@@ -173,7 +173,7 @@ def estimate_cost(resolution: Resolution, work: Workload, prepared: Preparation)
         seconds=prepared.work + frames_seconds(resolution, work),
         memory=max(memory_needed(resolution, work), prepared.memory or 0),
         memory_free=memory_free(),
-        disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_A_SMOKY_VOXEL_ON_DISK),
+        disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_PER_SMOKY_VOXEL_ON_DISK),
     )
 
 
@@ -199,15 +199,15 @@ def voxel_solves(resolution: Resolution, work: Workload) -> float:
 def memory_needed(resolution: Resolution, work: Workload) -> int:
     """Return the bytes that a run takes at its peak."""
     voxels = math.prod(resolution)
-    a_voxel, a_smoky_voxel = BYTES_A_VOXEL_OF_SMALL if voxels < SMALL else BYTES_A_VOXEL
+    a_voxel, a_smoky_voxel = BYTES_PER_VOXEL_OF_SMALL if voxels < SMALL else BYTES_PER_VOXEL
     if work.settings.method == "paper" or work.settings.velocity.coarsening == 0:
-        a_voxel += BYTES_A_VOXEL_OF_SOLVER
-    return round(BASE_BYTES + BYTES_A_PIXEL * work.pixels + (a_voxel + work.largest * a_smoky_voxel) * voxels)
+        a_voxel += BYTES_PER_VOXEL_OF_SOLVER
+    return round(BASE_BYTES + BYTES_PER_PIXEL * work.pixels + (a_voxel + work.largest * a_smoky_voxel) * voxels)
 
 
 def affordable_room(resolution: Resolution) -> float:
     """Return how many times as large as a clip's box a simulated one may be to fit into the free memory."""
-    return (memory_free() - BASE_BYTES) / (BYTES_A_SIMULATED_VOXEL * math.prod(resolution))
+    return (memory_free() - BASE_BYTES) / (BYTES_PER_SIMULATED_VOXEL * math.prod(resolution))
 
 
 def memory_free() -> int:

@@ -19,12 +19,12 @@ SENTENCES: Mapping[str, str] = {
         "Export the clip again to mend that."
     ),
     "pictures without a frame rate": (
-        "{path}: pictures carry no frame rate; {fps:g} frames a second are assumed. Give the frame rate if it is "
+        "{path}: pictures carry no frame rate; {fps:g} frames per second are assumed. Give the frame rate if it is "
         "another."
     ),
     "varying frame rate": (
-        "The frame rate varies: the clip is read at its mean, {fps:.4g} frames a second. Export it at a constant rate "
-        "for even motion."
+        "The frame rate varies: the clip is read at its mean, {fps:.4g} frames per second. Export it at a constant "
+        "rate for even motion."
     ),
     "interlaced clip": "The clip is interlaced: one field of each frame is used, so the picture has half its lines.",
     "high dynamic range": (

@@ -146,7 +146,7 @@ class Camera:
             return self
         if not 0 <= frame < len(self.matrices):
             raise SceneError(
-                f"matrices are given for frames 0 to {len(self.matrices) - 1}, not for {frame}; give one a frame"
+                f"matrices are given for frames 0 to {len(self.matrices) - 1}, not for {frame}; give one per frame"
             )
         return replace(self, matrix=self.matrices[frame], matrices=())
 

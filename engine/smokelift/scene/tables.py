@@ -188,7 +188,7 @@ def _matrices(data: Table) -> tuple[Any, ...]:
         _exclude(data, "matrices", "matrix", *look_at)
         matrices = data["matrices"]
         if not isinstance(matrices, list) or not matrices:
-            raise unexpected(matrices, "matrices", "a list of 4x4 matrices, camera to world, one a frame")
+            raise unexpected(matrices, "matrices", "a list of 4x4 matrices, camera to world, one per frame")
         return tuple(matrices)
     if "matrix" in data:
         _exclude(data, "matrix", *look_at)

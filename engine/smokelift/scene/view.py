@@ -30,7 +30,7 @@ class ClipSource:
     path
         A video, or an image sequence written ``frame_####.png``.
     fps
-        Frames a second of the captured motion; None takes it from the file.
+        Frames per second of the captured motion; None takes it from the file.
     frames
         First and last frame, both included, counted from 0; None takes all.
     transfer

@@ -41,7 +41,7 @@ def test_json_events_are_a_line_each(capsys) -> None:
     assert error == {"event": "error", "text": "no.", "status": 2, "later": False}
 
 
-def test_a_forecast_is_corrected_by_the_runs_own_pace(capsys) -> None:
+def test_a_forecast_is_corrected_by_the_runs_own_frames(capsys) -> None:
     """It is all that is known before the first frame, one of two after that, and nothing after ten."""
     with reporter("json") as say:
         say.start(24, 4, 80.0)

@@ -86,7 +86,7 @@ def test_retime_and_loop_write_every_frame(finished, tmp_path, capsys) -> None:
     assert events(capsys.readouterr().out)[-1]["frames"] == len(list(loop.glob("*.npz")))
 
 
-def test_wrong_paces_and_loops_are_refused(finished, tmp_path, capsys) -> None:
+def test_wrong_speeds_and_loops_are_refused(finished, tmp_path, capsys) -> None:
     out = ("--out", tmp_path / "out")
     assert "--speed 0" in refused(capsys, "retime", finished, *out, "--speed", 0)
     assert "--speed 1e+06" in refused(capsys, "retime", finished, *out, "--speed", 1, 1e6)

@@ -158,7 +158,7 @@ def test_an_input_before_a_changing_background_is_left_out(plume, side, tmp_path
         ({"velocity_y": np.zeros((5, 24, 24, 32), np.float16)}, "velocity on faces"),
         ({"density": np.zeros((24, 24, 32), np.float16)}, "frame, x, y, z"),
         ({"fps": 0}, "positive"),
-        ({"fps": 30}, "30 frames a second"),
+        ({"fps": 30}, "30 frames per second"),
         ({"voxel_size": 0.06}, "box"),
     ],
 )

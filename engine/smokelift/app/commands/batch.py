@@ -17,7 +17,7 @@ from smokelift.app.progress import Reporter
 from smokelift.batch.local import run_here
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
 from smokelift.batch.shots import BatchShot, read_shots
-from smokelift.batch.work import Needs, Record, Task, finish_shot, inspect_shot, read_record
+from smokelift.batch.work import Record, ShotMemory, Task, finish_shot, inspect_shot, read_record
 from smokelift.checks import counted
 from smokelift.report.cost import memory_free
 
@@ -106,7 +106,7 @@ def _run_remaining(
 
 
 def _run_shots(
-    scheduler: str | None, shots: Needs, task: Task, say: Callable[[str], None], workers: int
+    scheduler: str | None, shots: ShotMemory, task: Task, say: Callable[[str], None], workers: int
 ) -> Generator[tuple[BatchShot, Record], None, None]:
     """Run shots, here or on a cluster, and yield each at its end."""
     if scheduler is None:

@@ -43,8 +43,8 @@ from smokelift.output.sequence import Sequence
 from smokelift.report.cost import affordable_room
 from smokelift.scene import SIDES
 
-NOTICED = 1e-3
-"""Share of a frame's smoke that dissolves before its box's end, above which it is said."""
+MIN_DISSOLVED_FRACTION = 1e-3
+"""Fraction of a frame's smoke that dissolves before its box's end, from which on it is said."""
 
 SPEEDS = 0.01, 100.0
 """Slowest and fastest speed: beyond them nothing moves, or nothing is left."""
@@ -167,7 +167,7 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
             contradicted = True
             motion = "rises" if buoyancy < 0 else "sinks"
             say.note(Finding("contradicted buoyancy", {"buoyancy": buoyancy, "motion": motion}, doubt=True))
-        if not said and figures.get(DISSOLVED, 0.0) > NOTICED:
+        if not said and figures.get(DISSOLVED, 0.0) > MIN_DISSOLVED_FRACTION:
             said = True
             say.note(Finding("dissolving smoke", {"frame": number, "room": room}, doubt=True))
 
