@@ -11,7 +11,7 @@ from benchmarks.filming import filmed
 from benchmarks.measure import Figures, view_figures
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
-from smokelift.evaluation.frame_means import SMOKE_SHARE
+from smokelift.evaluation.frame_means import SMOKE_FRACTION
 from smokelift.evaluation.metrics import velocity_error
 from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Method, compose
@@ -24,14 +24,14 @@ from smokelift.velocity import DensityPair
 def motion(known: Known, voxels: float, method: MethodName) -> Figures:
     """A density and the same one carried by its true flow, scaled to a mean way of so many voxels."""
     density = known.density(FIRST)
-    smoke = density > SMOKE_SHARE * density.max()
+    smoke = density > SMOKE_FRACTION * density.max()
     flow = _on_faces(known)
     way = np.linalg.norm(flow.centres()[smoke], axis=-1).mean() / (known.fps * flow.voxel_size)
     flow = flow.with_faces(np.float32(voxels / way) * component for component in flow.faces)
     after = advect(density, flow, 1 / known.fps)
     pair = DensityPair(density, after, 1 / known.fps, flow.voxel_size)
     found = compose(smooth(method)).velocity_estimator.estimate(pair)
-    counted = after > SMOKE_SHARE * after.max()
+    counted = after > SMOKE_FRACTION * after.max()
     return {"velocity_error": velocity_error(found.centres(), flow.centres(), counted)[0]}
 
 
@@ -47,7 +47,7 @@ def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
         smoothness, kinetic = (weight / factor**2 for weight in (estimator.smoothness, estimator.kinetic))
         estimator = replace(estimator, smoothness=smoothness, kinetic=kinetic)
     found = estimator.estimate(DensityPair(before, after, 1 / known.fps, known.domain.voxel_size))
-    counted = (after > SMOKE_SHARE * after.max()) & ~known.inlets[FIRST + 1]
+    counted = (after > SMOKE_FRACTION * after.max()) & ~known.inlets[FIRST + 1]
     return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], counted)[0]}
 
 

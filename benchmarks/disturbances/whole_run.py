@@ -10,7 +10,7 @@ from benchmarks.filming import filmed
 from benchmarks.measure import Figures, reconstructed, view_figures
 from smokelift import Settings
 from smokelift.checks.array_types import Array
-from smokelift.evaluation.frame_means import SMOKE_SHARE, finite_mean
+from smokelift.evaluation.frame_means import SMOKE_FRACTION, finite_mean
 from smokelift.evaluation.metrics import velocity_error, volume_error
 from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Frame
@@ -95,7 +95,7 @@ def flow_error(known: Known, moment: int, velocity: Array) -> float | None:
         At the centers of the small grid's voxels (m/s).
     """
     density, true = known.density(moment), known.velocities[moment]
-    counted = (density > SMOKE_SHARE * density.max()) & ~known.inlets[moment]
+    counted = (density > SMOKE_FRACTION * density.max()) & ~known.inlets[moment]
     if not counted.any() or not np.isfinite(true).all():
         return None
     return velocity_error(velocity, true, counted)[0]
