@@ -7,8 +7,8 @@ import pytest
 from command_line import QUICK, command, events, names, refused
 
 from smokelift.output.sequence import Sequence
-from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.scene import completed
+from tests.engine.output.small_sequence import needs_vdb
 
 
 def test_reconstruct_writes_a_sequence(finished, plume) -> None:
@@ -20,11 +20,8 @@ def test_reconstruct_writes_a_sequence(finished, plume) -> None:
     assert all(sequence.figures(n)["psnr"] >= 35 for n in sequence.frames)
 
 
+@needs_vdb
 def test_reconstruct_writes_vdb_files(shot, tmp_path, capsys) -> None:
-    try:
-        vdb_module()
-    except VdbUnavailable as missing:
-        pytest.skip(str(missing))
     assert command("reconstruct", shot, "--out", tmp_path / "out", "--frames", "0:1", *QUICK) == 0
     assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.vdb", "smoke_0002.vdb"]
     out = "".join(capsys.readouterr().out.splitlines())

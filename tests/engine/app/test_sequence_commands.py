@@ -9,8 +9,8 @@ from command_line import command, events, names, refused
 from smokelift.app.commands import directed
 from smokelift.direct import CONTRADICTED
 from smokelift.output.sequence import Sequence
-from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.report import cost
+from tests.engine.output.small_sequence import needs_vdb
 
 
 def test_a_whole_sequence_passes(finished, capsys) -> None:
@@ -38,13 +38,9 @@ def test_what_is_damaged_or_missing_fails(finished, tmp_path, capsys, name, dama
     assert said in refused(capsys, "check", copy)
 
 
+@needs_vdb
 def test_every_frame_gets_a_coarse_copy(finished, tmp_path, capsys) -> None:
     there = shutil.copytree(finished, tmp_path / "there")
-    try:
-        vdb_module()
-    except VdbUnavailable:
-        assert "no OpenVDB module" in refused(capsys, "proxy", there)
-        pytest.skip("there is no OpenVDB module")
     assert command("proxy", there, "--progress", "json") == 0
     start, *frames, done = events(capsys.readouterr().out)
     assert start["total"] == len(frames) == done["frames"]
@@ -53,12 +49,8 @@ def test_every_frame_gets_a_coarse_copy(finished, tmp_path, capsys) -> None:
     assert "no sequence" in refused(capsys, "proxy", tmp_path)
 
 
+@needs_vdb
 def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
-    try:
-        vdb_module()
-    except VdbUnavailable:
-        assert "no OpenVDB module" in refused(capsys, "export", finished, "--out", tmp_path / "out")
-        pytest.skip("there is no OpenVDB module")
     out = tmp_path / "out"
     words = ("export", finished, "--out", out, "--precision", "quantized", "--proxy", 2, "--progress", "json")
     assert command(*words, "--size") == 0

@@ -1,6 +1,5 @@
 """The commands of the manual's tour, run as they stand there on a tiny plume."""
 
-import importlib.util
 import re
 import shlex
 from pathlib import Path
@@ -8,17 +7,18 @@ from pathlib import Path
 import pytest
 from command_line import command
 
+from tests.engine.output.small_sequence import has_vdb
+
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "tour.md"
 COMMANDS = re.findall(r"^ {4}smokelift (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 WRITE_FILES = ("reconstruct", "continue", "retime", "loop")
-HAS_VDB = any(importlib.util.find_spec(module) for module in ("openvdb", "pyopenvdb", "bpy"))
 
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_a_command_of_the_tour_does_what_it_says(line, shot, finished, plume, tmp_path, monkeypatch) -> None:
     words = shlex.split(line)
     words = [str(plume.scene.clip.path) if word == "clip.mp4" else word for word in words]
-    if words[0] in WRITE_FILES and not HAS_VDB:
+    if words[0] in WRITE_FILES and not has_vdb():
         words.append("--npz")
     monkeypatch.chdir(tmp_path)
     made = [words[n + 1] for n, word in enumerate(words) if word in ("--out", "--page", "--write", "--picture")]

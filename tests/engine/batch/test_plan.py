@@ -1,12 +1,11 @@
 """What a batch still takes, and its page."""
 
-import json
-
 import pytest
 from PIL import Image
 
 from smokelift.batch.plan import duration, remaining_work, write_report
 from smokelift.batch.work import Record
+from smokelift.output.index import Index
 
 
 @pytest.fixture
@@ -17,9 +16,7 @@ def filmed(make_shot):
         shot = make_shot(name)
         shot.directory.mkdir(parents=True)
         frames = {str(n + 1): {"psnr": psnr + n, "seconds_density": seconds} for n in range(count)}
-        index = {"format": 1, "scene": {}, "settings": {}, "choices": [], "provenance": [], "frames": frames}
-        rest = {"sources": {}, "checksums": {}, "versions": {}, "complete": complete}
-        (shot.directory / "sequence.json").write_text(json.dumps({**index, **rest}))
+        Index({}, {}, frames=frames, complete=complete).write(shot.directory)
         return shot
 
     return make

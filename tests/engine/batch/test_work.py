@@ -1,6 +1,5 @@
 """The work on one shot: nothing is lost, and nothing is done twice."""
 
-import json
 import os
 import subprocess
 import sys
@@ -107,11 +106,7 @@ def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake) -> None:
 def test_a_shot_is_forecast_once(make_shot, fake) -> None:
     shot = make_shot(frames=5, memory=300)
     record = inspect_shot(shot, threading.Event(), fake)
-    assert json.loads((shot.folder / "shot.json").read_text())["forecast"] == {
-        "frames": 5,
-        "seconds": 10,
-        "memory": 300,
-    }
+    assert read_record(shot).forecast == {"frames": 5, "seconds": 10, "memory": 300}
     assert inspect_shot(shot, threading.Event(), ("no such command",)) == record
     assert finish_shot(shot, threading.Event(), engine=fake).forecast == record.forecast
 
@@ -130,12 +125,8 @@ def test_a_log_that_cannot_be_written_stops_nothing(make_shot) -> None:
     shot = make_shot()
     shot.folder.mkdir()
     shot.file("log").symlink_to("/dev/full")
-    assert (
-        finish_shot(
-            shot, threading.Event(), engine=(*PYTHON, """print('{"event": "done", "text": "Made."}')""")
-        ).sentence
-        == "Made."
-    )
+    engine = (*PYTHON, """print('{"event": "done", "text": "Made."}')""")
+    assert finish_shot(shot, threading.Event(), engine=engine).sentence == "Made."
 
 
 def test_the_real_command_ends_when_its_standard_input_closes() -> None:

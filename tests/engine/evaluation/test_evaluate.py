@@ -1,6 +1,7 @@
 """``smokelift evaluate``: a sequence beside known volumes and other views, and every way to ask for nonsense."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,39 +9,42 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smokelift.app.cli import main
+from smokelift.output.archive import VELOCITY
 from smokelift.output.images import write_image
 from smokelift.output.writer import SequenceWriter
 from smokelift.render import render
-from smokelift.scene import Background, Scene, orbit
+from smokelift.scene import Background, Domain, Scene, orbit
 from smokelift.transport import Velocity
+from tests.engine.app.command_line import command, refused
 
 RISE = 1.5
 """Voxels a frame of the tiny plume."""
 
 
-def write(folder: Path, scene: Scene, densities, speed: float = 1.0) -> Path:
-    """A sequence of volumes that rise as fast as the truth, or by another speed."""
-    faces = Velocity.zero(scene.domain.resolution, scene.domain.voxel_size).faces
-    faces[2][:] = speed * RISE * scene.domain.voxel_size * 24
+def rising(domain: Domain) -> tuple[np.ndarray, ...]:
+    """A velocity as fast as the truth's."""
+    faces = Velocity.zero(domain.resolution, domain.voxel_size).faces
+    faces[2][:] = RISE * domain.voxel_size * 24
+    return faces
+
+
+def write(folder: Path, scene: Scene, densities, boxes: Iterable[Domain] | None = None) -> Path:
+    """A sequence of volumes that rise as fast as the truth, in the scene's box or in boxes of their own."""
+    boxes = boxes or [scene.domain] * len(densities)
     with SequenceWriter(folder, scene, {"density": {"scattering": "single"}}, npz=True) as writer:
-        for number, density in enumerate(densities, 1):
-            writer.write(number, density, faces)
+        for number, (density, box) in enumerate(zip(densities, boxes, strict=True), 1):
+            writer.write(number, density, rising(box), box=box)
     return folder
 
 
 def write_truth(path: Path, scene: Scene, densities, **changes) -> Path:
     """The tiny plume in the format of baked scenes."""
-    shape, count = scene.domain.resolution, len(densities)
-    faces = Velocity.zero(shape, scene.domain.voxel_size).faces
-    faces[2][:] = RISE * scene.domain.voxel_size * 24
+    count = len(densities)
+    faces = {name: np.stack([face] * count) for name, face in zip(VELOCITY, rising(scene.domain), strict=True)}
     arrays = {
         "density": np.stack(densities).astype(np.float16),
-        **{
-            f"velocity_{axis}": np.stack([face] * count).astype(np.float16)
-            for axis, face in zip("xyz", faces, strict=True)
-        },
-        "inflow_packed": np.zeros((count, int(np.prod(shape)) // 8), np.uint8),
+        **{name: face.astype(np.float16) for name, face in faces.items()},
+        "inflow_packed": np.zeros((count, densities[0].size // 8), np.uint8),
         "voxel_size": scene.domain.voxel_size,
         "fps": 24,
         "closed": np.array([], dtype="U2"),
@@ -73,33 +77,20 @@ def side(plume, tmp_path_factory) -> tuple[Path, Path]:
 def evaluate(capsys, *words: object) -> dict:
     """What is written on standard output, which is JSON and nothing else."""
     capsys.readouterr()
-    assert main(["evaluate", *map(str, words)]) == 0
+    assert command("evaluate", *words) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
     return json.loads(captured.out)
 
 
-def refused(capsys, *words: object) -> str:
-    capsys.readouterr()
-    assert main(["evaluate", *map(str, words)]) == 2
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1, lines
-    return lines[0]
-
-
 def test_smoke_that_has_left_the_truths_box(plume, perfect, truth, tmp_path, capsys) -> None:
     domain = plume.scene.domain
-    larger = domain.grown((8, 0, 0), (0, 0, 8))
-    with SequenceWriter(tmp_path / "out", plume.scene, {"density": {"scattering": "single"}}, npz=True) as writer:
-        for number, density in enumerate(plume.densities, 1):
-            box = domain if number == 1 else larger
-            faces = Velocity.zero(box.resolution, box.voxel_size).faces
-            faces[2][:] = RISE * box.voxel_size * 24
-            whole = np.full(box.shape, 0.5, np.float32)
-            whole[domain.slices_in(box)] = density
-            writer.write(number, whole, faces, box=box)
-    figures = evaluate(capsys, tmp_path / "out", "--truth", truth)["truth"]
-    assert figures["density_error"] < 1e-3
+    boxes = [domain, *[domain.grown((8, 0, 0), (0, 0, 8))] * 4]
+    wholes = [np.full(box.shape, 0.5, np.float32) for box in boxes]
+    for whole, box, density in zip(wholes, boxes, plume.densities, strict=True):
+        whole[domain.slices_in(box)] = density
+    out = write(tmp_path / "out", plume.scene, wholes, boxes)
+    assert evaluate(capsys, out, "--truth", truth)["truth"]["density_error"] < 1e-3
 
 
 def test_frames_are_those_of_the_clip(plume, truth, tmp_path, capsys) -> None:
@@ -121,7 +112,7 @@ def test_without_truth_or_view_the_orbit_is_compared_with_the_front(plume, perfe
 
 def test_the_truth_beside_itself_with_another_view(perfect, truth, side, tmp_path, capsys) -> None:
     files = ("--json", tmp_path / "a.json", "--picture", tmp_path / "a.png")
-    assert main(["evaluate", *map(str, (perfect, "--truth", truth, "--view", *side, *files))]) == 0
+    assert command("evaluate", perfect, "--truth", truth, "--view", *side, *files) == 0
     assert "a.json written" in "".join(capsys.readouterr().out.splitlines())
     found = json.loads((tmp_path / "a.json").read_text())
     assert found["frames"] == 5
@@ -164,19 +155,22 @@ def test_an_input_before_a_changing_background_is_left_out(plume, side, tmp_path
 )
 def test_a_truth_that_does_not_fit(plume, perfect, tmp_path, capsys, change, said) -> None:
     path = write_truth(tmp_path / "truth.npz", plume.scene, plume.densities, **change)
-    sentence = refused(capsys, perfect, "--truth", path)
+    sentence = refused(capsys, "evaluate", perfect, "--truth", path)
     assert str(path) in sentence
     assert said in sentence
 
 
 def test_views_that_do_not_fit(plume, perfect, side, tmp_path, capsys) -> None:
     camera, clip = side
-    assert "No such" in refused(capsys, perfect, "--view", tmp_path / "camera.toml", clip)
-    assert "no such" in refused(capsys, perfect, "--view", camera, tmp_path / "clip.mp4")
     Scene(background=Background(color=(0.0, 0.0, 0.0))).save(tmp_path / "nothing.toml")
-    assert "[camera]" in refused(capsys, perfect, "--view", tmp_path / "nothing.toml", clip)
     Scene(camera=plume.scene.camera.resized(40, 40)).save(tmp_path / "square.toml")
-    assert "40 x 56" in refused(capsys, perfect, "--view", tmp_path / "square.toml", clip)
     for number in range(3):
         write_image(tmp_path / f"short_{number}.exr", render(plume.densities[0], plume.scene))
-    assert "has 3 frames" in refused(capsys, perfect, "--view", camera, tmp_path / "short_#.exr")
+    for said, *files in (
+        ("No such", tmp_path / "camera.toml", clip),
+        ("no such", camera, tmp_path / "clip.mp4"),
+        ("[camera]", tmp_path / "nothing.toml", clip),
+        ("40 x 56", tmp_path / "square.toml", clip),
+        ("has 3 frames", camera, tmp_path / "short_#.exr"),
+    ):
+        assert said in refused(capsys, "evaluate", perfect, "--view", *files)
