@@ -118,7 +118,7 @@ def say_sequence(
     say.finish(Finding(kind, {**result, **figures}), result)
 
 
-def say_made(say: Reporter, made: Iterable[tuple[int, Made]], total: int, origin: str) -> list[Made]:
+def say_frames(say: Reporter, made: Iterable[tuple[int, Made]], total: int, origin: str) -> list[Made]:
     """Say a frame, by its number, with the time that it took, for each thing that is made of one; return the things."""
     say.start(total, 0)
     things, before = [], time.monotonic()

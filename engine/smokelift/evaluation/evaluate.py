@@ -103,11 +103,11 @@ def evaluate(
         views = open_views(whole, view_paths, stack, figures["notes"])
         if view_paths or truth is None:
             figures["views"] = [_against_view(whole, view) for view in views]
-    figures["orbit"] = _around(sequence, truth)
+    figures["orbit"] = _orbit_figures(sequence, truth)
     return Evaluation(figures, sequence, truth)
 
 
-def _around(sequence: Sequence, truth: Truth | None) -> Figures:
+def _orbit_figures(sequence: Sequence, truth: Truth | None) -> Figures:
     """Compare the orbit with the truth's, on its grid, or with the front."""
     frames = sequence.frames
     if truth is None:

@@ -23,7 +23,7 @@ Densities = Callable[[int], Volume]
 AZIMUTHS = tuple(range(15, 180, 15))
 """Degrees. From behind smoke has nearly the outline that it has from the front, so half a turn says all."""
 
-ON = 5
+OWN_STEP = 5
 """Azimuths, of 15 degrees each, from one picture of the truth to the one that it is compared with for its own distance:
 pictures that far from each other have next to no detail in common."""
 
@@ -53,10 +53,10 @@ def orbit_scores(
     -------
     ``patches`` and ``texture``, the distances of `PatchStatistics`, means over azimuths, and by azimuth;
     ``patches_worst``, the largest of an azimuth; ``patches_own`` and ``texture_own``, those of the truth from itself
-    `ON` azimuths on, or of the front from the front half the clip on; ``edges`` and ``flicker``, mean gradients and
-    second differences in time over the reference's; ``halo``, the fraction of the light outside the outlines that the
-    truth has at any azimuth. The figures of `RayShapes`, along the camera's rays and by azimuth, and the truth's. None
-    where there is nothing to say.
+    `OWN_STEP` azimuths on, or of the front from the front half the clip on; ``edges`` and ``flicker``, mean gradients
+    and second differences in time over the reference's; ``halo``, the fraction of the light outside the outlines that
+    the truth has at any azimuth. The figures of `RayShapes`, along the camera's rays and by azimuth, and the truth's.
+    None where there is nothing to say.
     """
     orbit = Orbit(scene, lights_turn=truth is None)
     frames = _scored_frames(count)
@@ -80,15 +80,15 @@ def orbit_scores(
             fronts += references
             references, sharp = len(AZIMUTHS) * references, len(AZIMUTHS) * sharp
         else:
-            _add(own, [*references[ON:], *references[:ON]], references)
+            _add_distances(own, [*references[OWN_STEP:], *references[:OWN_STEP]], references)
             outline = _outline(true)
-            found["halo"].append([_outside(picture, outline) for picture in pictures])
-        _add(found, [PatchStatistics.of(picture) for picture in pictures], references)
+            found["halo"].append([_halo(picture, outline) for picture in pictures])
+        _add_distances(found, [PatchStatistics.of(picture) for picture in pictures], references)
         edges = zip(map(mean_gradient, pictures), sharp, strict=True)
         found["edges"].append([_ratio(value, reference) for value, reference in edges])
     if len(fronts) > 1:
         half = len(fronts) // 2
-        _add(own, [*fronts[half:], *fronts[:half]], fronts)
+        _add_distances(own, [*fronts[half:], *fronts[:half]], fronts)
     by_azimuth = {name: _means(values) for name, values in found.items()}
     known = [value for value in by_azimuth["patches"] if value is not None]
     return {
@@ -106,7 +106,7 @@ def orbit_scores(
     }
 
 
-def _add(
+def _add_distances(
     figures: dict[str, list[list[float | None]]], found: list[PatchStatistics], references: list[PatchStatistics]
 ) -> None:
     """Add the distances of a frame's pictures."""
@@ -157,7 +157,7 @@ def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
     )
 
 
-def _outside(picture: Array, outline: npt.NDArray[np.bool_]) -> float | None:
+def _halo(picture: Array, outline: npt.NDArray[np.bool_]) -> float | None:
     return _ratio(float(picture[~outline].sum()), float(picture.sum()))
 
 

@@ -58,9 +58,9 @@ def _mean(shapes: Iterable[RayShapes | None], name: str) -> float | None:
 
 def _band_ratio(shape: RayShapes, band: int) -> float | None:
     """Depth over width in a band of the box; None where it holds no smoke."""
-    part = slice(*(len(shape.amounts) * end // BANDS for end in (band, band + 1)))
-    depths, widths, amounts = shape.depths[part], shape.widths[part], shape.amounts[part]
-    return float(np.average(depths / np.maximum(widths, 1e-9), weights=amounts)) if amounts.any() else None
+    part = slice(*(len(shape.masses) * end // BANDS for end in (band, band + 1)))
+    depths, widths, masses = shape.depths[part], shape.widths[part], shape.masses[part]
+    return float(np.average(depths / np.maximum(widths, 1e-9), weights=masses)) if masses.any() else None
 
 
 def _turned(upright: Volume, table: Turntable, degrees: float) -> Volume:

@@ -169,14 +169,14 @@ def _lines(values: Mapping[str, str]) -> str:
     return "{\n" + ",\n".join(f"{json.dumps(name)}: {value}" for name, value in values.items()) + "\n}"
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """Return a value as JSON holds it: arrays become lists, and numbers that are not finite become None."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [json_value(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -217,7 +217,7 @@ COMPARED: tuple[tuple[str, Callable[[Index], Any]], ...] = (
 before what follows from them: another clip, say, makes another scene, and another scene other settings of a part."""
 
 
-def changed(before: Index, now: Index) -> str:
+def first_change(before: Index, now: Index) -> str:
     """Return in words the first thing of `COMPARED` that differs between two runs, or an empty string."""
     return next(filter(None, (difference(name, of(before), of(now)) for name, of in COMPARED)), "")
 

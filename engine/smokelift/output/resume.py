@@ -67,7 +67,7 @@ class ResumeState:
         number = arrays.pop("number")
         x, y, z = (arrays.pop(name) for name in VELOCITY)
         try:
-            volumes = {name: _filled(arrays, name, shape) for name in arrays if not name.endswith(_VOXELS)}
+            volumes = {name: _dense(arrays, name, shape) for name in arrays if not name.endswith(_VOXELS)}
             density = volumes.pop("density")
         except (KeyError, TypeError, ValueError) as error:
             raise OSError(f"{path}: cannot be read: what it says of its voxels does not fit") from error
@@ -81,7 +81,7 @@ class ResumeState:
         return ResumeState(int(number), density, (x, y, z), extra)
 
 
-def _filled(arrays: Mapping[str, npt.NDArray[Any]], name: str, shape: Shape) -> npt.NDArray[Any]:
+def _dense(arrays: Mapping[str, npt.NDArray[Any]], name: str, shape: Shape) -> npt.NDArray[Any]:
     """Give the volume of that name, zeros included; KeyError, TypeError or ValueError if its parts do not fit."""
     there = np.unpackbits(arrays[name + _VOXELS], count=math.prod(shape)).view(bool).reshape(shape)
     filled = np.zeros(shape, arrays[name].dtype)

@@ -39,8 +39,8 @@ from smokelift.output.index import (
     DirectoryBusyError,
     Index,
     SequenceError,
-    changed,
-    plain,
+    first_change,
+    json_value,
 )
 from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
@@ -108,7 +108,7 @@ class SequenceWriter:
             scene = replace(scene, background=Background(image=self.directory.resolve() / BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
-        origins = plain({"choices": choices, "provenance": provenance, "sources": sources or {}})
+        origins = json_value({"choices": choices, "provenance": provenance, "sources": sources or {}})
         if not 0 <= start_number <= MAX_START_NUMBER:
             raise ValueError(f"start_number must be from 0 to {MAX_START_NUMBER}, not {start_number}")
         self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **origins, start_number=start_number)
@@ -143,7 +143,7 @@ class SequenceWriter:
                 write_image(self.directory / BACKGROUND, self._background)
         except OSError as error:
             self._lock.release()
-            raise self._failed(INDEX, error) from error
+            raise self._write_error(INDEX, error) from error
         except BaseException:
             self._lock.release()
             raise
@@ -159,7 +159,7 @@ class SequenceWriter:
                 self._index.write(self.directory)
                 (self.directory / RESUME).unlink(missing_ok=True)
         except OSError as failure:
-            raise self._failed(INDEX, failure) from failure
+            raise self._write_error(INDEX, failure) from failure
         finally:
             self._lock.release()
 
@@ -231,7 +231,7 @@ class SequenceWriter:
                     flame=fire,
                     lattice=self._domain,
                 )
-            frames = {**self._index.frames, str(number): plain({**(figures or {}), **own_box})}
+            frames = {**self._index.frames, str(number): json_value({**(figures or {}), **own_box})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
             grown.write(self.directory)
@@ -239,7 +239,7 @@ class SequenceWriter:
             state.write(self.directory / RESUME)
             self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
-            raise self._failed(f"frame {number}", error) from error
+            raise self._write_error(f"frame {number}", error) from error
 
     def _path(self, number: int, kind: str) -> Path:
         """The file of a frame."""
@@ -254,11 +254,11 @@ class SequenceWriter:
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""
-        there = _begun(self.directory, self._resume)
+        there = _earlier_run(self.directory, self._resume)
         if there is None:
             self._clear(INDEX)  # nothing else is written before it
             return
-        if what := changed(there, self._index):
+        if what := first_change(there, self._index):
             raise SequenceError(
                 f"{self.directory}: was begun differently and cannot be resumed: {what}; choose another directory"
             )
@@ -295,7 +295,7 @@ class SequenceWriter:
                     f"{path}: is missing, so this run cannot go on with this output; choose another directory"
                 )
 
-    def _failed(self, what: str, error: OSError) -> SequenceError:
+    def _write_error(self, what: str, error: OSError) -> SequenceError:
         reason = "the disk is full" if error.errno in DISK_FULL else str(error)
         return SequenceError(
             f"{self.directory}: {what} could not be written: {reason}; "
@@ -306,7 +306,7 @@ class SequenceWriter:
 def check_directory(directory: Path, *, resume: bool) -> None:
     """Refuse, before anything is computed or written, a directory that a `SequenceWriter` would refuse for itself."""
     if directory.is_dir():
-        _begun(directory, resume)
+        _earlier_run(directory, resume)
     nearest = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
     if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
         raise SequenceError(f"{directory}: cannot be written to: {nearest} is no folder, or may not be changed")
@@ -326,7 +326,7 @@ def written_kinds(npz: bool) -> tuple[str, ...]:
     return ("vdb", "npz") if npz else ("vdb",)
 
 
-def _begun(directory: Path, resume: bool) -> Index | None:
+def _earlier_run(directory: Path, resume: bool) -> Index | None:
     """The run in a directory that can be gone on with, or None if there is nothing; SequenceError for all else."""
     names = sorted(file.name for file in directory.iterdir() if not file.name.startswith("."))
     has_index = INDEX in names

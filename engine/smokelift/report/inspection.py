@@ -14,7 +14,7 @@ from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit
-from smokelift.report.page import TILE, Page, Panel, fitted
+from smokelift.report.page import TILE, Page, Panel, tile_size
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project_points
 from smokelift.setup.first_estimate import unknown_part
@@ -47,7 +47,7 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     What is ``known`` is that of `smokelift.report.facts`. Other findings follow below; doubts stand above the pictures.
     """
     number = shot.smoky[0] if shot.smoky else 0
-    columns, rows = fitted(*shot.clip.size)
+    columns, rows = tile_size(*shot.clip.size)
     pixels = shot.clip.size[0] * shot.clip.size[1] / (columns * rows)
     whole = shot.views[0].plates.through(lambda full: area_average(full, columns, rows), pixels)
     plate = whole.at(number)

@@ -69,7 +69,7 @@ def write_page(path: Path, page: Page) -> None:
             _as_picture(page).save(aside, format="PNG", compress_level=PACKED)
 
 
-def fitted(width: int, height: int) -> tuple[int, int]:
+def tile_size(width: int, height: int) -> tuple[int, int]:
     """Return width and height of a picture on the page, in pixels."""
     scale = min(TILE[0] / width, TILE[1] / height)
     return max(1, round(width * scale)), max(1, round(height * scale))

@@ -53,7 +53,7 @@ def made_up(shot: Shot) -> list[Finding]:
     return [Finding("texture of the clip", chosen, about="fine structure along the rays", source="made up")]
 
 
-def foreseen(shot: Shot) -> list[Finding]:
+def expected_shortcomings(shot: Shot) -> list[Finding]:
     """Return the doubts about a run that the set-up of its shot gives reason for."""
     if shot.fire is not None or any(found.kind == "likely wrong light" for found in shot.findings):
         return []

@@ -10,7 +10,7 @@ import pytest
 from smokelift.checks import Finding
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
-from smokelift.report.result import foreseen, made_up, provenance, shortcomings
+from smokelift.report.result import expected_shortcomings, made_up, provenance, shortcomings
 from smokelift.report.views import choices, part, sentence
 from smokelift.scene import orbit
 from smokelift.setup.settings import Settings
@@ -104,7 +104,9 @@ def test_what_may_be_no_smoke_is_foreseen(left: float, said: bool) -> None:
     """By what the set-up's fit leaves, unless it made none, fire shines or the light is at fault."""
     found = Finding("compared scattering", {"error": left}, about="scattering", value="single", source="measured")
     shot = SimpleNamespace(fire=None, findings=(Finding("open box"), found))
-    assert foreseen(shot) == ([Finding("not all may be smoke", {"error": left}, doubt=True)] if said else [])
+    assert expected_shortcomings(shot) == (
+        [Finding("not all may be smoke", {"error": left}, doubt=True)] if said else []
+    )
     wrong = Finding("likely wrong light", {"error": left}, doubt=True)
     for other in ({"fire": object()}, {"findings": ()}, {"findings": (found, wrong)}):
-        assert foreseen(SimpleNamespace(**{**vars(shot), **other})) == []
+        assert expected_shortcomings(SimpleNamespace(**{**vars(shot), **other})) == []

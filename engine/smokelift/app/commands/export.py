@@ -7,7 +7,7 @@ import time
 from typing import get_args
 
 from smokelift.app.options import Command, named_path
-from smokelift.app.progress import Reporter, say_made
+from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
 from smokelift.output.export import (
     ExportSettings,
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     say.note(f"{text}.")
     require_space(options.out, size)
     exported = export_sequence(sequence, options.out, settings)
-    written = sum(say_made(say, exported, len(sequence.frames), "exported"))
+    written = sum(say_frames(say, exported, len(sequence.frames), "exported"))
     say.finish(
         f"{frames} in {options.out}, {written / 1e6:.1f} MB.",
         {

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.app.options import Command, add_clip_options, named_path, require_folder, scene_of
-from smokelift.app.progress import Reporter, say_made
+from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         for finding in clip.findings():
             say.note(finding)
         elements = enumerate(extraction.write(options.out), 1)
-        files = list(map(str, say_made(say, elements, len(extraction), "extracted")))
+        files = list(map(str, say_frames(say, elements, len(extraction), "extracted")))
         if options.plate is not None:
             write_image(options.plate, extraction.plate)
         if options.preview is not None:

@@ -19,7 +19,7 @@ from smokelift.report.cost import Preparation, Workload, estimate_cost, peak_mem
 from smokelift.report.facts import boundaries, facts
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
-from smokelift.report.result import foreseen, made_up
+from smokelift.report.result import expected_shortcomings, made_up
 from smokelift.report.views import choices, fact, origin, sentence, value
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
         domain = shot.scene.domain
-        findings = [*shot.findings, *foreseen(shot), *boundaries(shot.scene), *made_up(shot)]
+        findings = [*shot.findings, *expected_shortcomings(shot), *boundaries(shot.scene), *made_up(shot)]
         for finding in findings:
             say.note(finding)
         work = Workload.of(shot, settings)

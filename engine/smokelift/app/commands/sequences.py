@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 
 from smokelift.app.options import Command, named_path
-from smokelift.app.progress import Reporter, say_made
+from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
 from smokelift.output.export import write_proxies
@@ -69,7 +69,7 @@ def proxy(options: argparse.Namespace, say: Reporter) -> None:
     """Write a coarse copy of every frame."""
     sequence = Sequence.open(options.directory)
     frames = len(sequence.frames)
-    say_made(say, ((number, number) for number in write_proxies(sequence)), frames, "made coarser")
+    say_frames(say, ((number, number) for number in write_proxies(sequence)), frames, "made coarser")
     say.finish(Finding("proxy", {"frames": frames, "directory": str(sequence.directory)}), {"frames": frames})
 
 

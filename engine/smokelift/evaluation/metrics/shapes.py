@@ -40,7 +40,7 @@ class RayShapes:
         Standard deviation along the rays of the rows' middles, over the smoke's width.
     ray_length
         Effective length of rays, (sum rho)^2 / sum rho^2, over the smoke's width.
-    depths, widths, amounts : (n,)
+    depths, widths, masses : (n,)
         Of the rows, from below: standard deviations along the rays and across (voxels), and how much smoke they hold.
     """
 
@@ -51,7 +51,7 @@ class RayShapes:
     ray_length: float
     depths: Doubles
     widths: Doubles
-    amounts: Doubles
+    masses: Doubles
 
     @staticmethod
     def of(smoke: npt.ArrayLike) -> RayShapes | None:
@@ -90,7 +90,7 @@ class RayShapes:
             ray_length=float(np.average(lengths, weights=thick)) / width,
             depths=depths,
             widths=widths,
-            amounts=counts,
+            masses=counts,
         )
 
 
