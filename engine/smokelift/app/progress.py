@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
-from typing import Any, Literal, Protocol, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -58,7 +58,7 @@ def _output() -> Iterator[None]:
         raise OutputError(error) from error
 
 
-class Reporter(Protocol):
+class Reporter:
     """Receives what happens; a context manager around the frames."""
 
     def __enter__(self) -> Self:

@@ -240,9 +240,8 @@ class _Export:
             self.domain,
             sequence.settings,
             None if flame is None else host.turned(flame),
-            velocity_name=host.velocity,
-            facts={"fps": sequence.fps, **UNITS, **light_properties(self.medium)},
-            whole_box=host.whole_box,
+            metadata={"fps": sequence.fps, **UNITS, **light_properties(self.medium)},
+            host=host,
         )
         if self.settings.proxy > 1:
             paths.append(proxy_path(out, sequence.file_number(number)))

@@ -60,8 +60,10 @@ class Host:
         )
 
 
+BLENDER = Host()
+
 HOSTS: Mapping[HostName, Host] = {
-    "blender": Host(),
+    "blender": BLENDER,
     "houdini": Host(velocity="vel", up_axis="Y", axes=((0, 1), (2, 1), (1, -1))),
     "unreal": Host(axes=((0, 1), (1, -1), (2, 1)), left_handed=True, eight_bits=True, whole_box=True),
 }

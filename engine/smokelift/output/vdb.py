@@ -28,6 +28,7 @@ from scipy import ndimage
 from smokelift.checks.array_types import Array
 from smokelift.output.archive import FLAME
 from smokelift.output.files import atomic_path
+from smokelift.output.host import BLENDER, Host
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.transport import StaggeredGrid, at_centres, block_means, faces_in
@@ -102,12 +103,11 @@ def write_vdb(
     density: npt.ArrayLike,
     velocity: npt.ArrayLike | StaggeredGrid | None,
     domain: Domain,
-    metadata: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
     flame: npt.ArrayLike | None = None,
     *,
-    velocity_name: str = "velocity",
-    facts: Mapping[str, str | float] | None = None,
-    whole_box: bool = False,
+    metadata: Mapping[str, str | float] | None = None,
+    host: Host = BLENDER,
     lattice: Domain | None = None,
 ) -> None:
     """Write one frame; the file appears whole or not at all.
@@ -121,16 +121,15 @@ def write_vdb(
         Not negative.
     velocity
         m/s, on faces or at voxel centers, shape (nx, ny, nz, 3); None for a file of the density alone.
-    metadata
-        Settings to keep with the density grid, as JSON can hold them.
+    settings
+        Kept with the density grid, as JSON can hold them.
     flame : (nx, ny, nz), optional
         Emission, radiance per meter, not negative; None for a file without that grid.
-    velocity_name
-        Name of the grid of the velocity.
-    facts
-        Metadata that every grid gets.
-    whole_box
-        Whether two opposite corners of the box are active although there is no smoke.
+    metadata
+        What every grid gets.
+    host
+        Names the grid of the velocity, and says whether two opposite corners of the box are active although there is no
+        smoke. The axes of the volumes are its own already.
     lattice
         Whose first voxel has the index (0, 0, 0), with voxels in line with those of `domain`; by default `domain`. All
         frames of a sequence share one, because a host mixes grids with one transform only.
@@ -154,9 +153,9 @@ def write_vdb(
     rho_box, corner = rho[box], _index(box, first)
     grids = {"density": _fog(vdb, rho_box, corner)}
     if velocity is not None:
-        grids[velocity_name] = vdb.Vec3SGrid()
+        grids[host.velocity] = vdb.Vec3SGrid()
         for slab, near in _near(rho_box, velocity, box):
-            grids[velocity_name].copyFromArray(near, ijk=_index(slab, first))
+            grids[host.velocity].copyFromArray(near, ijk=_index(slab, first))
     if flame is not None:
         emission = checked_volume(flame, domain.shape, FLAME)
         box = _around(emission > 0.0, 0)
@@ -170,13 +169,13 @@ def write_vdb(
         # The binding's default tolerance does not fit vector grids, so it is spelt out.
         grid.prune(tolerance=grid.zeroValue)
         grid.transform = vdb.createLinearTransform([[h, 0, 0, 0], [0, h, 0, 0], [0, 0, h, 0], [x, y, z, 1]])
-        for fact, value in (facts or {}).items():
-            grid[fact] = value
+        for key, value in (metadata or {}).items():
+            grid[key] = value
         last = tuple(i + n - 1 for i, n in zip(first, domain.shape, strict=True))
-        for corner in (first, last) if whole_box else ():
+        for corner in (first, last) if host.whole_box else ():
             grid.getAccessor().setActiveState(corner, True)
-    if metadata is not None:
-        grids["density"][SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
+    if settings is not None:
+        grids["density"][SETTINGS] = json.dumps(dict(settings), sort_keys=True)
     with atomic_path(path) as aside:
         try:
             vdb.write(str(aside), grids=list(grids.values()))

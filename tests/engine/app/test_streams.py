@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import ENVIRONMENT, MODULE, QUICK, command, refused
-from PIL import Image
+from command_line import ENVIRONMENT, MODULE, command, refused
 
 from smokelift.app.progress import printable_lines
 from smokelift.output.index import SequenceError
@@ -133,48 +132,43 @@ assert environment == dict(os.environ)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+def of_system(number: int, path: str | None = None) -> OSError:
+    """The system's error of a number, of a file or of none."""
+    return OSError(number, os.strerror(number), *([path] if path else []))
+
+
+def unwritten(reason: OSError | None) -> SequenceError:
+    """The error of a sequence that could not be written, for a reason."""
+    error = SequenceError("It could not be written.")
+    error.__cause__ = reason
+    return error
+
+
+LIMITS = "gives no more memory or threads"
+
+
 @pytest.mark.parametrize(
-    "error",
+    ("error", "status", "said", "later"),
     [
-        BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)),
-        OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)),
-        RuntimeError("can't start new thread"),
+        (of_system(errno.EAGAIN), 3, LIMITS, True),
+        (of_system(errno.ENOMEM), 3, LIMITS, True),
+        (RuntimeError("can't start new thread"), 3, LIMITS, True),
+        (unwritten(of_system(errno.ENOSPC)), 2, "It could not be written.", True),
+        (unwritten(of_system(errno.EACCES)), 2, "It could not be written.", False),
+        (unwritten(None), 2, "It could not be written.", False),
+        (of_system(errno.ENOSPC, "page.png"), 2, "page.png: cannot be written: the disk is full", True),
+        (of_system(errno.EACCES, "page.png"), 2, "page.png: Permission denied", False),
     ],
 )
-def test_limits_of_the_system_are_said_to_be_limits(shot, capsys, monkeypatch, error) -> None:
+def test_a_failure_has_its_status_its_sentence_and_whether_it_may_pass(
+    shot, capsys, monkeypatch, error, status, said, later
+) -> None:
     def fail(_choice: str) -> None:
         raise error
 
     monkeypatch.setattr(device, "start", fail)
-    assert "gives no more memory or threads" in refused(capsys, "inspect", shot, status=3)
-
-
-@pytest.mark.parametrize(
-    ("reason", "later"),
-    [
-        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), True),
-        (OSError(errno.EACCES, os.strerror(errno.EACCES)), False),
-        (None, False),
-    ],
-)
-def test_json_says_whether_a_failure_may_pass(shot, capsys, monkeypatch, reason, later) -> None:
-    def fail(_choice: str) -> None:
-        raise SequenceError("It could not be written.") from reason
-
-    monkeypatch.setattr(device, "start", fail)
-    assert command("inspect", shot, "--progress", "json") == 2
-    error = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert error == {"event": "error", "text": "It could not be written.", "status": 2, "later": later}
-
-
-@pytest.mark.parametrize(
-    ("number", "said"), [(errno.ENOSPC, "cannot be written: the disk is full"), (errno.EACCES, "Permission denied")]
-)
-def test_an_error_of_the_system_is_a_sentence(shot, tmp_path, capsys, monkeypatch, number, said) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise OSError(number, os.strerror(number))
-
-    monkeypatch.setattr(Image.Image, "save", fail)
-    page = tmp_path / "page.png"
-    assert refused(capsys, "inspect", shot, "--page", page, *QUICK) == f"{page}: {said}"
-    assert not list(tmp_path.glob("*page*"))
+    assert command("inspect", shot, "--progress", "json") == status
+    event = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (event["event"], event["status"], event["later"]) == ("error", status, later)
+    assert said in event["text"]
+    assert said in refused(capsys, "inspect", shot, status=status)
