@@ -14,7 +14,7 @@ from urllib.parse import quote
 from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, is_finished, read_index
 from smokelift.checks import counted
-from smokelift.output.files import atomic_path
+from smokelift.checks.whole_files import atomic_path
 
 _STYLE = """
 body { background: #1a1a1c; color: #e8e8e8; font: 15px sans-serif; margin: 1.5em }

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import psutil
 
 from smokelift.batch.shots import BatchShot
-from smokelift.output.files import atomic_path
+from smokelift.checks.whole_files import atomic_path
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.lock import Lock
 from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE

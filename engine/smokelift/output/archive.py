@@ -11,7 +11,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.output.files import atomic_path
+from smokelift.checks.whole_files import atomic_path
 
 Shape = tuple[int, ...]
 

@@ -25,8 +25,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME
-from smokelift.output.files import INDEX, atomic_path, frame_path, proxy_path
+from smokelift.output.files import INDEX, frame_path, proxy_path
 from smokelift.output.host import HOSTS, Host, HostName
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence

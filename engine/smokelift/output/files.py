@@ -1,13 +1,11 @@
-"""The files in the directory of a sequence: their names, their content, and how they get there whole or not at all."""
+"""The files in the directory of a sequence: their names, and their content."""
 
 from __future__ import annotations
 
 import errno
 import hashlib
-import os
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 INDEX = "sequence.json"
@@ -48,27 +46,6 @@ def is_foreign(name: str) -> bool:
     """
     known = (INDEX, RESUME, LOCK, BACKGROUND, *PICTURES)
     return not (name in known or name.startswith(".") or _FRAME.fullmatch(name))
-
-
-@contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Give a hidden path beside ``path`` to write to, and rename it to ``path`` when the block ends well.
-
-    After an exception nothing is left and an older ``path`` is untouched; after a kill a hidden
-    ``.NAME.PID.tmp`` may stay behind.
-    """
-    path = Path(path)
-    aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        yield aside
-        with aside.open("rb+") as file:  # else a power cut could leave the new name with nothing in it
-            os.fsync(file.fileno())
-        aside.replace(path)
-    except BaseException as error:
-        aside.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, str(aside)):  # the name that was asked for
-            error.filename = str(path)
-        raise
 
 
 def checksum(paths: Iterable[Path]) -> str:

@@ -15,8 +15,9 @@ import numpy.typing as npt
 import OpenEXR
 from PIL import Image, ImageDraw
 
+from smokelift.checks.whole_files import atomic_path
 from smokelift.footage.images import ImageError, linear_to_srgb
-from smokelift.output.files import DISK_FULL, atomic_path
+from smokelift.output.files import DISK_FULL
 
 Tile = npt.NDArray[np.uint8]
 """An sRGB picture (rows, columns, 3)."""

@@ -16,10 +16,10 @@ from typing import Any, get_origin, get_type_hints
 import numpy as np
 
 from smokelift.checks import shown
-from smokelift.output.files import INDEX, MAX_START_NUMBER, atomic_path
+from smokelift.checks.whole_files import atomic_path, read_text
+from smokelift.output.files import INDEX, MAX_START_NUMBER
 from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
-from smokelift.scene.toml_files import read_text
 
 FORMAT = 1
 """Version of the file's structure; any other is refused."""

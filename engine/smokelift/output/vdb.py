@@ -26,8 +26,8 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.checks.array_types import Array
+from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME
-from smokelift.output.files import atomic_path
 from smokelift.output.host import BLENDER, Host
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around

@@ -19,6 +19,7 @@ from typing import Any
 import numpy.typing as npt
 
 from smokelift.checks import counted
+from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME, VELOCITY, write_arrays
 from smokelift.output.files import (
     BACKGROUND,
@@ -27,7 +28,6 @@ from smokelift.output.files import (
     LOCK,
     MAX_START_NUMBER,
     RESUME,
-    atomic_path,
     checksum,
     frame_path,
     is_foreign,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from smokelift.checks import UNDETERMINED, Finding
-from smokelift.output.files import atomic_path
+from smokelift.checks.whole_files import atomic_path
 from smokelift.report.views import fact, sentence
 
 PAGE_KINDS = (".png", ".html")

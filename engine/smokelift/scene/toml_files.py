@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,13 +12,11 @@ from typing import Any
 import tomli_w
 
 from smokelift.checks import listed, printable, shown
+from smokelift.checks.whole_files import atomic_path, read_text
 from smokelift.scene.checks import SceneError
 
 Place = tuple[str | int, ...]
 """Names of nested tables and a key, with the index of a table in a list of them: ``("lights", 1, "direction")``."""
-
-LARGEST_TEXT = 64 * 2**20
-"""Bytes of a text file, at most: the matrices of a camera that moves through 200,000 frames."""
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w\-.\"' ]+?)\s*\]")
 _KEY = re.compile(r"\s*([\w\-.\"' ]+?)\s*=")
@@ -73,35 +69,8 @@ def write_toml(path: Path, data: Mapping[str, Any], comments: Sequence[str] = ()
     if path.is_dir():
         raise SceneError(f"{path}: is a folder; give the name of a file")
     top = "".join(f"# {printable(line)}\n" for line in listed(comments, str, "comments", "a list of lines"))
-    aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with atomic_path(path) as aside:
         aside.write_text(top + tomli_w.dumps(data), encoding="utf-8")
-        aside.replace(path)
-    except OSError as error:
-        error.filename = str(path)  # the name that was asked for
-        raise
-    finally:
-        with suppress(OSError):  # what failed before says why
-            aside.unlink(missing_ok=True)
-
-
-def read_text(path: Path) -> str:
-    """Read a text file in UTF-8.
-
-    It raises OSError with the path, if it cannot be read, is no regular file, is too large or holds no text.
-    """
-    if not path.is_file() and path.exists():
-        raise OSError(f"{path}: cannot be read: it is a folder, a pipe or a device, not a file")
-    try:
-        if path.stat().st_size > LARGEST_TEXT:
-            raise OSError(f"{path}: cannot be read: it holds more than {LARGEST_TEXT >> 20} MiB; give a smaller file")
-        return path.read_text(encoding="utf-8-sig")  # some editors on Windows begin a file with a byte order mark
-    except UnicodeDecodeError as error:
-        raise OSError(f"{path}: is not a text file in UTF-8; save it as one") from error
-    except OSError as error:
-        if error.strerror is None:
-            raise
-        raise type(error)(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _find_lines(text: str) -> dict[Place, int]:

@@ -7,8 +7,8 @@ import json
 
 from smokelift.app.options import Command, named_path, require_folder
 from smokelift.app.progress import Reporter
+from smokelift.checks.whole_files import atomic_path
 from smokelift.evaluation.evaluate import evaluate
-from smokelift.output.files import atomic_path
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 
