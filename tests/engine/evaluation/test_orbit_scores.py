@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.evaluation.orbit_scores import AZIMUTHS, orbit_scores
-from smokelift.evaluation.orbit_shapes import SHAPES
+from smokelift.evaluation.orbit_shapes import BANDS, SHAPES
 from smokelift.scene import CompleteScene, completed
 
 
@@ -53,6 +53,9 @@ def test_shapes_along_the_cameras_rays_stand_beside_the_truths(plume, scene, per
         assert perfect[name] == perfect[f"{name}_by_azimuth"][0]
     assert flat["depth_over_width"] > 1.5 * flat["depth_over_width_truth"]
     assert flat["ray_length"] > 1.5 * flat["ray_length_truth"]
+    bands = zip(flat["depth_over_width_by_height"], flat["depth_over_width_truth_by_height"], strict=True)
+    there = [(found, true) for found, true in bands if true is not None]
+    assert 2 <= len(there) < BANDS and all(found > 1.5 * true for found, true in there)
     across = flat["shape_azimuths"].index(90)
     assert flat["ray_length_by_azimuth"][across] < flat["ray_length"]
     turned = orbit_scores(scene, 5, lambda frame: np.ascontiguousarray(np.rot90(truth(frame), 1, (0, 1))))

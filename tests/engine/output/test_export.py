@@ -189,7 +189,8 @@ def test_every_frame_has_its_file() -> None:
         "float3 inputs:in1 = (4, 2, 1)",
         "float3 inputs:in1 = (1, 3, 4)",
         "float inputs:anisotropy = 0.1",
+        'fieldName = "velocity"\n            token vectorDataRoleHint = "Vector"',
     ):
         assert line in text
-    assert text.count("field:velocity") == 1
+    assert text.count("field:velocity") == text.count("vectorDataRoleHint") == 1
     assert text.count("{") == text.count("}")

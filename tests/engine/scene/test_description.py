@@ -99,5 +99,8 @@ def test_a_camera_that_does_not_see_the_domain_is_refused() -> None:
     inside = Camera.look_at((0, 0, 1.5), (0, 5, 1.5), fov_y_degrees=30, size=size)
     assert Scene(camera=inside, domain=domain).camera == inside
     assert Scene(camera=moving_camera((50, -7, 1.5), (0, -7, 1.5)), domain=domain).domain == domain
-    with pytest.raises(SceneError, match="does not see the domain"):
-        Scene(camera=moving_camera((50, -7, 1.5), (40, -7, 1.5)), domain=domain)
+    beside = Camera.look_at((5, -7, 1.5), (5, 0, 1.5), fov_y_degrees=30, size=size)
+    parallel = replace(beside, type="orthographic", fx=20, fy=20)  # sees 1.6 m to each side
+    for camera in (moving_camera((50, -7, 1.5), (40, -7, 1.5)), parallel):
+        with pytest.raises(SceneError, match="does not see the domain"):
+            Scene(camera=camera, domain=domain)
