@@ -99,7 +99,6 @@ def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys, nu
 
 
 def test_an_interrupt_while_writing_is_quiet(shot, tmp_path, capsys, monkeypatch) -> None:
-    """Ctrl-C in the middle of a file: one sentence, no half file, and nothing cries out afterwards."""
     cries: list[Any] = []
     opened = []
     real = zipfile.ZipFile.open

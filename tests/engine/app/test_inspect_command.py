@@ -16,7 +16,6 @@ from smokelift.setup.settings import QUALITIES
 
 
 def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
-    """The same from inspect, as sentences and as JSON, and with the sequence, each with its figures."""
     kept = Sequence.open(finished).choices
     assert [choice["what"] for choice in kept] == [
         "resolution", "scattering", "velocity grid coarsening",
@@ -89,7 +88,6 @@ def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -
 
 
 def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) -> None:
-    """Written, read and run, it differs by no more than noise from the run that estimates for itself."""
     clip, scene = plume.scene.clip.path, tmp_path / "scene.toml"
     words = ("--frames", "0:2", "--detail", "0", *QUICK)
     assert command("inspect", clip, "--write", scene, *words) == 0

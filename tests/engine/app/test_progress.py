@@ -70,7 +70,6 @@ def test_what_passes_between_frames_counts(capsys, monkeypatch) -> None:
 
 
 def test_text_names_what_matters(capsys) -> None:
-    """Notes, the fit, frames without smoke and the end are readable; nothing is taken for markup."""
     with reporter("text") as say:
         say.note("Light [not] given: /a/[bold]path")
         say.start(3, 0)

@@ -105,7 +105,6 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
 
 
 def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys, monkeypatch) -> None:
-    """The seconds of what was simulated before count too; frames that are copied from the clip took none."""
     out = tmp_path / "out"
     words = ("continue", finished, "--out", out, "--npz", "--frames", 3, "--progress", "json")
     assert command(*words) == 0

@@ -69,7 +69,6 @@ def test_the_truth_itself_is_perfect(truth) -> None:
 
 
 def test_each_mistake_shows_where_it_belongs(truth) -> None:
-    """Half the mass; smoke a voxel too deep; a velocity that is half as fast; a step that does not fit."""
     half, deep, slow = VolumeMeans(truth), VolumeMeans(truth), VolumeMeans(truth)
     still = np.zeros((*SHAPE, 3), np.float32)
     for frame in range(4):

@@ -30,7 +30,6 @@ def preview(sequence: Sequence, scene: Scene) -> Preview:
 
 @pytest.mark.parametrize("count", [1, 5])
 def test_a_contact_sheet_has_the_input_and_every_view(plume, tmp_path, count) -> None:
-    """Rows of frames, columns of input and views, whatever the number of frames; smoke in every picture."""
     sequence = at_rest(plume.scene, plume.densities[:count], tmp_path / "out")
     rows, titles, labels = preview(sequence, plume.scene).contact_sheet()
     assert len(labels) == len(rows) and 1 <= len(rows) <= count
@@ -92,7 +91,6 @@ def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
     ],
 )
 def test_a_plate_does_not_turn_along(plume, tmp_path, plate, scattering, behind) -> None:
-    """The turning view has one color behind it, from its first frame on; the front has the plate."""
     picture = np.repeat(np.float32(plate), 28)[:, None, None] * np.ones((1, 40, 3), np.float32)
     write_image(tmp_path / "plate.exr", picture)
     scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"), scattering=scattering)
@@ -105,7 +103,6 @@ def test_a_plate_does_not_turn_along(plume, tmp_path, plate, scattering, behind)
 
 
 def test_the_smoke_of_every_frame_is_in_the_part_from_all_sides(plume, tmp_path) -> None:
-    """Smoke that leaves the middle of the box is turned about itself, and is not cut off at the edges."""
     moved = [np.roll(density, (6, -6), (0, 1)) for density in plume.densities]
     sequence = at_rest(plume.scene, moved, tmp_path / "out")
     framing = frame_smoke(sequence)

@@ -36,7 +36,6 @@ def test_a_clean_plate_stands_behind_what_the_camera_itself_shows(plume, tmp_pat
 
 
 def test_a_moving_camera_is_followed(plume, tracked, tmp_path) -> None:
-    """In front each frame is seen as it was filmed, before its own plate; turned by so much from there."""
     scene = replace(tracked, background=Background(image=tmp_path / "plate_#.exr"))
     for n in range(5):
         write_image(tmp_path / f"plate_{n}.exr", np.full((56, 40, 3), 0.1 * n, np.float32))

@@ -38,7 +38,6 @@ def test_a_picture_that_does_not_fit_is_an_error_of_the_system(
 
 @pytest.mark.parametrize("name", ["video.mp4", "video.mkv", "video.mov", "video.webm"])
 def test_a_video_reads_back(tmp_path, name) -> None:
-    """Frames, rate and gray levels survive in every kind of file that is offered; odd sides lose a pixel."""
     levels = [0.1, 0.3, 0.6]
     frames = (np.full((33, 47, 3), level, np.float32) for level in levels)
     write_video(tmp_path / name, frames, 12.0)

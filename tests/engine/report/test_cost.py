@@ -79,7 +79,6 @@ def test_the_forecast_covers_what_was_measured(size, pixels, fraction, mebibytes
 
 
 def test_a_voxel_a_pixel_fits_where_smoke_fills_little() -> None:
-    """A plume of 1080p takes 7 GB; the same box full of smoke does not fit, nor does a velocity as fine."""
     large, plume = (524, 524, 952), replace(WORK, pixels=FULL_HD, largest=0.05)
     fine = replace(plume.settings, velocity=replace(plume.settings.velocity, coarsening=0))
     assert 5e9 < memory_needed(large, plume) < 8e9
@@ -143,7 +142,6 @@ def test_time_without_detail_and_of_the_papers_method(seconds) -> None:
 
 
 def test_the_machine_is_timed_by_its_processor(monkeypatch) -> None:
-    """So other programs hardly change a forecast."""
     clock = iter([10.0, 18.0])
     monkeypatch.setattr(cost.time, "process_time", lambda: next(clock))
     solved = cost.WORKERS * cost.TIMES * 64**3

@@ -21,7 +21,6 @@ def known(scene: Scene, settings: Settings) -> dict[str, dict[str, str]]:
 
 
 def test_what_is_given_is_said_to_be_given(plume, draft) -> None:
-    """With its value, and without a sentence."""
     medium = replace(plume.scene.medium, extinction=20.0, color=(1.0, 0.5, 0.25))
     lines = known(replace(plume.scene, medium=medium), draft)
     for what in ("background", "camera", "scale", "box", "resolution", "extinction", "albedo", "smoke color", "light"):

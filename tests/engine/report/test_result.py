@@ -30,7 +30,6 @@ def parts(shot: Shot) -> dict[str, Finding]:
 
 
 def test_only_what_the_pictures_show_is_measured(shot) -> None:
-    """The rays' optical depths are, the distribution along them is not, and the velocity follows from both."""
     assert [(found.about, found.source) for found in provenance(shot)] == [
         ("optical depth of every ray", "measured"),
         ("velocity", "estimated"),
@@ -101,7 +100,6 @@ def test_a_fit_that_explains_little_is_said(left: float, kind: str | None) -> No
 
 @pytest.mark.parametrize(("left", "said"), [(0.2, False), (0.3, True)])
 def test_what_may_be_no_smoke_is_foreseen(left: float, said: bool) -> None:
-    """By what the set-up's fit leaves, unless it made none, fire shines or the light is at fault."""
     found = Finding("compared scattering", {"error": left}, about="scattering", value="single", source="measured")
     shot = SimpleNamespace(fire=None, findings=(Finding("open box"), found))
     assert expected_shortcomings(shot) == (

@@ -88,7 +88,6 @@ def test_a_sentence_fills_its_figures_in(finding: Finding, said: str) -> None:
 
 
 def test_a_line_of_a_table_has_a_short_value_for_a_sidebar() -> None:
-    """That of what is given is enough; what is assumed is undetermined, and says why."""
     line = fact(PLACE)
     assert line == {
         "what": "axis depth", "value": "0.21 m before the middle of the box, give or take 0.12 m",

@@ -89,7 +89,6 @@ def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: floa
 
 @both
 def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
-    """What was at the picture's right is now near: the camera stands at +X and looks along -X, upright."""
     side = orbit(camera, DOMAIN, 90)
     np.testing.assert_allclose(side.position, (4, 0, 0.8), atol=1e-12)
     matrix = np.array(side.matrix)
