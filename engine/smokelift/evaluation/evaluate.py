@@ -23,7 +23,7 @@ from smokelift.render import Volume
 TILE_AZIMUTHS, TILE_ROWS = tuple(range(0, 180, 18)), 240
 """Azimuths of the pictures (degrees), and their pixels."""
 
-SHOWN = ("patches", "patches_worst", "patches_own", "edges", "flicker")
+LABEL_SCORES = ("patches", "patches_worst", "patches_own", "edges", "flicker")
 """Scores in the label of a picture's row."""
 
 
@@ -48,7 +48,8 @@ class Evaluation:
         sequence = self.sequence
         number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
         scores = self.figures["orbit"]
-        shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in SHOWN if scores[name] is not None)
+        known = [name for name in LABEL_SCORES if scores[name] is not None]
+        shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in known)
         rows = [
             (f"frame {number}, beside the {scores['reference']}: {shown}", sequence.scene, sequence.density(number))
         ]

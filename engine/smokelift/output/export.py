@@ -2,10 +2,10 @@
 
 What is left out or rounded does not show in a picture of 8 bits:
 
-- Smoke that is so thin that a box full of it hides less than `THIN` of what is behind is left out.
+- Smoke that is so thin that a box full of it hides less than `MIN_OPACITY` of what is behind is left out.
 - Quantized densities are multiples of a power of two; rounding errors along a ray are independent, so over n voxels of
   h meters they change the optical depth by extinction * h * sqrt(n / 12) steps (root mean square), which is kept below
-  `SHADE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
+  `HALF_CODE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
 - Quantized velocities move smoke by at most half of `VELOCITY_STEP` voxels per frame.
 
 Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
@@ -44,10 +44,10 @@ USD = "smoke.usda"
 ASSET = "smoke.blend"
 """What the Blender extension adds; it stays when an export is replaced."""
 
-THIN = 1e-3
+MIN_OPACITY = 1e-3
 """Fraction of the light that smoke may hide and yet be left out."""
 
-SHADE = 1 / 510
+HALF_CODE = 1 / 510
 """Half a step of a picture of 8 bits."""
 
 VELOCITY_STEP = 1 / 16
@@ -291,7 +291,7 @@ def write_proxies(sequence: Sequence) -> Iterator[int]:
 def density_step(domain: Domain, extinction: float) -> float:
     """Step of a quantized density: the largest power of two whose rounding does not show (see the module)."""
     longest = max(domain.resolution)
-    return _power_of_two(SHADE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
+    return _power_of_two(HALF_CODE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
 
 
 def velocity_step(domain: Domain, fps: float) -> float:
@@ -301,7 +301,7 @@ def velocity_step(domain: Domain, fps: float) -> float:
 
 def _thinned(density: Array, domain: Domain, extinction: float) -> Array:
     longest = max(domain.resolution) * domain.voxel_size
-    return np.where(density < THIN / (extinction * longest), np.float32(0.0), density)
+    return np.where(density < MIN_OPACITY / (extinction * longest), np.float32(0.0), density)
 
 
 def _rounded(values: Array, step: float) -> Array:

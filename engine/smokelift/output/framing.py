@@ -11,7 +11,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.scene import Camera, Domain, orbit
 from smokelift.scene.projection import project_points
 
-VISIBLE = 0.01
+MIN_VISIBLE_DEPTH = 0.01
 """Optical depth from which smoke is seen: it changes what is behind it by as much, which is a step or two of 8 bits."""
 
 MARGIN_FRACTION = 0.05
@@ -91,8 +91,8 @@ def _smoke_box(sequence: Sequence) -> Domain:
     front, side = np.zeros((nx, nz), np.bool_), np.zeros((ny, nz), np.bool_)
     for number in sequence.frames:
         density = sequence.density(number)
-        front |= opacity * density.sum(1) > VISIBLE
-        side |= opacity * density.sum(0) > VISIBLE
+        front |= opacity * density.sum(1) > MIN_VISIBLE_DEPTH
+        side |= opacity * density.sum(0) > MIN_VISIBLE_DEPTH
     if not (front.any() and side.any()):
         return domain
     x, y, z = (np.flatnonzero(line) for line in (front.any(1), side.any(1), front.any(0)))

@@ -28,7 +28,7 @@ from smokelift.scene import Camera, orbit
 
 SHEET_ANGLES = (20, 45, 90)
 ORBIT_ANGLES = tuple(range(0, 360, 30))
-SIDE = 90
+SIDE_DEGREES = 90
 """Degrees by which the scene's camera is carried around the smoke."""
 
 SHEET_HEIGHT, PREVIEW_HEIGHT = 320, 480
@@ -40,7 +40,7 @@ ORBIT_COLUMNS = 6
 
 STRIP_FRAMES = 8
 
-TURN = 90.0
+MAX_DEGREES_PER_SECOND = 90.0
 """Degrees per second by which the video's camera turns at most; in longer clips it goes around once."""
 
 
@@ -87,16 +87,16 @@ class Preview:
         last = min(len(frames), frames.index(self._late) + STRIP_FRAMES // 2)
         numbers = frames[max(0, last - STRIP_FRAMES) :][:STRIP_FRAMES]
         camera = self._camera(SHEET_HEIGHT)
-        viewers = self._viewers(camera, [SIDE])
+        viewers = self._viewers(camera, [SIDE_DEGREES])
         filmed = [self._filmed(number, camera) for number in numbers]
         turned = [self._rendered(number, viewers)[0] for number in numbers]
-        labels = ["input", f"reconstruction from {_degrees(SIDE)}"]
+        labels = ["input", f"reconstruction from {_degrees(SIDE_DEGREES)}"]
         return Sheet([filmed, turned], [f"frame {number}" for number in numbers], labels)
 
     def video(self) -> Iterator[Image]:
         """Input, reconstruction and a view that turns while the smoke moves side by side, frame by frame."""
         frames, camera = self.sequence.frames, self._camera(PREVIEW_HEIGHT)
-        step = min(TURN / self.clip.fps, 360 / len(frames))
+        step = min(MAX_DEGREES_PER_SECOND / self.clip.fps, 360 / len(frames))
         turns = [orbit(camera.at(n), self.framing.box, step * n) for n in range(frames[-1])]
         turning = replace(turns[0], matrices=tuple(turned.matrix for turned in turns))
         viewers = [self._own_viewer(camera), Viewer(self.sequence.scene, turning, self._behind)]

@@ -44,7 +44,7 @@ and for those beyond, whose detail is found from coarse to fine."""
 VIEW_FRACTION = 0.5
 """Part of a frame's time that each further view adds."""
 
-WITHOUT_DETAIL = 0.55
+SMOOTH_FRACTION = 0.55
 """Part of a frame's time that is left without detail in depth."""
 
 EXTRA_FRAMES = 2.0
@@ -66,17 +66,17 @@ BYTES_PER_PIXEL = 210
 BYTES_PER_VOXEL = 12, 230
 """Bytes at a run's peak for each voxel of the box, and in addition for each that may hold smoke."""
 
-SMALL = 2**23
+SMALL_GRID_VOXELS = 2**23
 """Voxels whose array takes 32 MiB. Smaller arrays get memory that the C library kept and has to clear, so they take all
 of it whether there is smoke or not."""
 
-BYTES_PER_VOXEL_OF_SMALL = 80, 100
-"""`BYTES_PER_VOXEL` of grids below `SMALL`."""
+BYTES_PER_VOXEL_OF_SMALL_GRID = 80, 100
+"""`BYTES_PER_VOXEL` of grids below `SMALL_GRID_VOXELS`."""
 
 BYTES_PER_VOXEL_OF_SOLVER = 145
 """Bytes for each voxel of the box that a velocity on the density's grid adds."""
 
-TIMED, TIMES = (64, 64, 64), 40
+TIMED_GRID, TIMED_SOLVES = (64, 64, 64), 40
 """Voxels of the grid whose solve is timed, and how often: the processor's clock of some systems counts in 16 ms."""
 
 WORKERS = 2
@@ -111,7 +111,7 @@ class Workload:
         The given ones: a velocity's grid that is chosen is coarse, and hardly takes memory.
     frames, views, pixels
         Numbers: of frames, of cameras, and of pixels in all cameras' pictures of one moment.
-    largest, mean
+    smoky_max, smoky_mean
         Fractions of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all.
     """
 
@@ -119,8 +119,8 @@ class Workload:
     frames: int
     views: int
     pixels: int
-    largest: float
-    mean: float
+    smoky_max: float
+    smoky_mean: float
 
     @staticmethod
     def of(shot: Shot, settings: Settings) -> Workload:
@@ -132,8 +132,8 @@ class Workload:
             frames=shot.length,
             views=len(shot.views),
             pixels=sum(width * height for width, height in (view.clip.size for view in shot.views)),
-            largest=max(fractions, default=0.0),
-            mean=smoky * fmean(fractions) if fractions else 0.0,
+            smoky_max=max(fractions, default=0.0),
+            smoky_mean=smoky * fmean(fractions) if fractions else 0.0,
         )
 
 
@@ -173,13 +173,13 @@ def estimate_cost(resolution: Resolution, work: Workload, prepared: Preparation)
         seconds=prepared.work + frames_seconds(resolution, work),
         memory=max(memory_needed(resolution, work), prepared.memory or 0),
         memory_free=memory_free(),
-        disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_PER_SMOKY_VOXEL_ON_DISK),
+        disk=round(work.frames * work.smoky_mean * math.prod(resolution) * BYTES_PER_SMOKY_VOXEL_ON_DISK),
     )
 
 
 def frames_seconds(resolution: Resolution, work: Workload) -> float:
     """Estimate the seconds of a run's frames, without the set-up, in a part of a second."""
-    return START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel()
+    return START_SECONDS + voxel_solves(resolution, work) * _seconds_per_voxel()
 
 
 def voxel_solves(resolution: Resolution, work: Workload) -> float:
@@ -188,21 +188,21 @@ def voxel_solves(resolution: Resolution, work: Workload) -> float:
     if work.settings.method == "paper":
         return work.frames * PAPER_VOXEL_SOLVES * voxels
     on_own_grid, beyond = SMOKY_VOXEL_SOLVES
-    smoky = work.mean * voxels
+    smoky = work.smoky_mean * voxels
     fitted = on_own_grid * min(smoky, MIN_COARSENED_VOXELS) + beyond * max(smoky - MIN_COARSENED_VOXELS, 0)
-    a_frame = (FRAME_VOXELS + VOXEL_SOLVES * voxels + fitted) * (1 + VIEW_FRACTION * (work.views - 1))
+    per_frame = (FRAME_VOXELS + VOXEL_SOLVES * voxels + fitted) * (1 + VIEW_FRACTION * (work.views - 1))
     if work.settings.detail == 0:
-        return work.frames * WITHOUT_DETAIL * a_frame
-    return (work.frames + EXTRA_FRAMES) * a_frame
+        return work.frames * SMOOTH_FRACTION * per_frame
+    return (work.frames + EXTRA_FRAMES) * per_frame
 
 
 def memory_needed(resolution: Resolution, work: Workload) -> int:
     """Return the bytes that a run takes at its peak."""
     voxels = math.prod(resolution)
-    a_voxel, a_smoky_voxel = BYTES_PER_VOXEL_OF_SMALL if voxels < SMALL else BYTES_PER_VOXEL
+    per_voxel, per_smoky_voxel = BYTES_PER_VOXEL_OF_SMALL_GRID if voxels < SMALL_GRID_VOXELS else BYTES_PER_VOXEL
     if work.settings.method == "paper" or work.settings.velocity.coarsening == 0:
-        a_voxel += BYTES_PER_VOXEL_OF_SOLVER
-    return round(BASE_BYTES + BYTES_PER_PIXEL * work.pixels + (a_voxel + work.largest * a_smoky_voxel) * voxels)
+        per_voxel += BYTES_PER_VOXEL_OF_SOLVER
+    return round(BASE_BYTES + BYTES_PER_PIXEL * work.pixels + (per_voxel + work.smoky_max * per_smoky_voxel) * voxels)
 
 
 def affordable_room(resolution: Resolution) -> float:
@@ -278,15 +278,15 @@ def _smoky_fractions(shot: Shot, settings: Settings) -> list[float]:
 
 
 @cache
-def _seconds_a_voxel() -> float:
+def _seconds_per_voxel() -> float:
     """Return the seconds that a Poisson solve takes on this machine for each voxel; timed once.
 
     By its processor time on one thread: what passes is up to three times as much while other programs, or a run
     of our own, are at work.
     """
-    field, began = np.zeros(TIMED, np.float32), 0.0
-    for n in range(TIMES + 1):
+    field, began = np.zeros(TIMED_GRID, np.float32), 0.0
+    for n in range(TIMED_SOLVES + 1):
         if n == 1:  # the first finds nothing in the caches
             began = time.process_time()
         scipy.fft.idctn(scipy.fft.dctn(field))  # on one thread: a system may allow no more
-    return (time.process_time() - began) / (WORKERS * TIMES * field.size)
+    return (time.process_time() - began) / (WORKERS * TIMED_SOLVES * field.size)

@@ -28,13 +28,13 @@ BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40)
 MASK = (255, 60, 60)
 """Color (sRGB) of the mask's outline."""
 
-ARROW = 0.35
+ARROW_LENGTH = 0.35
 """Length of a light's arrow over the diagonal of the box."""
 
-HEAD = 16.0
+ARROW_HEAD = 16.0
 """Length of the arrow's head in pixels."""
 
-STRONG = 16.0
+MAX_SHOWN_DEVIATION = 16.0
 """Deviation from the background that is shown brightest, in units of noise."""
 
 BINS = 96
@@ -99,7 +99,7 @@ def _light_starts(shot: Shot, domain: Domain) -> list[NDArray[np.float64]]:
     if shot.scene.scattering not in SHADOWED:
         return []
     middle = np.array(domain.centre)
-    length = ARROW * float(np.linalg.norm(np.array(domain.max) - domain.min))
+    length = ARROW_LENGTH * float(np.linalg.norm(np.array(domain.max) - domain.min))
     ways = [np.array(light.direction) for light in shot.scene.lights if isinstance(light, DirectionalLight)]
     ways += [middle - light.position for light in shot.scene.lights if isinstance(light, PointLight)]
     return [middle - length * way / np.linalg.norm(way) for way in ways]
@@ -120,7 +120,7 @@ def _line(
     along = pixels[-1] - pixels[-2]
     length = float(np.hypot(*along))
     if head and length > 0:
-        along *= HEAD / length
+        along *= ARROW_HEAD / length
         across = 0.5 * np.array([-along[1], along[0]])
         tip, base = pixels[-1], pixels[-1] - along
         draw.polygon([(float(x), float(y)) for x, y in (tip, base + across, base - across)], fill=color)
@@ -128,7 +128,7 @@ def _line(
 
 def _matte_picture(seen: Matte) -> Tile:
     """The deviation from the background, the more orange the surer it is smoke."""
-    strength = np.clip(seen.deviation / STRONG, 0, 1)[..., None]
+    strength = np.clip(seen.deviation / MAX_SHOWN_DEVIATION, 0, 1)[..., None]
     return np.asarray(np.rint(strength * (255 + seen.share[..., None] * (np.array(SMOKE) - 255))), np.uint8)
 
 

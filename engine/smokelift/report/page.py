@@ -34,7 +34,7 @@ _WIDTH = COLUMNS * TILE[0] + (COLUMNS + 1) * _GAP
 _STARTS = (_GAP, 170, 520, 670)
 """Left edges of the columns of the table, in pixels."""
 
-PACKED = 2
+PNG_COMPRESSION = 2
 """Compression level of PNG files: half of the time of the usual 6, and a seventh more bytes."""
 
 _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165), (255, 170, 70)
@@ -66,7 +66,7 @@ def write_page(path: Path, page: Page) -> None:
         if path.suffix.lower() == ".html":
             aside.write_text(_as_html(page), encoding="utf-8")
         else:
-            _as_picture(page).save(aside, format="PNG", compress_level=PACKED)
+            _as_picture(page).save(aside, format="PNG", compress_level=PNG_COMPRESSION)
 
 
 def tile_size(width: int, height: int) -> tuple[int, int]:
@@ -150,5 +150,5 @@ def _as_html(page: Page) -> str:
 def _data(picture: NDArray[np.uint8]) -> str:
     """A picture as a data URL."""
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, format="PNG", compress_level=PACKED)
+    Image.fromarray(picture).save(file, format="PNG", compress_level=PNG_COMPRESSION)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"

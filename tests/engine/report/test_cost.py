@@ -25,7 +25,7 @@ from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
-WORK = Workload(Settings.preset(), frames=24, views=1, pixels=512 * 768, largest=0.4, mean=0.2)
+WORK = Workload(Settings.preset(), frames=24, views=1, pixels=512 * 768, smoky_max=0.4, smoky_mean=0.2)
 EXAMPLE, BUILT_IN, FULL_HD = 256 * 384, 512 * 768, 1920 * 1080
 MEASURED = [
     ((48, 48, 72), EXAMPLE, 0.073, 182, 13),
@@ -55,7 +55,7 @@ def free(monkeypatch):
 @pytest.fixture
 def seconds(monkeypatch):
     """Forecast the seconds of a run on a cube, on a machine of known speed."""
-    monkeypatch.setattr(cost, "_seconds_a_voxel", lambda: 1e-8)
+    monkeypatch.setattr(cost, "_seconds_per_voxel", lambda: 1e-8)
     return lambda work=WORK, prepared=PREPARED: estimate_cost(CUBE, work, prepared).seconds
 
 
@@ -70,19 +70,19 @@ def suggestion(resolution: tuple[int, int, int], given: bool = True) -> tuple[in
 
 @pytest.mark.parametrize(("size", "pixels", "fraction", "mebibytes", "million_solves"), MEASURED)
 def test_the_forecast_covers_what_was_measured(size, pixels, fraction, mebibytes, million_solves) -> None:
-    work = replace(WORK, pixels=pixels, largest=fraction, mean=fraction)
+    work = replace(WORK, pixels=pixels, smoky_max=fraction, smoky_mean=fraction)
     if mebibytes:
         assert 0.97 * mebibytes < memory_needed(size, work) / 2**20 < 1.5 * mebibytes
     if million_solves:
-        a_frame = voxel_solves(size, replace(work, frames=11)) - voxel_solves(size, replace(work, frames=10))
-        assert million_solves / 1.5 < a_frame / 1e6 < 1.5 * million_solves
+        per_frame = voxel_solves(size, replace(work, frames=11)) - voxel_solves(size, replace(work, frames=10))
+        assert million_solves / 1.5 < per_frame / 1e6 < 1.5 * million_solves
 
 
 def test_a_voxel_a_pixel_fits_where_smoke_fills_little() -> None:
-    large, plume = (524, 524, 952), replace(WORK, pixels=FULL_HD, largest=0.05)
+    large, plume = (524, 524, 952), replace(WORK, pixels=FULL_HD, smoky_max=0.05)
     fine = replace(plume.settings, velocity=replace(plume.settings.velocity, coarsening=0))
     assert 5e9 < memory_needed(large, plume) < 8e9
-    assert memory_needed(large, replace(plume, largest=1.0)) > 60e9
+    assert memory_needed(large, replace(plume, smoky_max=1.0)) > 60e9
     assert memory_needed(large, replace(plume, settings=fine)) > 40e9
 
 
@@ -113,10 +113,8 @@ def test_nothing_fits_is_said_too(free) -> None:
 
 
 def test_more_frames_views_and_smoke_cost_more(seconds) -> None:
-    base, longer, more = (
-        estimate_cost(CUBE, work, PREPARED)
-        for work in (WORK, replace(WORK, frames=240), replace(WORK, mean=2 * WORK.mean, largest=2 * WORK.largest))
-    )
+    thicker = replace(WORK, smoky_mean=2 * WORK.smoky_mean, smoky_max=2 * WORK.smoky_max)
+    base, longer, more = (estimate_cost(CUBE, work, PREPARED) for work in (WORK, replace(WORK, frames=240), thicker))
     assert longer.disk == pytest.approx(10 * base.disk)
     assert longer.memory == base.memory < more.memory
     assert longer.seconds > 8 * base.seconds
@@ -138,14 +136,14 @@ def test_what_preparing_took_is_taken_again(seconds) -> None:
 def test_time_without_detail_and_of_the_papers_method(seconds) -> None:
     smooth = seconds(replace(WORK, settings=replace(WORK.settings, detail=0.0)))
     assert 1.5 * smooth < seconds() < 2.5 * smooth
-    assert seconds(replace(WORK, settings=Settings.preset(method="paper"), largest=1.0, mean=1.0)) > 5 * smooth
+    assert seconds(replace(WORK, settings=Settings.preset(method="paper"), smoky_max=1.0, smoky_mean=1.0)) > 5 * smooth
 
 
 def test_the_machine_is_timed_by_its_processor(monkeypatch) -> None:
     clock = iter([10.0, 18.0])
     monkeypatch.setattr(cost.time, "process_time", lambda: next(clock))
-    solved = cost.WORKERS * cost.TIMES * 64**3
-    assert cost._seconds_a_voxel.__wrapped__() == pytest.approx(8 / solved)
+    solved = cost.WORKERS * cost.TIMED_SOLVES * 64**3
+    assert cost._seconds_per_voxel.__wrapped__() == pytest.approx(8 / solved)
 
 
 # how many voxels may hold smoke
@@ -165,17 +163,17 @@ def fractions_of_a_run(shot: Shot) -> list[float]:
 
 def test_the_fraction_that_may_hold_smoke_is_that_of_the_run(shot) -> None:
     found, fractions = Workload.of(shot, SMOOTH), fractions_of_a_run(shot)
-    assert found.largest == pytest.approx(max(fractions), rel=0.02)
-    assert found.mean == pytest.approx(sum(fractions) / len(fractions), rel=0.1)
+    assert found.smoky_max == pytest.approx(max(fractions), rel=0.02)
+    assert found.smoky_mean == pytest.approx(sum(fractions) / len(fractions), rel=0.1)
     assert (found.frames, found.views, found.pixels) == (len(fractions), 1, 40 * 56)
     one, none = (Workload.of(replace(shot, smoky=shot.smoky[:n]), SMOOTH) for n in (1, 0))
-    assert one.mean == pytest.approx(one.largest / shot.length)
-    assert none.largest == none.mean == 0
-    assert Workload.of(shot, Settings.preset(method="paper")).largest == 1, "the paper's densities are anywhere"
+    assert one.smoky_mean == pytest.approx(one.smoky_max / shot.length)
+    assert none.smoky_max == none.smoky_mean == 0
+    assert Workload.of(shot, Settings.preset(method="paper")).smoky_max == 1, "the paper's densities are anywhere"
 
 
 def test_a_large_grid_is_measured_on_a_coarse_one(plume) -> None:
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, replace(SMOOTH, resolution=(96, 96, 128)))
         assert max(shot.optics.domain.resolution) > MAX_SIDE_VOXELS
-        assert 1 < Workload.of(shot, SMOOTH).largest / max(fractions_of_a_run(shot)) < 1.4
+        assert 1 < Workload.of(shot, SMOOTH).smoky_max / max(fractions_of_a_run(shot)) < 1.4
