@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import counted
-from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
+from smokelift.evaluation.frame_means import Figures, VolumeMeans, means, picture_figures
 from smokelift.evaluation.orbit import Orbit
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
@@ -138,12 +138,12 @@ def _true_density(sequence: Sequence, truth: Truth, number: int) -> Volume:
 
 
 def _against_truth(sequence: Sequence, truth: Truth) -> Figures:
-    means = VolumeMeans(truth)
+    volumes = VolumeMeans(truth)
     for number in sequence.frames:
         # the first frame's velocity is the second's
         velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None
-        means.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
-    return means.figures()
+        volumes.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
+    return volumes.figures()
 
 
 def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:
@@ -169,7 +169,8 @@ def _meters(size: npt.NDArray[np.float64]) -> str:
 
 def _against_view(sequence: Sequence, view: ReferenceView) -> Figures:
     viewer = Viewer(sequence.scene, view.camera, view.background)
-    means = PictureMeans()
-    for number in sequence.frames:
-        means.add(viewer.image(number, sequence.density(number), sequence.flame(number)), view.picture(number))
-    return {"name": view.name, "clip": str(view.clip.path), "size": list(view.camera.size), **means.figures()}
+    frames = [
+        picture_figures(viewer.image(number, sequence.density(number), sequence.flame(number)), view.picture(number))
+        for number in sequence.frames
+    ]
+    return {"name": view.name, "clip": str(view.clip.path), "size": list(view.camera.size), **means(frames)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,22 +24,10 @@ SURROUNDING_VOXELS = 2
 """Voxels around the smoke in which a velocity still matters: advection and motion blur reach there."""
 
 
-class PictureMeans:
-    """Pictures from one camera beside the true ones, in 8-bit sRGB values over the whole picture."""
-
-    def __init__(self) -> None:
-        self._frames: list[Figures] = []
-
-    def add(self, image: Image, truth: Image) -> Figures:
-        """Add a frame, linear radiance (rows, columns, 3), and return its own metrics."""
-        found, true = (eight_bit_values(picture) for picture in _without_copies(image, truth))
-        figures = {"psnr": metrics.psnr(found, true), "ssim": metrics.ssim(found, true)}
-        self._frames.append(figures)
-        return figures
-
-    def figures(self) -> Figures:
-        """Means over the frames; of decibels, those that are finite."""
-        return {name: finite_mean(frame[name] for frame in self._frames) for name in ("psnr", "ssim")}
+def picture_figures(image: Image, truth: Image) -> Figures:
+    """Metrics of a picture beside the true one, both linear radiance (rows, columns, 3), in their 8-bit sRGB values."""
+    found, true = (eight_bit_values(picture) for picture in _without_copies(image, truth))
+    return {"psnr": metrics.psnr(found, true), "ssim": metrics.ssim(found, true)}
 
 
 class VolumeMeans:
@@ -96,9 +84,14 @@ class VolumeMeans:
         }
 
     def figures(self) -> Figures:
-        """Means over the frames that are finite."""
-        names = dict.fromkeys(name for figures in self._frames for name in figures)
-        return {name: finite_mean(f[name] for f in self._frames if name in f) for name in names}
+        """Means over the frames."""
+        return means(self._frames)
+
+
+def means(frames: Sequence[Figures]) -> Figures:
+    """Means of each figure over the frames that have it and in which it is finite."""
+    names = dict.fromkeys(name for figures in frames for name in figures)
+    return {name: finite_mean(figures[name] for figures in frames if name in figures) for name in names}
 
 
 def finite_mean(values: Iterable[float | None]) -> float | None:

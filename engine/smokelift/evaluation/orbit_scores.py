@@ -10,9 +10,9 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.evaluation.frame_means import finite_mean
-from smokelift.evaluation.metrics import PatchStatistics, flicker, mean_gradient
+from smokelift.evaluation.metrics import PatchStatistics, RayShapes, flicker, mean_gradient
 from smokelift.evaluation.orbit import Orbit
-from smokelift.evaluation.orbit_shapes import SHAPE_AZIMUTHS, OrbitShapes
+from smokelift.evaluation.orbit_shapes import SHAPE_AZIMUTHS, azimuth_shapes, shape_means
 from smokelift.render import Volume
 from smokelift.scene import CompleteScene
 from smokelift.transport import Array
@@ -63,16 +63,17 @@ def orbit_scores(
     found: dict[str, list[list[float | None]]] = {name: [] for name in ("patches", "texture", "edges", "halo")}
     own: dict[str, list[list[float | None]]] = {"patches": [], "texture": []}
     fronts: list[PatchStatistics] = []
-    shapes, true_shapes = OrbitShapes(orbit.table), OrbitShapes(orbit.table)
+    shapes: list[list[RayShapes | None]] = []
+    true_shapes: list[list[RayShapes | None]] = []
     for frame in frames:
         smoke = density(frame)
-        shapes.add(smoke)
+        shapes.append(azimuth_shapes(orbit.table, smoke))
         pictures = _pictures(orbit, smoke, AZIMUTHS)
         if truth is None:
             true = _pictures(orbit, smoke, (0,))
         else:
             true_smoke = truth(frame)
-            true_shapes.add(true_smoke)
+            true_shapes.append(azimuth_shapes(orbit.table, true_smoke))
             true = _pictures(orbit, true_smoke, AZIMUTHS)
         references = [PatchStatistics.of(picture) for picture in true]
         sharp = [mean_gradient(picture) for picture in true]
@@ -101,8 +102,8 @@ def orbit_scores(
         **{f"{name}_by_azimuth": by_azimuth[name] for name in ("patches", "texture", "edges")},
         "patches_own_by_azimuth": None if truth is None else _means(own["patches"]),
         "shape_azimuths": list(SHAPE_AZIMUTHS),
-        **shapes.figures(),
-        **({} if truth is None else true_shapes.figures("_truth")),
+        **shape_means(shapes),
+        **({} if truth is None else shape_means(true_shapes, "_truth")),
     }
 
 

@@ -27,29 +27,27 @@ BANDS = 6
 """Bands of equal height, from the floor of the box up, for depth over width."""
 
 
-class OrbitShapes:
-    """Collects the shapes of frames."""
+def azimuth_shapes(table: Turntable, density: Volume) -> list[RayShapes | None]:
+    """Shapes of a frame's smoke (nx, ny, nz) along the rays of `SHAPE_AZIMUTHS`; None where there is none."""
+    upright = table.upright(density)
+    return [RayShapes.of(_turned(upright, table, degrees)) for degrees in SHAPE_AZIMUTHS]
 
-    def __init__(self, table: Turntable) -> None:
-        self._table = table
-        self._found: list[list[RayShapes | None]] = []
 
-    def add(self, density: Volume) -> None:
-        """Add a frame, (nx, ny, nz)."""
-        upright = self._table.upright(density)
-        self._found.append([RayShapes.of(_turned(upright, self._table, degrees)) for degrees in SHAPE_AZIMUTHS])
+def shape_means(frames: Iterable[list[RayShapes | None]], ending: str = "") -> dict[str, Any]:
+    """`SHAPES` along the camera's rays, by azimuth, and depth over width by height: means, their names with an ending.
 
-    def figures(self, ending: str = "") -> dict[str, Any]:
-        """`SHAPES` along the camera's rays, by azimuth, and depth over width by height, their names with an ending."""
-        by_azimuth = {name: [_mean(shapes, name) for shapes in zip(*self._found, strict=True)] for name in SHAPES}
-        front = [frame[0] for frame in self._found]
-        return {
-            **{f"{name}{ending}": values[0] for name, values in by_azimuth.items()},
-            **{f"{name}{ending}_by_azimuth": values for name, values in by_azimuth.items()},
-            f"depth_over_width{ending}_by_height": [
-                finite_mean(_band_ratio(shape, band) for shape in front if shape is not None) for band in range(BANDS)
-            ],
-        }
+    The frames are `azimuth_shapes`.
+    """
+    azimuths = list(zip(*frames, strict=True))
+    by_azimuth = {name: [_mean(shapes, name) for shapes in azimuths] for name in SHAPES}
+    front = [shape for shape in azimuths[0] if shape is not None]
+    return {
+        **{f"{name}{ending}": values[0] for name, values in by_azimuth.items()},
+        **{f"{name}{ending}_by_azimuth": values for name, values in by_azimuth.items()},
+        f"depth_over_width{ending}_by_height": [
+            finite_mean(_band_ratio(shape, band) for shape in front) for band in range(BANDS)
+        ],
+    }
 
 
 def _mean(shapes: Iterable[RayShapes | None], name: str) -> float | None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
+from smokelift.evaluation.frame_means import VolumeMeans, eight_bit_values, finite_mean, means, picture_figures
 from smokelift.evaluation.truth import Truth, resampled
 from smokelift.transport import Velocity
 
@@ -47,10 +47,8 @@ def picture(shift: int = 0, size: tuple[int, int] = (96, 64)) -> np.ndarray:
 
 
 def test_a_shifted_picture_is_another_one() -> None:
-    score = PictureMeans()
-    score.add(picture(), picture())
-    alone = score.add(picture(9), picture())
-    figures = score.figures()
+    alone = picture_figures(picture(9), picture())
+    figures = means([picture_figures(picture(), picture()), alone])
     assert figures["psnr"] == alone["psnr"] < 30
     assert figures["ssim"] == pytest.approx((1 + alone["ssim"]) / 2)
 
