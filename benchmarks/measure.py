@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.baked import BLACK, FRONT, Volumes
 from smokelift import Camera, Clip, Reconstruction, Scene, Settings, prepare_shot
-from smokelift.evaluation.frame_means import PictureMeans, finite_mean
+from smokelift.evaluation.frame_means import finite_mean, means, picture_figures
 from smokelift.pipeline import Frame, compose
 from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import CompleteScene, completed
@@ -59,10 +59,10 @@ def view_figures(
     """
     found: Figures = {}
     for view, camera in cameras.items():
-        renderer, means = scene_renderer(scene, camera, np.float32(gain) * background), PictureMeans()
-        for frame in frames:
-            means.add(renderer.image(density(frame)) / np.float32(gain), seen(view, frame))
-        found[f"psnr_{view}"] = means.figures()["psnr"]
+        renderer = scene_renderer(scene, camera, np.float32(gain) * background)
+        pictures = (renderer.image(density(frame)) / np.float32(gain) for frame in frames)
+        pairs = zip(pictures, (seen(view, frame) for frame in frames), strict=True)
+        found[f"psnr_{view}"] = means([picture_figures(*pair) for pair in pairs])["psnr"]
     new = [float(found[f"psnr_{view}"] or np.nan) for view in cameras if view != FRONT]
     return found | {"psnr_new": finite_mean(new)}
 

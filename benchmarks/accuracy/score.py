@@ -20,7 +20,7 @@ from benchmarks.baked import BLACK
 from benchmarks.process import apart
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
+from smokelift.evaluation.frame_means import VolumeMeans, eight_bit_values, finite_mean, means, picture_figures
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.orbit_shapes import SHAPES
 from smokelift.evaluation.truth import Truth, on_grid, resampled
@@ -161,11 +161,11 @@ def around(known: KnownScene, densities: KnownDensities) -> dict[str, Any]:
 
 def _view_figures(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
     """Return the figures of the pictures in every view, and their means over the new views."""
-    scores = {view: PictureMeans() for view in known.cameras}
+    scores: dict[str, list[dict[str, Any]]] = {view: [] for view in known.cameras}
     for frame, shown in images(known, run, folder, known.scored):
         for view, image in shown.items():
-            scores[view].add(image, known.seen(view, frame))
-    found = {view: pictures.figures() for view, pictures in scores.items()}
+            scores[view].append(picture_figures(image, known.seen(view, frame)))
+    found = {view: means(frames) for view, frames in scores.items()}
     used = {next(iter(known.cameras)), *run_views(run)}
     row: dict[str, Any] = {}
     for name in VIEW_FIGURES:
