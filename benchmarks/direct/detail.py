@@ -2,10 +2,10 @@
 
     python -m benchmarks.direct.detail CONTINUED ...
 
-References are four of the clip's last twelve frames, from the front. Patches and texture: `PatchStatistics`. Edges:
-mean gradient over that of the clip. Lines: how much of the detail finer than four voxels runs in one direction over
-four voxels, as sheets and threads do (coherence of the structure tensor). Octaves: energy of the detail from 0 to 1, 1
-to 2 and 2 to 4 voxels over the clip's, in dB. Rise of the center of mass in m/s.
+References are every fourth of the clip's last twelve frames, from the front. Patches and texture: `PatchStatistics`.
+Edges: mean gradient over that of the clip. Lines: how much of the detail finer than four voxels runs in one direction
+over four voxels, as sheets and threads do (coherence of the structure tensor). Octaves: energy of the detail from 0 to
+1, 1 to 2 and 2 to 4 voxels over the clip's, in dB. Rise of the center of mass in m/s.
 """
 
 import argparse
@@ -57,7 +57,7 @@ def rows(directory: Path) -> list[list[str]]:
     """Return the rows of a continued sequence, those of its clip first."""
     sequence = Sequence.open(directory)
     seam = max(number for number in sequence.frames if sequence.figures(number)["origin"] == "clip")
-    clip = {number: sequence.density(number) for number in range(seam - BACK, seam + 1, 4)}
+    clip = {number: sequence.density(number) for number in range(seam - BACK, seam + 1, 4) if number in sequence.frames}
     references = [views(density)["front"] for density in clip.values()]
     statistics = [PatchStatistics.of(picture) for picture in references]
     sharp = np.mean([mean_gradient(picture) for picture in references])
@@ -65,7 +65,7 @@ def rows(directory: Path) -> list[list[str]]:
     speed = sequence.fps * sequence.scene.domain.voxel_size
     found = []
     for number in (seam, *(seam + after for after in AFTER)):
-        density, since = sequence.density(number), seam - BACK if number == seam else seam
+        density, since = sequence.density(number), min(clip) if number == seam else seam
         rise = (height(density) - height(clip[since])) * speed / (number - since)
         mass = density.sum(dtype=np.float64) / clip[seam].sum(dtype=np.float64)
         for name, picture in views(density).items():

@@ -30,7 +30,7 @@ from smokelift.direct.simulation import Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.direct.turbulence import SmallEddies
-from smokelift.transport import Array, advect, at_centres
+from smokelift.transport import Array, advect, at_centres, project
 from smokelift.velocity.pyramid import coarsen, coarsened
 
 COARSE = 64
@@ -133,8 +133,9 @@ def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
     along, velocity = _along(simulation), states[first].velocity
     for step, state in enumerate(states[first:-1], first + 1):
         velocity = along.velocity(replace(state, velocity=velocity), step)
-    last = replace(states[-1], velocity=velocity)
-    return last if simulation.eddies is None else simulation.eddies.begun(last)
+    if simulation.eddies is not None:
+        velocity = project(simulation.eddies.added(velocity, states[-1].density))
+    return replace(states[-1], velocity=velocity)
 
 
 def _first_typical(states: Sequence[SmokeState]) -> int:

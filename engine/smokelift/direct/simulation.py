@@ -3,7 +3,7 @@
 A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
 the frame before to this one:
 
-    u'   = Project(K(advect(u - a, u)) + dt (b rho up) + a'), in inlets and fans with their own velocity
+    u'   = Project(advect(u - a, u) + e + dt (b rho up) + a'), in inlets and fans with their own velocity
     rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
 
 where a is the ambient velocity: wind and turbulence, which all air has in addition to the flow. Outside the box there
@@ -11,7 +11,7 @@ is nothing else.
 
 Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as are what enters
 (`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.burning`), which lifts nothing beside what b has.
-Advection keeps the mass, and MacCormack's correction the eddies that the grid shows. K gives small ones back what
+Advection keeps the mass, and MacCormack's correction the eddies that the grid shows; e are small ones in place of what
 interpolation takes (`smokelift.direct.turbulence`).
 """
 
@@ -97,7 +97,7 @@ class Simulation:
         """The velocity of the state one step later, around what is solid."""
         moved = self._self_advected(state.velocity, step)
         if self.eddies is not None:
-            moved = self.eddies.kept(moved, state.density)
+            moved = self.eddies.added(moved, state.density, step)
         driven = moved.with_faces(self._with_forces(moved, state, step))
         return project(driven) if solid is None else solid.projected(driven)
 

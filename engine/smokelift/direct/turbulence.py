@@ -5,14 +5,15 @@ wave is a wave that swings across its own direction. A sum of waves is known at 
 
 True smoke has as much motion in each octave of sizes below a tenth of its width, about a seventh of its speed
 (docs/experiments/continuation.md). An estimated velocity lacks it, and smoke that a smooth velocity carries is drawn
-out into sheets and threads. `SmallEddies` makes up what is missing, and keeps it at that level, which interpolation
-takes away (backscatter: Mason and Thomson 1992).
+out into sheets and threads. `SmallEddies` makes up what is missing, and what interpolation takes away in every step:
+random motion, new in each (stochastic backscatter: Mason and Thomson 1992). To make the eddies that are there faster
+would keep their directions, in which the smooth velocity has drawn them out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
 from smokelift.direct.state import SmokeState
-from smokelift.transport import Array, Faces, Velocity, at_centres, on_faces, project
+from smokelift.transport import Array, Faces, Velocity, at_centres, on_faces
 
 MODES = 64
 """Waves in the sum: enough that it shows no pattern."""
@@ -103,9 +104,6 @@ INTENSITY = 0.23
 """Speed of an octave's eddies, of each component, over that of a clip's smoke: .14 of the true one, of which estimates
 show .6 (docs/experiments/continuation.md)."""
 
-LARGEST_GAIN = np.float32(1.25)
-"""Largest gain of an octave in a step: eddies grow as smoke is stirred, and do not appear."""
-
 IN_SMOKE = np.float32(0.05)
 """Fraction of the largest density above which a voxel is in the smoke."""
 
@@ -125,25 +123,19 @@ class SmallEddies:
         squares = [sum(_mean_squares(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3)) for m in states]
         return SmallEddies(INTENSITY * float(np.median(squares)) ** 0.5)
 
-    def begun(self, state: SmokeState) -> SmokeState:
-        """A state with the eddies that it lacks."""
-        velocity, faces = state.velocity, list(state.velocity.faces)
-        smoke, near = _on_faces(state.density)
-        for seed, (octave, found) in enumerate(_octaves(velocity)):
-            missing = max(0.0, 3 * self.speed**2 - sum(_mean_squares(found, smoke))) ** 0.5
-            eddies = Turbulence(missing, octave.eddy * velocity.voxel_size, seed).velocity(velocity, 0.0)
-            faces = [u + weight * eddy for u, weight, eddy in zip(faces, near, eddies, strict=True)]
-        return replace(state, velocity=project(velocity.with_faces(faces)))
+    def added(self, velocity: Velocity, density: Array, step: int = 0) -> Velocity:
+        """A velocity with the eddies that its smoke lacks; it may have divergence.
 
-    def kept(self, velocity: Velocity, density: Array) -> Velocity:
-        """A velocity in whose smoke those eddies are faster that have become too slow; it may have divergence."""
+        They are others in every step, so that they have nothing to do with the flow and their energy adds to its own.
+        """
         faces = list(velocity.faces)
         smoke, near = _on_faces(density)
-        for _, found in _octaves(velocity):
-            square = sum(_mean_squares(found, smoke))
-            if 0 < square < 3 * self.speed**2:
-                gain = min(np.float32(3**0.5 * self.speed / square**0.5), LARGEST_GAIN)
-                faces = [u + (gain - 1) * weight * part for u, weight, part in zip(faces, near, found, strict=True)]
+        for number, (octave, found) in enumerate(_octaves(velocity)):
+            missing = 3 * self.speed**2 - sum(_mean_squares(found, smoke))
+            if missing > 0:
+                eddies = Turbulence(missing**0.5, octave.eddy * velocity.voxel_size, step * len(SIZES) + number)
+                added = eddies.velocity(velocity, 0.0)
+                faces = [u + weight * eddy for u, weight, eddy in zip(faces, near, added, strict=True)]
         return velocity.with_faces(faces)
 
 

@@ -21,7 +21,7 @@ def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tm
     part = source.scene.domain.slices_in(made.scene.domain)
     error = np.linalg.norm(made.density(15)[part] - true) / np.linalg.norm(true)
     held = np.linalg.norm(source.density(10) - true) / np.linalg.norm(true)
-    assert error < 0.6 * held
+    assert error < 0.65 * held
     assert made.provenance[-1]["origin"] == "made up"
     assert "Frames 11 to 15" in made.provenance[-1]["how"]
 
