@@ -31,7 +31,7 @@ from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.direct.turbulence import SmallEddies
 from smokelift.transport import Array, advect, at_centres, project
-from smokelift.velocity.pyramid import coarsen, coarsened
+from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 
 COARSE = 64
 """Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a mean motion needs no more."""
@@ -114,13 +114,13 @@ def fit_simulation(
 def coarse(state: SmokeState) -> SmokeState:
     """The state on the grid that the buoyancy is fitted on, without fire."""
     while max(state.density.shape) > COARSE:
-        state = SmokeState(coarsen(state.density), coarsened(state.velocity))
+        state = SmokeState(coarsen_density(state.density), coarsen_velocity(state.velocity))
     return SmokeState(state.density, state.velocity)
 
 
 def _coarse_mask(voxels: Mask) -> Mask:
     while max(voxels.shape) > COARSE:
-        voxels = coarsen(voxels.astype(np.float32)) > 0
+        voxels = coarsen_density(voxels.astype(np.float32)) > 0
     return voxels
 
 

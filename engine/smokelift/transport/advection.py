@@ -96,7 +96,7 @@ def advect(
     if field.min() < 0:
         raise ValueError("mass can be kept for a density, not for negative values; leave it out.")
     other = _core.advect_cells(field, displacement.faces, not corrected)
-    mass = float(np.sum(field * _share_inside(displacement), dtype=np.float64))
+    mass = float(np.sum(field * _fraction_inside(displacement), dtype=np.float64))
     return _with_mass(moved, np.abs(moved - other), mass)
 
 
@@ -121,12 +121,12 @@ def _with_mass(moved: Array, doubt: Array, mass: float) -> Array:
     return moved * np.float32(mass / found) if found > 0 else moved
 
 
-def _share_inside(displacement: StaggeredGrid) -> Array:
+def _fraction_inside(displacement: StaggeredGrid) -> Array:
     """The part of every voxel that is still in the box after a step: nothing leaves through walls."""
-    share = np.ones((), np.float32)
+    fraction = np.ones((), np.float32)
     for axis, along in enumerate(at_centres(displacement.faces)):
         count, (low_wall, high_wall) = along.shape[axis], displacement.walls[2 * axis : 2 * axis + 2]
         low = along + np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
         ends = np.float32(1) if low_wall else low + 1, np.float32(1) if high_wall else count - low
-        share = share * np.clip(np.minimum(*ends), 0, 1)
-    return share
+        fraction = fraction * np.clip(np.minimum(*ends), 0, 1)
+    return fraction

@@ -17,7 +17,7 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
 on one grid after a prediction, which is coarse in a reconstruction; else from a coarse grid to the one that is asked
 for (`coarse_to_fine`). It is linearized anew after the first solve (`linearization`). Before and after are as
 `preparation` makes them. Division by s makes every weight independent of the scales of density, space and time. k is
-`UNEXPLAINED` over the share of the change that u_p leaves unexplained: it grows as u_p gets better.
+`UNEXPLAINED` over the fraction of the change that u_p leaves unexplained: it grows as u_p gets better.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
 """
@@ -31,7 +31,7 @@ from smokelift.checks import require_kind
 from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine, VelocitySettings
-from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity, refined_to
+from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity, refine
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
 
 
@@ -73,8 +73,8 @@ def estimate_velocity(
     Velocity
         In m/s, without divergence, such that after(x) = before(x - u(x) dt). `figures` has ``iterations``, ``products``
         and ``projections`` of the whole estimate, the last ``residual`` of the solver, the ``divergence`` (max |div u|
-        voxel size / max |u|) on the estimate's grid, the ``unexplained`` share of the change that the center of the
-        regularizer leaves, the ``trust`` in the prediction and the ``dissipation``, the share of the smoke that
+        voxel size / max |u|) on the estimate's grid, the ``unexplained`` fraction of the change that the center of
+        the regularizer leaves, the ``trust`` in the prediction and the ``dissipation``, the fraction of the smoke that
         dissolves in `dt`, below zero where all of it gets denser. Zero if there is no smoke, or none in one of the two,
         or no motion.
 
@@ -100,7 +100,7 @@ def estimate_velocity(
     pair = DensityPair(before, after, dt, voxel_size, closed, inflow)
     found = CoarseToFine(settings or VelocitySettings()).estimate(pair, prediction)
     x, y, z = np.shape(before)
-    return refined_to(found, (x, y, z))
+    return refine(found, (x, y, z))
 
 
 __all__ = [

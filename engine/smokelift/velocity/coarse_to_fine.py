@@ -16,12 +16,12 @@ from smokelift.velocity.estimator import (
     in_meters,
     motion_weight,
     predict_velocity,
-    refined_to,
+    refine,
 )
 from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, linearize
 from smokelift.velocity.momentum import fit_center
 from smokelift.velocity.preparation import PreparedPair, prepare
-from smokelift.velocity.pyramid import coarsen, coarsened, smoothed
+from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, smooth_velocity
 from smokelift.velocity.solver import ProjectedCG, Solver
 
 ONE_VIEW_SMOOTHNESS = 10.0
@@ -40,11 +40,11 @@ KINETIC = 0.003
 (docs/experiments/velocity-solver.md)."""
 
 UNEXPLAINED, MIN_UNEXPLAINED = 0.25, 0.04
-"""Share of the change, left unexplained by the center, at which the weights apply unscaled: they grow in inverse
-proportion to that share, down to the second one (docs/experiments/velocity-solver.md)."""
+"""Fraction of the change, left unexplained by the center, at which the weights apply unscaled: they grow in inverse
+proportion to that fraction, down to the second one (docs/experiments/velocity-solver.md)."""
 
-WORTHLESS = 0.5
-"""Share of the change left unexplained from which a prediction is not used: after a cut, say, or a gust
+MAX_UNEXPLAINED = 0.5
+"""Fraction of the change left unexplained from which a prediction is not used: after a cut, say, or a gust
 (docs/experiments/velocity-solver.md)."""
 
 MAX_INCREMENT = 1.0
@@ -99,19 +99,19 @@ class CoarseToFine:
         seen = peaks[0] > SMOKE_THRESHOLD * peaks[1]  # between smoke and none there is no motion to be seen
         for _ in range(self.settings.coarsening or 0):
             if prediction is not None and prediction.shape == pair.before.shape:
-                prediction = coarsened(prediction)
+                prediction = coarsen_velocity(prediction)
             pair = _half(pair)
         if prediction is not None:
             require_same_shape("the prediction", prediction.shape, pair.before.shape)
         found = self._found(pair, prediction) if seen else None
         if found is None:
             return Velocity.zero(pair.before.shape, pair.voxel_size, pair.closed)
-        return smoothed(found) if self.settings.coarsening else found
+        return smooth_velocity(found) if self.settings.coarsening else found
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, carried along on its own grid."""
         predicted = predict_velocity(velocity, dt)
-        return smoothed(predicted) if self.settings.coarsening else predicted
+        return smooth_velocity(predicted) if self.settings.coarsening else predicted
 
     def of_one_view(self) -> CoarseToFine:
         """The estimator with more smoothness."""
@@ -120,26 +120,28 @@ class CoarseToFine:
     def _found(self, pair: DensityPair, given: Velocity | None) -> Velocity | None:
         """The velocity on the pair's grid; None where there is no structure to follow.
 
-        Without a prediction that serves it starts from that of a grid half as fine, unless the pair's grid is coarse.
+        Without a usable prediction it starts from that of a grid half as fine, unless the pair's grid is coarse.
         """
         x, y, z = shape = pair.before.shape
         prepared, weight = prepare(pair.before, pair.after), motion_weight(shape, pair.inflow)
-        start = prediction = _serving(given, pair, prepared, weight)
+        start = prediction = _usable_prediction(given, pair, prepared, weight)
         if start is None and max(shape) > COARSEST_SIDE and min(shape) >= 2 * MIN_SIDE:
             coarse = self._found(_half(pair), None)
-            start = None if coarse is None else refined_to(coarse, (x, y, z)).displacement(pair.dt)
+            start = None if coarse is None else refine(coarse, (x, y, z)).displacement(pair.dt)
         u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
         return _solved(pair, prepared, weight, u, prediction, self.settings)
 
 
 def _half(pair: DensityPair) -> DensityPair:
     """The pair on a grid half as fine."""
-    inflow = None if pair.inflow is None else coarsen(pair.inflow.astype(np.float32)) > 0
-    before, after = coarsen(pair.before), coarsen(pair.after)
+    inflow = None if pair.inflow is None else coarsen_density(pair.inflow.astype(np.float32)) > 0
+    before, after = coarsen_density(pair.before), coarsen_density(pair.after)
     return replace(pair, before=before, after=after, voxel_size=2 * pair.voxel_size, inflow=inflow)
 
 
-def _serving(given: Velocity | None, pair: DensityPair, prepared: PreparedPair, weight: Array) -> StaggeredGrid | None:
+def _usable_prediction(
+    given: Velocity | None, pair: DensityPair, prepared: PreparedPair, weight: Array
+) -> StaggeredGrid | None:
     """The prediction in voxels a frame, if it explains the change well enough as it is, and better than no motion."""
     if given is None or not any(component.any() for component in given.faces):
         return None
@@ -150,8 +152,8 @@ def _serving(given: Velocity | None, pair: DensityPair, prepared: PreparedPair, 
     unexplained, rest = linear.unexplained(u, prepared.noise)
     # The linearized change grows with the prediction, however wrong that is, so that long runs would run away.
     change = (prepared.after - prepared.before) / np.float32(linear.scale)
-    serves = unexplained < WORTHLESS and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
-    return u if serves else None
+    usable = unexplained < MAX_UNEXPLAINED and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
+    return u if usable else None
 
 
 def _solved(

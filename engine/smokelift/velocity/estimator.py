@@ -27,12 +27,12 @@ from smokelift.transport import (
     require_same_shape,
     without_divergence,
 )
-from smokelift.velocity.pyramid import prolonged
+from smokelift.velocity.pyramid import prolong
 
 Density = npt.NDArray[np.floating[Any]]
 
 REACH = 1
-"""Coarse voxels around a box that its fine velocity depends on; see `prolonged`."""
+"""Coarse voxels around a box that its fine velocity depends on; see `prolong`."""
 
 LARGEST_DENSITY = 1e12
 """Largest density of which sums of fourth powers are finite in 32 bits."""
@@ -70,7 +70,7 @@ class VelocityEstimator(Protocol):
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """Estimate the velocity that carries one density into the next: see `estimate_velocity`.
 
-        It may be on a coarser grid than the densities (`refined_to` leads back), and so may the prediction.
+        It may be on a coarser grid than the densities (`refine` leads back), and so may the prediction.
         """
         ...
 
@@ -88,7 +88,7 @@ def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
     return project(advect(velocity, velocity, dt))
 
 
-def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
+def refine(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     """A velocity refined to the grid (shape) that its own was halved from; itself if it is on that already.
 
     It has no divergence there.
@@ -96,11 +96,11 @@ def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     if coarse.shape == shape:
         return coarse
     x, y, z = (slice(0, count) for count in shape)
-    return refined_in(coarse, shape, (x, y, z))
+    return refine_in_box(coarse, shape, (x, y, z))
 
 
-def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
-    """What `refined_to` gives in a box of its voxels, as the velocity of a box of its own."""
+def refine_in_box(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
+    """What `refine` gives in a box of its voxels, as the velocity of a box of its own."""
     if coarse.shape == shape:
         return part_of(coarse, box)
     half = halved(shape)
@@ -108,9 +108,9 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
         slice(max(side.start // 2 - REACH, 0), min((side.stop + 1) // 2 + REACH, count))
         for side, count in zip(box, half, strict=True)
     )
-    part = refined_in(coarse, half, (x, y, z))
+    part = refine_in_box(coarse, half, (x, y, z))
     counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
-    fine = Velocity(prolonged(part, counts), part.voxel_size / 2, part.closed, figures=part.figures)
+    fine = Velocity(prolong(part, counts), part.voxel_size / 2, part.closed, figures=part.figures)
     i, j, k = (
         slice(inner.start - 2 * outer.start, inner.stop - 2 * outer.start)
         for inner, outer in zip(box, (x, y, z), strict=True)

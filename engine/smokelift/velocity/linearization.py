@@ -41,12 +41,12 @@ class Linearization:
     smoke: npt.NDArray[np.bool_]
     scale: float
 
-    def with_dissipation(self, share: float) -> Linearization:
-        """The change that is left where a share of the smoke dissolves."""
-        return replace(self, offset=self.offset + np.float32(share) * self.carried) if share else self
+    def with_dissipation(self, fraction: float) -> Linearization:
+        """The change that is left where a fraction of the smoke dissolves."""
+        return replace(self, offset=self.offset + np.float32(fraction) * self.carried) if fraction else self
 
     def unexplained(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
-        """The share of the squared change that a velocity leaves beyond noise of a variance, and all that it leaves."""
+        """Fraction of the squared change that a velocity leaves beyond noise of a variance, and all that it leaves."""
         left = self.offset + directional_derivative(self.direction, u.faces)
         whole, rest = (float(np.sum(self.weight * change**2, dtype=np.float64)) for change in (self.offset, left))
         floor = noise / self.scale**2 * float(np.sum(self.weight[self.smoke], dtype=np.float64))

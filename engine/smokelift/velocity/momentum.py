@@ -11,8 +11,8 @@ linearized change as the velocity itself, together with the trust t in the predi
 
     min sum W (r + d before + g . (t u_p + P(m) - u_k))^2
 
-d is the share of the smoke that dissolves. Below zero smoke gets denser, as in a clip that flickers. Without d either
-would be fitted as motion. The regularizer penalises the distance from the velocity that is fitted here.
+d is the fraction of the smoke that dissolves. Below zero smoke gets denser, as in a clip that flickers. Without d
+either would be fitted as motion. The regularizer penalises the distance from the velocity that is fitted here.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from smokelift.transport import Array, StaggeredGrid, without_divergence
 from smokelift.velocity.linearization import Linearization, directional_derivative
 
 MOMENTUM = 0.8
-"""Share of the fitted momentum that an estimate without a prediction starts from. Below one, because the fit is to
+"""Fraction of the fitted momentum that an estimate without a prediction starts from. Below one, because the fit is to
 noise as well (docs/experiments/velocity-solver.md)."""
 
 BRIGHTENING = 0.5
-"""Without a prediction, overall brightening is allowed only if it cuts the unexplained change to this share. Flicker
+"""Without a prediction, overall brightening is allowed only if it cuts the unexplained change to this fraction. Flicker
 does; smoke that enters does not (docs/experiments/velocity-solver.md)."""
 
 RIDGE = 1e-3
@@ -41,8 +41,8 @@ RIDGE = 1e-3
 class Center:
     """The motion around which the velocity is regularized: t u_p + P(m), in voxels a frame.
 
-    `trust` is t, from 0 to 1. `dissipation` is the share of the smoke that dissolves in a frame, at most 1, and below
-    zero where all of it gets denser.
+    `trust` is t, from 0 to 1. `dissipation` is the fraction of the smoke that dissolves in a frame, at most 1 and
+    below zero where all of it gets denser.
     """
 
     motion: StaggeredGrid
@@ -67,8 +67,8 @@ def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Lineari
     found, rest = _least_squares(products)
     dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearized change may ask for more than all
     if dissipation < 0 and prediction is None:
-        kept = np.delete(np.arange(len(products)), -2)
-        steady, without = _least_squares(products[np.ix_(kept, kept)])
+        others = np.delete(np.arange(len(products)), -2)
+        steady, without = _least_squares(products[np.ix_(others, others)])
         if rest > BRIGHTENING * without:
             dissipation, found = 0.0, steady
     momentum = found[: 3 * rows].reshape(rows, 3)

@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.checks.array_types import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
-from smokelift.velocity.estimator import refined_in
+from smokelift.velocity.estimator import refine_in_box
 
 MIN_SLAB_VOXELS = 4_000_000
 """Voxels of a box around smoke above which it is cut into slabs, each as narrow as the smoke is there."""
@@ -21,13 +21,13 @@ SLAB = 64
 def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False) -> Array:
     """Carry a density (nx, ny, nz), not negative, along by a velocity of its grid or of one that was halved from it.
 
-    It gives what `advect` makes of it with `refined_to`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of the
+    It gives what `advect` makes of it with `refine`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of the
     density in meters; ``conserve`` is that of `advect`.
     """
     x, y, z = density.shape
     result = np.zeros(density.shape, np.float32)
     for box, source in _boxes(density > 0, _reach(velocity, dt / voxel_size), whole=conserve):
-        along = refined_in(velocity, (x, y, z), source)
+        along = refine_in_box(velocity, (x, y, z), source)
         moved = advect(density[source], along, dt, conserve=conserve)
         inner = moved[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))]
         # memory is given where something is written: where the smoke is, not all over its box
@@ -46,7 +46,7 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
         return velocity
     i, j, k = (np.zeros(shape, np.float32) for shape in face_shapes(smoke.shape))
     for box, _ in _boxes(smoke, _reach(velocity, dt / voxel_size)):
-        part = refined_in(velocity, (x, y, z), box)
+        part = refine_in_box(velocity, (x, y, z), box)
         for component, found in zip(faces_in((i, j, k), box), part.faces, strict=True):
             component[...] = found
     return Velocity((i, j, k), voxel_size, velocity.closed, figures=velocity.figures)

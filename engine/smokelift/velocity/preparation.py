@@ -53,9 +53,9 @@ class PreparedPair:
     noise: float
     reduced: bool
 
-    def density_dissipation(self, share: float) -> float:
-        """The share of the density that dissolves where a share of the values does."""
-        return float(1 - (1 - share) ** (4 / 3)) if self.reduced else share
+    def density_dissipation(self, fraction: float) -> float:
+        """The fraction of the density that dissolves where a fraction of the values does."""
+        return float(1 - (1 - fraction) ** (4 / 3)) if self.reduced else fraction
 
 
 def prepare(before: Array, after: Array) -> PreparedPair:
@@ -112,7 +112,7 @@ def without_noise(
 
 
 def _passed(width: float) -> float:
-    """Share of white noise's standard deviation that a Gaussian lets through."""
+    """Fraction of white noise's standard deviation that a Gaussian lets through."""
     if width <= 0:
         return 1.0
     spike = np.zeros(int(8 * width) * 2 + 3)

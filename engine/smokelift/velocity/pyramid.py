@@ -16,7 +16,7 @@ SMOOTHING = 1 / 4
 What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-solver.md)."""
 
 
-def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
+def prolong(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
     """The faces of a velocity on the next finer grid, in the same unit, without divergence.
 
     The formulas for a coarse voxel (Toth and Roe 2002) read only its neighbors. Along an odd number of voxels the last
@@ -31,7 +31,7 @@ def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
     return without_divergence(StaggeredGrid(faces, 1.0, u.closed))[0].faces
 
 
-def smoothed(velocity: Velocity) -> Velocity:
+def smooth_velocity(velocity: Velocity) -> Velocity:
     """A velocity with every component smoothed alike along all axes, which keeps a divergence of zero."""
     faces = []
     for along, component in enumerate(velocity.faces):
@@ -45,23 +45,22 @@ def smoothed(velocity: Velocity) -> Velocity:
     return velocity.with_faces(faces)
 
 
-def coarsen(a: Array) -> Array:
+def coarsen_density(a: Array) -> Array:
     """Means of two along every axis; an odd last one counts twice."""
     odd = [(0, count % 2) for count in a.shape]
     return _core.means_of_two(np.pad(a, odd, mode="edge") if np.any(odd) else np.ascontiguousarray(a))
 
 
-def coarsened(velocity: Velocity) -> Velocity:
+def coarsen_velocity(velocity: Velocity) -> Velocity:
     """A velocity on a grid half as fine: what goes in and out of eight voxels together."""
     faces = []
     for along, component in enumerate(velocity.faces):
-        # the side of an odd last voxel stands for one beyond it
-        last = component.shape[along] - 1
-        component = component.take(np.minimum(2 * np.arange((last + 1) // 2 + 1), last), along)
-        for axis in {0, 1, 2} - {along}:
-            even = 2 * np.arange((component.shape[axis] + 1) // 2)
-            odd = np.minimum(even + 1, component.shape[axis] - 1)
-            component = np.float32(0.5) * (component.take(even, axis) + component.take(odd, axis))
+        # an odd last voxel, or its far side, stands for one beyond it
+        missing = [(0, (count - (axis == along)) % 2) for axis, count in enumerate(component.shape)]
+        component = np.pad(component, missing, mode="edge")
+        for axis in range(3):
+            even, odd = (component.take(range(start, component.shape[axis], 2), axis) for start in (0, 1))
+            component = even if axis == along else np.float32(0.5) * (even + odd)
         faces.append(component)
     x, y, z = faces
     return Velocity((x, y, z), 2 * velocity.voxel_size, velocity.closed)

@@ -28,7 +28,7 @@ from smokelift.checks.array_types import Array
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 from smokelift.transport import Velocity, on_faces, without_divergence
-from smokelift.velocity.pyramid import coarsen
+from smokelift.velocity.pyramid import coarsen_density
 
 CURVATURE, REST = 0.05, 0.14
 """Weights, for each pixel of a cell, of a correction's squared Laplacian from cell to cell and of its square
@@ -37,8 +37,8 @@ CURVATURE, REST = 0.05, 0.14
 TOLERANCE, MAX_STEPS = 1e-2, 50
 """Residual, relative to the start's, at which the solution is taken, and steps at most."""
 
-ANYWHERE = 1e-3
-"""Share of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
+OUTSIDE_WEIGHT = 1e-3
+"""Fraction of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
 
 SPREAD = 1 / 8
 """Standard deviation of the average, in shortest sides of the box, which is cut out around the smoke."""
@@ -61,10 +61,10 @@ def with_seen_motion(
     smoke = after > 0
     if smoke.any() and before.any():
         while density.shape != velocity.shape:
-            density = coarsen(density)
-        screen, scale = _Screen.of(camera, domain, velocity.shape, velocity.voxel_size), dt / velocity.voxel_size
-        motion = screen.mean_motion(velocity.centres() * np.float32(scale), density)
-        correction = screen.lifted(_correction(screen, motion, before, after, smoke)) / np.float32(scale)
+            density = coarsen_density(density)
+        image, scale = _ImageGrid.of(camera, domain, velocity.shape, velocity.voxel_size), dt / velocity.voxel_size
+        motion = image.mean_motion(velocity.centres() * np.float32(scale), density)
+        correction = image.lifted(_correction(image, motion, before, after, smoke)) / np.float32(scale)
         faces = zip(velocity.faces, on_faces(correction), strict=True)
         velocity = velocity.with_faces(component + added for component, added in faces)
     return averaged_along(velocity, (float(ray[0]), float(ray[1]), float(ray[2])))
@@ -85,21 +85,21 @@ def _line(direction: NDArray[np.float64], deviation: float) -> Array:
     """A Gaussian of so many voxels on a line through the middle of a box: eight voxels share every point."""
     ends = int(np.ceil(REACH * deviation))
     along = np.arange(-ends, ends + 1)
-    points, amounts = along[:, None] * direction, np.exp(-0.5 * np.square(along / deviation))
+    points, weights = along[:, None] * direction, np.exp(-0.5 * np.square(along / deviation))
     half = np.ceil(np.abs(ends * direction)).astype(int) + 1
     kernel = np.zeros(2 * half + 1)
     low = np.floor(points).astype(int)
     for corner in np.ndindex(2, 2, 2):
-        shares = np.prod(np.where(corner, points - low, 1 - (points - low)), axis=1)
-        np.add.at(kernel, tuple((low + corner + half).T), amounts * shares)
+        corner_weights = np.prod(np.where(corner, points - low, 1 - (points - low)), axis=1)
+        np.add.at(kernel, tuple((low + corner + half).T), weights * corner_weights)
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
 def _correction(
-    screen: _Screen, motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
+    image: _ImageGrid, motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
 ) -> Array:
     """What the motion (cells, 2) of the picture lacks, in columns and rows a frame."""
-    columns, rows = (screen.pixels @ motion).T.reshape(2, *after.shape)
+    columns, rows = (image.pixels @ motion).T.reshape(2, *after.shape)
     down, across = np.indices(after.shape)
     carried = ndimage.map_coordinates(before, (down - rows, across - columns), order=1, mode="nearest")
     mean = (carried + after) / 2  # correlated, since a picture may be a single row
@@ -108,9 +108,9 @@ def _correction(
     if steepness == 0:
         return np.zeros(motion.shape, np.float32)
     steep = np.flatnonzero((gradient[0] != 0) | (gradient[1] != 0))  # the others say nothing
-    pixels = screen.pixels[steep]
+    pixels = image.pixels[steep]
     along = sparse.hstack([pixels.multiply(part[steep, None]) for part in gradient]).tocsr()
-    normal = (along.T @ along / steepness + sparse.block_diag([screen.stiffness] * 2)).tocsr()
+    normal = (along.T @ along / steepness + sparse.block_diag([image.stiffness] * 2)).tocsr()
     right = along.T @ (carried - after).ravel()[steep] / steepness
     found, _ = cg(normal, right, rtol=TOLERANCE, maxiter=MAX_STEPS, M=sparse.diags(1 / normal.diagonal()))
     # sums may be taken in another order on another day, and a run has to be the same to the bit
@@ -118,7 +118,7 @@ def _correction(
 
 
 @dataclass(frozen=True, eq=False)
-class _Screen:
+class _ImageGrid:
     """Cells of a picture, about as wide as voxels of a grid are in it.
 
     Attributes
@@ -144,7 +144,7 @@ class _Screen:
 
     @staticmethod
     @lru_cache(maxsize=2)
-    def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> _Screen:
+    def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> _ImageGrid:
         """The cells for a grid from the domain's low corner on, its voxels so many meters wide."""
         centers = np.array(domain.min) + (np.indices(shape).reshape(3, -1).T + 0.5) * voxel_size
         at, _ = project_points(camera, centers)
@@ -165,11 +165,11 @@ class _Screen:
         laplacian = sparse.kronsum(*(_differences(count) for count in counts[::-1]))
         stiffness = CURVATURE * laplacian @ laplacian + REST * sparse.identity(counts[0] * counts[1])
         stiffness *= sizes[0] * sizes[1]
-        return _Screen(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
+        return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
 
     def mean_motion(self, motion: Array, density: Array) -> NDArray[np.float64]:
         """Mean along the rays (cells, 2), in columns and rows a frame, of a motion (nx, ny, nz, 3) in voxels."""
-        weight = density.ravel() + ANYWHERE * float(density.max()) + np.finfo(np.float32).tiny
+        weight = density.ravel() + OUTSIDE_WEIGHT * float(density.max()) + np.finfo(np.float32).tiny
         across = np.einsum("nij,nj->ni", self.moved, motion.reshape(-1, 3))
         sums = self.voxels.T @ np.column_stack([weight[:, None] * across, weight])
         return np.asarray(sums[:, :2] / np.maximum(sums[:, 2:], np.finfo(np.float64).tiny))

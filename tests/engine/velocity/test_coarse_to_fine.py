@@ -9,7 +9,7 @@ from smokelift.baselines.velocity import PaperVelocity
 from smokelift.transport import face_shapes
 from smokelift.velocity import CoarseToFine, DensityPair, ProjectedCG, Velocity, VelocitySettings, estimate_velocity
 from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
-from smokelift.velocity.estimator import refined_to
+from smokelift.velocity.estimator import refine
 from tests.engine.velocity.known_motions import (
     DT,
     LARGE,
@@ -86,13 +86,13 @@ def test_an_estimate_on_a_coarser_grid_guides_the_next_one() -> None:
     estimator = CoarseToFine(dataclasses.replace(SMOOTH, coarsening=1))
     found = estimator.estimate(DensityPair(before, after, DT, VOXEL))
     assert (found.shape, found.voxel_size) == ((13, 12, 14), 2 * VOXEL)
-    fine = refined_to(found, before.shape)
+    fine = refine(found, before.shape)
     assert (fine.shape, fine.voxel_size) == (before.shape, VOXEL)
-    assert refined_to(fine, fine.shape) is fine
+    assert refine(fine, fine.shape) is fine
     wanted = estimate_velocity(before, after, DT, VOXEL, estimator.settings)
     np.testing.assert_array_equal(fine.centres(), wanted.centres())
     prediction = estimator.predict(found, DT)
-    for given in (prediction, refined_to(prediction, before.shape)):
+    for given in (prediction, refine(prediction, before.shape)):
         assert estimator.estimate(DensityPair(before, after, DT, VOXEL), given).figures["trust"] > 0.5
 
 

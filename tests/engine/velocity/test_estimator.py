@@ -7,7 +7,7 @@ import pytest
 
 from smokelift.transport import divergence, part_of
 from smokelift.velocity import estimate_velocity, predict_velocity
-from smokelift.velocity.estimator import refined_in, refined_to
+from smokelift.velocity.estimator import refine, refine_in_box
 from tests.engine.transport.random_fields import random_velocity
 from tests.engine.velocity.known_motions import DT, VOXEL, rotation, uniform
 
@@ -29,7 +29,7 @@ def test_part_of_a_finer_velocity_is_what_the_whole_has_there(shape, box):
     """Computed around the box alone, on a grid coarsened twice, with what is known of the estimate."""
     coarse_shape = tuple(-(-n // 4) for n in shape)
     coarse = replace(random_velocity(2, voxel_size=4.0, shape=coarse_shape), closed=("y-",))
-    found, expected = refined_in(coarse, shape, box), part_of(refined_to(coarse, shape), box)
+    found, expected = refine_in_box(coarse, shape, box), part_of(refine(coarse, shape), box)
     assert found.voxel_size == 1.0
     assert found.closed == expected.closed == (("y-",) if box[1].start == 0 else ())
     for mine, other in zip(found.faces, expected.faces, strict=True):

@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.transport import Velocity, advect, face_shapes, halved, project
 from smokelift.velocity import near_smoke as module
-from smokelift.velocity.estimator import refined_to
+from smokelift.velocity.estimator import refine
 from smokelift.velocity.near_smoke import carry, near_smoke
 
 SHAPE = (41, 36, 48)
@@ -32,7 +32,7 @@ def flow(speed: float, closed: tuple[str, ...] = ()) -> Velocity:
 @pytest.mark.parametrize("conserve", [False, True])
 def test_smoke_is_carried_as_by_the_velocity_of_the_whole_box(speed: float, conserve: bool) -> None:
     velocity = flow(speed, ("z-",))
-    expected = advect(puff(), refined_to(velocity, SHAPE), 1.0, conserve=conserve)
+    expected = advect(puff(), refine(velocity, SHAPE), 1.0, conserve=conserve)
     np.testing.assert_allclose(carry(puff(), velocity, 1.0, 1.0, conserve=conserve), expected, atol=1e-5)
     assert expected.any()
 
@@ -45,7 +45,7 @@ def test_where_no_smoke_is_nothing_is_carried() -> None:
 
 def test_velocity_is_right_where_smoke_can_arrive_and_zero_far_away() -> None:
     velocity, smoke = flow(1.0), puff() > 0
-    whole, near = refined_to(velocity, SHAPE), near_smoke(velocity, smoke, 1.0, 1.0)
+    whole, near = refine(velocity, SHAPE), near_smoke(velocity, smoke, 1.0, 1.0)
     assert near.voxel_size == 1.0
     assert not near.centres()[:4].any()
     inside = (slice(13, 23), slice(11, 21), slice(17, 29))

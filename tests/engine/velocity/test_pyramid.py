@@ -5,13 +5,13 @@ import pytest
 
 from smokelift.transport import divergence, face_shapes, project
 from smokelift.velocity import Velocity
-from smokelift.velocity.pyramid import coarsened, prolonged
+from smokelift.velocity.pyramid import coarsen_velocity, prolong
 from tests.engine.transport.random_fields import random_velocity
 
 
 @pytest.mark.parametrize("shape", [(8, 6, 10), (7, 9, 5)])
 def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
-    coarse = coarsened(project(random_velocity(0, shape=shape)))
+    coarse = coarsen_velocity(project(random_velocity(0, shape=shape)))
     assert coarse.shape == tuple((n + 1) // 2 for n in shape)
     inner = tuple(slice(0, n // 2) for n in shape)  # an odd last voxel is continued outwards
     assert np.abs(divergence(coarse)[inner]).max() < 1e-5
@@ -21,7 +21,7 @@ def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
 @pytest.mark.parametrize("shape", [(12, 8, 10), (11, 9, 7)])
 def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed):
     rough = random_velocity(1, voxel_size=2.0, shape=tuple((n + 1) // 2 for n in shape))
-    fine = Velocity(prolonged(project(rough, closed), shape), 1.0, closed)
+    fine = Velocity(prolong(project(rough, closed), shape), 1.0, closed)
     assert fine.shape == shape
     assert np.abs(divergence(fine)).max() < 1e-5
     for wall in closed:
@@ -37,5 +37,5 @@ def test_twice_as_fine_a_turning_flow_turns_as_it_did():
 
     fine = turning(1.0, (14, 12, 10))
     inner = slice(4, 6)  # the ends are continued
-    for found, expected in zip(prolonged(turning(2.0, (7, 6, 5)), fine.shape), fine.faces, strict=True):
+    for found, expected in zip(prolong(turning(2.0, (7, 6, 5)), fine.shape), fine.faces, strict=True):
         np.testing.assert_allclose(found[inner, inner, inner], expected[inner, inner, inner], atol=1e-5)
