@@ -67,7 +67,7 @@ def ways(
     yield "carried", carried[1:], None
     simulation = fitted_simulation(fitted or moments, dt)
     if true:
-        simulation = replace(simulation, eddies=None)
+        simulation = replace(simulation, eddy_speed=0.0)
     simulated = [spun_up(simulation, moments[-FITTED_FRAMES:])]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))

@@ -29,7 +29,7 @@ from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.simulation import Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import SmallEddies
+from smokelift.direct.turbulence import small_eddy_speed, with_small_eddies
 from smokelift.transport import Array, advect, at_centres, project
 from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 
@@ -108,7 +108,7 @@ def fit_simulation(
     else:
         physics = Physics(buoyancy, dissipation)
     around = surroundings or Surroundings()
-    return Simulation(physics, inflow.cropped(), around, dt, fit_fire(states, dt), SmallEddies.of(states))
+    return Simulation(physics, inflow.cropped(), around, dt, fit_fire(states, dt), small_eddy_speed(states))
 
 
 def coarse(state: SmokeState) -> SmokeState:
@@ -133,9 +133,8 @@ def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
     along, velocity = _along(simulation), states[first].velocity
     for step, state in enumerate(states[first:-1], first + 1):
         velocity = along.velocity(replace(state, velocity=velocity), step)
-    if simulation.eddies is not None:
-        velocity = project(simulation.eddies.added(velocity, states[-1].density))
-    return replace(states[-1], velocity=velocity)
+    with_eddies = with_small_eddies(velocity, states[-1].density, simulation.eddy_speed)
+    return replace(states[-1], velocity=project(with_eddies))
 
 
 def _first_typical(states: Sequence[SmokeState]) -> int:

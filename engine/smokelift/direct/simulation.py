@@ -27,7 +27,7 @@ from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Solid, Surroundings
-from smokelift.direct.turbulence import SmallEddies
+from smokelift.direct.turbulence import with_small_eddies
 from smokelift.transport import Array, Velocity, advect, on_faces, project
 
 TRACE = np.float32(1e-4)
@@ -69,8 +69,8 @@ class Simulation:
         Time of a step in seconds.
     fire
         Of the clip; None without any.
-    eddies
-        Small ones that the smoke keeps; None leaves the flow to itself.
+    eddy_speed
+        Of the small eddies that the smoke keeps, in m/s; 0 leaves the flow to itself.
     """
 
     physics: Physics
@@ -78,7 +78,7 @@ class Simulation:
     surroundings: Surroundings
     dt: float
     fire: Combustion | None = None
-    eddies: SmallEddies | None = None
+    eddy_speed: float = 0.0
 
     def next(self, state: SmokeState, step: int) -> SmokeState:
         """Return the state one step later; step 1 starts from the clip's last state."""
@@ -96,8 +96,8 @@ class Simulation:
     def velocity(self, state: SmokeState, step: int, solid: Solid | None = None) -> Velocity:
         """The velocity of the state one step later, around what is solid."""
         moved = self._self_advected(state.velocity, step)
-        if self.eddies is not None:
-            moved = self.eddies.added(moved, state.density, step)
+        if self.eddy_speed > 0:
+            moved = with_small_eddies(moved, state.density, self.eddy_speed, step)
         driven = moved.with_faces(self._with_forces(moved, state, step))
         return project(driven) if solid is None else solid.projected(driven)
 

@@ -5,13 +5,14 @@ wave is a wave that swings across its own direction. A sum of waves is known at 
 
 True smoke has as much motion in each octave of sizes below a tenth of its width, about a seventh of its speed
 (docs/experiments/continuation.md). An estimated velocity lacks it, and smoke that a smooth velocity carries is drawn
-out into sheets and threads. `SmallEddies` makes up what is missing, and what interpolation takes away in every step:
-random motion, new in each (stochastic backscatter: Mason and Thomson 1992). To make the eddies that are there faster
-would keep their directions, in which the smooth velocity has drawn them out.
+out into sheets and threads. `with_small_eddies` makes up what is missing, and what interpolation takes away in every
+step: random motion, new in each (stochastic backscatter: Mason and Thomson 1992). To make the eddies that are there
+faster would keep their directions, in which the smooth velocity has drawn them out.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -111,32 +112,27 @@ EDGE = 5
 """Voxels over which the eddies end beside the smoke."""
 
 
-@dataclass(frozen=True)
-class SmallEddies:
-    """The eddies of each of `SIZES` that smoke has, of a `speed` in m/s, root mean square of each component."""
+def small_eddy_speed(states: Sequence[SmokeState]) -> float:
+    """The speed in m/s, root mean square of each component, that eddies of each of `SIZES` should have in a clip."""
+    squares = [sum(_mean_squares(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3)) for m in states]
+    return INTENSITY * math.sqrt(float(np.median(squares)))
 
-    speed: float
 
-    @staticmethod
-    def of(states: Sequence[SmokeState]) -> SmallEddies:
-        """The eddies that a clip's smoke should have, by some of its states."""
-        squares = [sum(_mean_squares(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3)) for m in states]
-        return SmallEddies(INTENSITY * float(np.median(squares)) ** 0.5)
+def with_small_eddies(velocity: Velocity, density: Array, speed: float, step: int = 0) -> Velocity:
+    """A velocity whose smoke has eddies of each of `SIZES` of a `small_eddy_speed`; it may have divergence.
 
-    def added(self, velocity: Velocity, density: Array, step: int = 0) -> Velocity:
-        """A velocity with the eddies that its smoke lacks; it may have divergence.
-
-        They are others in every step, so that they have nothing to do with the flow and their energy adds to its own.
-        """
-        faces = list(velocity.faces)
-        smoke, near = _on_faces(density)
-        for number, (octave, found) in enumerate(_octaves(velocity)):
-            missing = 3 * self.speed**2 - sum(_mean_squares(found, smoke))
-            if missing > 0:
-                eddies = Turbulence(missing**0.5, octave.eddy * velocity.voxel_size, step * len(SIZES) + number)
-                added = eddies.velocity(velocity, 0.0)
-                faces = [u + weight * eddy for u, weight, eddy in zip(faces, near, added, strict=True)]
-        return velocity.with_faces(faces)
+    What is missing is added, with other eddies in every step, so that they have nothing to do with the flow and their
+    energy adds to its own.
+    """
+    faces = list(velocity.faces)
+    smoke, near = _on_faces(density)
+    for number, (octave, found) in enumerate(_octaves(velocity)):
+        missing = 3 * speed**2 - sum(_mean_squares(found, smoke))
+        if missing > 0:
+            eddies = Turbulence(missing**0.5, octave.eddy * velocity.voxel_size, step * len(SIZES) + number)
+            added = eddies.velocity(velocity, 0.0)
+            faces = [u + weight * eddy for u, weight, eddy in zip(faces, near, added, strict=True)]
+    return velocity.with_faces(faces)
 
 
 def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:

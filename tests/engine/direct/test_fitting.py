@@ -90,11 +90,11 @@ def test_a_velocity_that_is_estimated_wrong_does_not_go_on():
     wrong = [slowed(states[0], -5.0), *states[1:]]
     simulation = fit_simulation(wrong, DT, inlet)
     assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.2)
-    assert error(spun_up(replace(simulation, eddies=None), wrong).velocity, states[-1].velocity) < 0.1
+    assert error(spun_up(replace(simulation, eddy_speed=0.0), wrong).velocity, states[-1].velocity) < 0.1
 
 
 def test_a_velocity_that_the_forces_explain_stays():
     states, inlet = plume(), Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     simulation = fit_simulation(states, DT, inlet)
     assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.1)
-    assert error(spun_up(replace(simulation, eddies=None), states).velocity, states[-1].velocity) < 0.05
+    assert error(spun_up(replace(simulation, eddy_speed=0.0), states).velocity, states[-1].velocity) < 0.05

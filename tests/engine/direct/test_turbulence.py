@@ -9,7 +9,7 @@ from smokelift.direct import Simulation, SmokeState, Turbulence
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import INTENSITY, SmallEddies
+from smokelift.direct.turbulence import INTENSITY, small_eddy_speed, with_small_eddies
 from smokelift.transport import Velocity, at_centres, divergence, project
 from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
 
@@ -81,16 +81,16 @@ def energy(state: SmokeState, smoke: bool = True) -> float:
 
 def test_a_smooth_velocity_gains_eddies_in_the_smoke():
     smooth = stirred(16)
-    eddies_of_clip = SmallEddies.of([smooth, smooth])
-    assert eddies_of_clip.speed == pytest.approx(INTENSITY * energy(smooth) ** 0.5, rel=1e-3)
-    found = eddies_of_clip.added(smooth.velocity, smooth.density)
+    eddy_speed = small_eddy_speed([smooth, smooth])
+    assert eddy_speed == pytest.approx(INTENSITY * energy(smooth) ** 0.5, rel=1e-3)
+    found = with_small_eddies(smooth.velocity, smooth.density, eddy_speed)
     gained = [replace(smooth, velocity=found), replace(smooth, velocity=project(found))]
     assert all(energy(state) > 1.05 * energy(smooth) for state in gained)
     far = np.ones(SHAPE, bool)
     far[1:-1, 1:-1, 1:-1] = False
     for before, after in zip(*(at_centres(m.velocity.faces) for m in (smooth, gained[1])), strict=True):
         assert np.abs(after - before)[far].mean() < 0.1 * np.abs(before)[far].mean()
-    again, next_step = (eddies_of_clip.added(smooth.velocity, smooth.density, step) for step in (0, 1))
+    again, next_step = (with_small_eddies(smooth.velocity, smooth.density, eddy_speed, step) for step in (0, 1))
     np.testing.assert_array_equal(again.faces[0], found.faces[0])
     new = [
         smooth.velocity.with_faces(u - a for u, a in zip(m.faces, smooth.velocity.faces, strict=True))
@@ -102,7 +102,7 @@ def test_a_smooth_velocity_gains_eddies_in_the_smoke():
 def test_small_eddies_stay_as_fast_as_they_are():
     state = stirred(2.2, 4, 8)
     left = Simulation(Physics(0.0, 0.0), Inflow(np.zeros(SHAPE, bool), [state]).cropped(), Surroundings(), DT)
-    kept = replace(left, eddies=SmallEddies(0.2))
+    kept = replace(left, eddy_speed=0.2)
     with_eddies, without = (course(each, state, 24)[-1] for each in (kept, left))
     assert energy(without) < 0.5 * energy(state)
     assert 0.7 < energy(with_eddies) / energy(state) < 2
@@ -110,6 +110,6 @@ def test_small_eddies_stay_as_fast_as_they_are():
 
 def test_a_velocity_that_has_its_eddies_and_still_air_gain_none():
     full, still = stirred(2.2, 4, 8), SmokeState(np.ones(SHAPE, np.float32), Velocity.zero(SHAPE, VOXEL))
-    for eddies_of_clip, state in ((SmallEddies(0.05), full), (SmallEddies.of([still]), still)):
-        found = eddies_of_clip.added(state.velocity, state.density, 1)
+    for eddy_speed, state in ((0.05, full), (small_eddy_speed([still]), still)):
+        found = with_small_eddies(state.velocity, state.density, eddy_speed, 1)
         np.testing.assert_array_equal(found.faces[2], state.velocity.faces[2])
