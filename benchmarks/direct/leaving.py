@@ -30,7 +30,8 @@ from smokelift.evaluation.orbit import Orbit
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence, box_around_all
 from smokelift.scene import Domain
-from smokelift.transport import Array, at_centres, faces_in
+from smokelift.transport import Velocity, faces_in
+from smokelift.transport.advection import fraction_inside
 
 HEADER = ["case", "room", "left by a face", "dissolved", "box at the end", "seconds a frame: first, last six"]
 
@@ -59,19 +60,9 @@ def left_by_a_face(sequence: Sequence, start: int) -> float:
             box = sequence.box(number)
             part = box.slices_in(sequence.scene.domain)
             before = sequence.density(number - 1)[part]
-            faces = faces_in(sequence.velocity(number).faces, part)
-            left += float((before * (1 - share_inside(faces, dt / box.voxel_size))).sum(dtype=np.float64))
+            velocity = Velocity(faces_in(sequence.velocity(number).faces, part), box.voxel_size)
+            left += float((before * (1 - fraction_inside(velocity.displacement(dt)))).sum(dtype=np.float64))
     return left / float(sequence.density(start).sum(dtype=np.float64))
-
-
-def share_inside(faces: tuple[Array, Array, Array], scale: float) -> Array:
-    """Return the part of every voxel that is still in the box after it has gone `scale` times the velocity."""
-    fraction = np.ones((), np.float32)
-    for axis, along in enumerate(at_centres(faces)):
-        count = along.shape[axis]
-        low = scale * along + np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
-        fraction = fraction * np.clip(np.minimum(low + 1, count - low), 0, 1)
-    return fraction
 
 
 def seen(sequence: Sequence, number: int, around: Domain, degrees: float) -> npt.NDArray[np.uint8]:

@@ -96,7 +96,7 @@ def advect(
     if field.min() < 0:
         raise ValueError("mass can be kept for a density, not for negative values; leave it out.")
     other = _core.advect_cells(field, displacement.faces, not corrected)
-    mass = float(np.sum(field * _fraction_inside(displacement), dtype=np.float64))
+    mass = float(np.sum(field * fraction_inside(displacement), dtype=np.float64))
     return _with_mass(moved, np.abs(moved - other), mass)
 
 
@@ -121,7 +121,7 @@ def _with_mass(moved: Array, doubt: Array, mass: float) -> Array:
     return moved * np.float32(mass / found) if found > 0 else moved
 
 
-def _fraction_inside(displacement: StaggeredGrid) -> Array:
+def fraction_inside(displacement: StaggeredGrid) -> Array:
     """The part of every voxel that is still in the box after a step: nothing leaves through walls."""
     fraction = np.ones((), np.float32)
     for axis, along in enumerate(at_centres(displacement.faces)):
