@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.direct.constraint import faces_of
 from smokelift.direct.fitting import BUOYANCY_FRAMES, coarse, fit_simulation, spun_up
 from smokelift.direct.growth import (
     Growth,
@@ -22,7 +21,7 @@ from smokelift.direct.growth import (
 )
 from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, write_copy, write_simulated
 from smokelift.direct.state import SmokeState, read_state
-from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Obstacle, Obstacles, Surroundings, require_place
+from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Obstacle, Surroundings, require_place
 from smokelift.direct.turbulence import Turbulence
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
@@ -238,15 +237,14 @@ def _start_box(continuation: Continuation, growth: Growth) -> Domain:
 
 def _surroundings(continuation: Continuation, domain: Domain, clip: Domain) -> Surroundings:
     """What is placed in a box that the clip's has grown to."""
-    blown = tuple((faces_of(fan.place.voxels(domain)), fan.velocity) for fan in continuation.fans)
     for turbulence in continuation.turbulences:
         if turbulence.size < SMALLEST_EDDY * domain.voxel_size:
             raise ValueError(
                 f"turbulence of {turbulence.size:g} m is too small for voxels of {domain.voxel_size:.3g} m; make it "
                 f"{SMALLEST_EDDY * domain.voxel_size:.3g} m at least."
             )
-    obstacles = Obstacles(domain, continuation.obstacles) if continuation.obstacles else None
-    return Surroundings(continuation.wind, continuation.turbulences, blown, obstacles, domain.first_in(clip))
+    placed = continuation.wind, continuation.turbulences, continuation.fans, continuation.obstacles
+    return Surroundings(domain, *placed, domain.first_in(clip))
 
 
 def _as_settings(obstacle: Obstacle) -> dict[str, Any]:

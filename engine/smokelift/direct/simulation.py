@@ -128,7 +128,7 @@ class Simulation:
         faces = [component.copy() for component in moved.faces]
         lifted = 0.5 * (state.density[:, :, 1:] + state.density[:, :, :-1])
         faces[2][:, :, 1:-1] += np.float32(self.dt * self.physics.buoyancy) * lifted
-        for fan_faces, fan_velocity in self.surroundings.blown:
+        for fan_faces, fan_velocity in self.surroundings.fan_faces:
             for component, inside, speed in zip(faces, fan_faces, fan_velocity, strict=True):
                 component[inside] = speed
         self.inflow.velocity_into(faces, step)

@@ -99,33 +99,6 @@ class Solid(NamedTuple):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Obstacles:
-    """Everything that smoke cannot go through, in a box or outside it."""
-
-    domain: Domain
-    things: tuple[Obstacle, ...]
-
-    def at(self, step: int, dt: float) -> Solid | None:
-        """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
-        solid = Solid(self._still, None)
-        for thing in self.things:
-            if isinstance(thing, Mesh) and thing.moves:
-                solid = _with(solid, *thing.solid(self.domain, step, dt))
-        if solid.voxels.all():
-            raise ValueError("the obstacles fill the whole box; make them smaller.")
-        return solid if solid.voxels.any() else None
-
-    @cached_property
-    def _still(self) -> Mask:
-        """The voxels of what does not move."""
-        still: Mask = np.zeros(self.domain.shape, bool)
-        for thing in self.things:
-            if not (isinstance(thing, Mesh) and thing.moves):
-                still |= thing.voxels(self.domain)
-        return still
-
-
 def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
     """What is solid with a thing that moves."""
     before = solid.velocity or [np.zeros(shape, np.float32) for shape in face_shapes(voxels.shape)]
@@ -171,22 +144,25 @@ class Surroundings:
 
     Attributes
     ----------
+    domain
+        The box; None where nothing is placed in it.
     wind
         Velocity in m/s that all air gains, beside what moves it already.
     turbulences
         Eddies that all air gains, likewise.
-    blown
-        The faces of every fan's voxels, with its velocity in m/s.
+    fans
+        In the box.
     obstacles
-        Through which nothing passes; None without any.
+        Through which nothing passes, in the box or outside it.
     first
         Voxel at which the box begins, counted from the clip's box: turbulence stays where it is when the box grows.
     """
 
+    domain: Domain | None = None
     wind: Vector = (0.0, 0.0, 0.0)
     turbulences: tuple[Turbulence, ...] = ()
-    blown: tuple[tuple[FaceMasks, Vector], ...] = ()
-    obstacles: Obstacles | None = None
+    fans: tuple[Fan, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     first: tuple[int, ...] = (0, 0, 0)
 
     def air(self, like: Velocity, time: float) -> list[Array]:
@@ -198,6 +174,29 @@ class Surroundings:
             faces = [component + eddy for component, eddy in zip(faces, eddies, strict=True)]
         return [gained * component for component in faces]
 
+    @cached_property
+    def fan_faces(self) -> list[tuple[FaceMasks, Vector]]:
+        """The faces of every fan's voxels, with its velocity in m/s."""
+        return [(faces_of(fan.place.voxels(self.domain)), fan.velocity) for fan in self.fans if self.domain is not None]
+
     def solid(self, step: int, dt: float) -> Solid | None:
-        """What is solid after so many steps; None if nothing is."""
-        return self.obstacles.at(step, dt) if self.obstacles is not None else None
+        """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
+        if self.domain is None or not self.obstacles:
+            return None
+        solid = Solid(self._at_rest, None)
+        for obstacle in self.obstacles:
+            if isinstance(obstacle, Mesh) and obstacle.moves:
+                solid = _with(solid, *obstacle.solid(self.domain, step, dt))
+        if solid.voxels.all():
+            raise ValueError("the obstacles fill the whole box; make them smaller.")
+        return solid if solid.voxels.any() else None
+
+    @cached_property
+    def _at_rest(self) -> Mask:
+        """The voxels of the obstacles that do not move."""
+        assert self.domain is not None
+        voxels: Mask = np.zeros(self.domain.shape, bool)
+        for obstacle in self.obstacles:
+            if not (isinstance(obstacle, Mesh) and obstacle.moves):
+                voxels |= obstacle.voxels(self.domain)
+        return voxels

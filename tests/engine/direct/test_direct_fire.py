@@ -7,7 +7,7 @@ import pytest
 
 from smokelift.direct import Ball, fit_simulation
 from smokelift.direct.burning import Combustion, fit_fire
-from smokelift.direct.surroundings import Obstacles, Surroundings
+from smokelift.direct.surroundings import Surroundings
 from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume
 
 
@@ -20,7 +20,7 @@ def test_fire_without_fuel_burns_out():
 
 def test_nothing_burns_in_an_obstacle():
     ball = Ball((0.0, 0.0, 0.3), 0.4)
-    around = Surroundings(obstacles=Obstacles(DOMAIN, (ball,)))
+    around = Surroundings(DOMAIN, obstacles=(ball,))
     clip = plume(burning=True)
     after = fit_simulation(clip, DT, surroundings=around).next(clip[-1], 1)
     assert not after.flame[ball.voxels(DOMAIN)].any()

@@ -61,7 +61,7 @@ def test_a_box_stays_below_its_largest_size_and_before_cameras_and_lamps():
 def test_a_larger_box_changes_nothing_where_the_smaller_was():
     clip, larger = DOMAIN, DOMAIN.grown((8, 0, 16), (0, 8, 8))
     before, after = (
-        Surroundings((0.3, 0.0, 0.0), (Turbulence(0.5, 0.6),), first=box.first_in(clip)) for box in (clip, larger)
+        Surroundings(box, (0.3, 0.0, 0.0), (Turbulence(0.5, 0.6),), first=box.first_in(clip)) for box in (clip, larger)
     )
     still = at_rest(blob())
     state = replace(still, velocity=still.velocity.with_faces(before.air(still.velocity, 0.5)), flame=still.density)

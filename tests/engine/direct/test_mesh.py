@@ -10,7 +10,7 @@ from smokelift.direct import BoxObstacle, Continuation, Mesh, continue_sequence,
 from smokelift.direct.constraint import faces_between
 from smokelift.direct.mesh import HEADER, RECORD
 from smokelift.direct.simulation import Physics
-from smokelift.direct.surroundings import Obstacles, Surroundings, require_place
+from smokelift.direct.surroundings import Surroundings, require_place
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.transport import divergence
@@ -120,11 +120,11 @@ def test_the_surface_has_the_speed_of_its_corners():
 def test_an_obstacle_pushes_still_smoke_before_it():
     """Nothing goes through its faces but with it, no smoke is lost, and the air has no divergence."""
     moving = along_x(octahedron((-0.55, 0.0, 1.5), 0.4), 0.8, 12)
-    obstacles = Obstacles(DOMAIN, (moving,))
+    around = Surroundings(DOMAIN, obstacles=(moving,))
     start = at_rest(blob((0.0, 0.0, 1.5), 0.2))
-    states = course(free(Physics(0.0, 0.0), Surroundings(obstacles=obstacles)), start, 12)
+    states = course(free(Physics(0.0, 0.0), around), start, 12)
     for step, state in enumerate(states[1:], 1):
-        solid = obstacles.at(step, DT)
+        solid = around.solid(step, DT)
         for mask, component, wanted in zip(
             faces_between(solid.voxels), state.velocity.faces, solid.velocity, strict=True
         ):
@@ -174,4 +174,4 @@ def test_a_mesh_that_never_reaches_the_box_is_refused():
     with pytest.raises(ValueError):
         require_place("obstacle", along_x(far, 0.1, 5), DOMAIN, DOMAIN)
     require_place("obstacle", along_x(far, 0.1, 5), DOMAIN, DOMAIN.grown((0, 0, 0), (40, 0, 0)))
-    assert Obstacles(DOMAIN, (along_x(far, -24.0, 5),)).at(1, DT) is None
+    assert Surroundings(DOMAIN, obstacles=(along_x(far, -24.0, 5),)).solid(1, DT) is None

@@ -6,7 +6,7 @@ import pytest
 from smokelift.direct import Ball, Simulation, SmokeState, fit_simulation
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Physics
-from smokelift.direct.surroundings import Obstacles, Surroundings
+from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import divergence
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 
@@ -51,7 +51,7 @@ def test_smoke_goes_round_an_obstacle():
     ball = Ball((0.0, 0.0, 1.4), 0.35)
     solid = ball.voxels(DOMAIN)
     start = at_rest(np.where(solid, np.float32(0), blob()))
-    states = course(free(PHYSICS, Surroundings(obstacles=Obstacles(DOMAIN, (ball,)))), start, 36)
+    states = course(free(PHYSICS, Surroundings(DOMAIN, obstacles=(ball,))), start, 36)
     for state in states[1:]:
         assert not state.density[solid].any()
         assert np.abs(divergence(state.velocity))[~solid].max() * DOMAIN.voxel_size < 0.02
@@ -64,7 +64,7 @@ def test_smoke_goes_round_an_obstacle():
 def test_an_obstacle_closes_the_inlet_that_it_covers():
     inlet = Ball((0.0, 0.0, 1.4), 0.3)
     inflow = Inflow(inlet.voxels(DOMAIN), (at_rest(blob()),))
-    around = Surroundings(obstacles=Obstacles(DOMAIN, (Ball(inlet.centre, 0.4),)))
+    around = Surroundings(DOMAIN, obstacles=(Ball(inlet.centre, 0.4),))
     nothing = at_rest(np.zeros(DOMAIN.shape, np.float32))
     assert Simulation(PHYSICS, inflow, Surroundings(), DT).next(nothing, 1).density.any()
     assert not Simulation(PHYSICS, inflow, around, DT).next(nothing, 1).density.any()
