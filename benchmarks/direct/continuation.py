@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
 from benchmarks.tables import markdown
-from smokelift.direct import SmokeState, coarse, complete_velocity, fit_simulation, spun_up
+from smokelift.direct import SmokeState, coarsen_state, complete_velocity, fit_simulation, spin_up
 from smokelift.direct.continuation import FITTED_FRAMES
 from smokelift.direct.fitting import BUOYANCY_FRAMES
 from smokelift.direct.simulation import Physics, Simulation
@@ -68,7 +68,7 @@ def ways(
     simulation = fitted_simulation(fitted or moments, dt)
     if true:
         simulation = replace(simulation, eddy_speed=0.0)
-    simulated = [spun_up(simulation, moments[-FITTED_FRAMES:])]
+    simulated = [spin_up(simulation, moments[-FITTED_FRAMES:])]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))
     yield "simulated", simulated[1:], simulation.physics
@@ -76,7 +76,7 @@ def ways(
 
 def fitted_simulation(moments: list[SmokeState], dt: float) -> Simulation:
     """Return the simulation that `smokelift continue` goes on with."""
-    earlier = [coarse(moment) for moment in moments[-BUOYANCY_FRAMES:-FITTED_FRAMES]]
+    earlier = [coarsen_state(moment) for moment in moments[-BUOYANCY_FRAMES:-FITTED_FRAMES]]
     return fit_simulation(moments[-FITTED_FRAMES:], dt, earlier=earlier)
 
 

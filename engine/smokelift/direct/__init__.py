@@ -1,7 +1,7 @@
 """Smoke after its clip: continued, retimed, looped, and made to react to wind, turbulence, fans and obstacles."""
 
 from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
-from smokelift.direct.fitting import coarse, fit_simulation, spun_up
+from smokelift.direct.fitting import coarsen_state, fit_simulation, spin_up
 from smokelift.direct.looping import default_overlap, loop_length, loop_sequence, steady_part
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.new_sequence import open_source
@@ -23,7 +23,7 @@ __all__ = [
     "Simulation",
     "SmokeState",
     "Turbulence",
-    "coarse",
+    "coarsen_state",
     "complete_velocity",
     "continue_sequence",
     "default_overlap",
@@ -34,6 +34,6 @@ __all__ = [
     "playback",
     "read_state",
     "retime_sequence",
-    "spun_up",
+    "spin_up",
     "steady_part",
 ]

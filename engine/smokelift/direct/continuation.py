@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.direct.fitting import BUOYANCY_FRAMES, coarse, fit_simulation, spun_up
+from smokelift.direct.fitting import BUOYANCY_FRAMES, coarsen_state, fit_simulation, spin_up
 from smokelift.direct.growth import (
     Growth,
     camera_and_lamp_places,
-    dissolved,
+    dissolve,
     in_larger_box,
     moves,
 )
-from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, write_copy, write_simulated
+from smokelift.direct.new_sequence import MIN_FRAMES, Written, directed_writer, write_copy, write_simulated
 from smokelift.direct.state import SmokeState, read_state
 from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Obstacle, Surroundings, require_place
 from smokelift.direct.turbulence import Turbulence
@@ -43,7 +43,7 @@ DISSOLVED = "dissolved"
 CONTRADICTED = "contradicted_buoyancy"
 """Figure of a simulated frame: the buoyancy in m/s2 that was fitted and not taken, 0 if it was."""
 
-SMALLEST_EDDY = 3
+MIN_EDDY_VOXELS = 3
 """Voxels across an eddy, at least: fewer do not show that it turns."""
 
 ROOM = 8.0
@@ -119,10 +119,10 @@ def continue_sequence(
     """
     start = sequence.frames[-1] if continuation.start is None else continuation.start
     copied = tuple(number for number in sequence.frames if number <= start)
-    if start not in sequence.frames or len(copied) < SHORTEST:
+    if start not in sequence.frames or len(copied) < MIN_FRAMES:
         raise ValueError(
             f"{sequence.directory}: cannot go on from frame {start}; choose one from "
-            f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
+            f"{sequence.frames[MIN_FRAMES - 1]} to {sequence.frames[-1]}."
         )
     growth = _growth(continuation, sequence.scene)
     box = _start_box(continuation, growth)
@@ -170,7 +170,7 @@ def _simulated(
         dt,
         sequence.scene.inflow(),
         _surroundings(continuation, clip, clip),
-        earlier=[coarse(read_state(sequence, number)) for number in earlier],
+        earlier=[coarsen_state(read_state(sequence, number)) for number in earlier],
         depth_axis=_depth_axis(sequence.scene.camera),
         buoyancy=continuation.buoyancy,
         dissipation=continuation.dissipation,
@@ -184,7 +184,7 @@ def _simulated(
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     else:
         box, larger = clip, _start_box(continuation, growth)
-        state = spun_up(simulation, states)
+        state = spin_up(simulation, states)
         state = replace(state, velocity=replace(state.velocity, closed=growth.closed))
     del states  # they are large
     for step in range(1, continuation.frames + 1):
@@ -199,10 +199,10 @@ def _simulated(
             box = larger
         state = simulation.next(state, step)
         mass = float(state.density.sum(dtype=np.float64))
-        state = dissolved(state, growth.stopped(box), dt, box.first_in(clip))
+        state = dissolve(state, growth.stopped(box), dt, box.first_in(clip))
         gone = 1 - float(state.density.sum(dtype=np.float64)) / mass if mass > 0 else 0.0
         shown = min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
-        faded = state.thinned(np.float32(shown))
+        faded = state.scaled(np.float32(shown))
         solid = simulation.surroundings.solid(step, dt)
         obstacles = None if solid is None else solid.voxels
         further = {**vars(simulation.physics), DISSOLVED: gone}
@@ -238,10 +238,10 @@ def _start_box(continuation: Continuation, growth: Growth) -> Domain:
 def _surroundings(continuation: Continuation, domain: Domain, clip: Domain) -> Surroundings:
     """What is placed in a box that the clip's has grown to."""
     for turbulence in continuation.turbulences:
-        if turbulence.size < SMALLEST_EDDY * domain.voxel_size:
+        if turbulence.size < MIN_EDDY_VOXELS * domain.voxel_size:
             raise ValueError(
                 f"turbulence of {turbulence.size:g} m is too small for voxels of {domain.voxel_size:.3g} m; make it "
-                f"{SMALLEST_EDDY * domain.voxel_size:.3g} m at least."
+                f"{MIN_EDDY_VOXELS * domain.voxel_size:.3g} m at least."
             )
     placed = continuation.wind, continuation.turbulences, continuation.fans, continuation.obstacles
     return Surroundings(domain, *placed, domain.first_in(clip))

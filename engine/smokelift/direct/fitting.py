@@ -33,14 +33,14 @@ from smokelift.direct.turbulence import small_eddy_speed, with_small_eddies
 from smokelift.transport import Array, advect, at_centres, project
 from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 
-COARSE = 64
+COARSE_SIDE_VOXELS = 64
 """Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a mean motion needs no more."""
 
 MIN_FRAMES = 8
 """Frames that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
 which is within its error."""
 
-UNUSUAL = 2.0
+MAX_SPEED_RATIO = 2.0
 """Times the median speed above which a state's velocity is taken to be wrong."""
 
 BUOYANCY_FRAMES = 24
@@ -50,20 +50,20 @@ slow (docs/experiments/continuation.md)."""
 BLUR = 1.5
 """Standard deviation in coarse voxels of the blur before pictures are compared: finer detail is of interpolation."""
 
-BORDER = 2
+BORDER_LAYERS = 2
 """Layers of coarse voxels at the lower and the upper side whose smoke may have come in or gone out."""
 
-AROUND = 1
+INLET_MARGIN = 1
 """Coarse voxels around an inlet that are not compared: inlets are found roughly, and what enters there stands still."""
 
-STEADINESS = 0.1
+BRIGHTNESS_RIDGE = 0.1
 """Weight, in units of the brightness itself, against a brightness that changes with height: without texture nothing
 else tells such a change from a rise."""
 
-TRIALS = 6
+MAX_SECANT_STEPS = 6
 """Steps of the secant method at most: the rise is nearly linear in the buoyancy."""
 
-MIN_RISE_DIFFERENCE = 1e-9
+RISE_ROUNDING = 1e-9
 """Voxels per frame of difference in rise, at most, that are rounding."""
 
 PRECISION = 0.01
@@ -92,7 +92,7 @@ def fit_simulation(
     surroundings
         What the artist has placed; nothing if None.
     earlier
-        The frames before them, `coarse`, which show the buoyancy as well.
+        The frames before them, from `coarsen_state`, which show the buoyancy as well.
     depth_axis
         0 or 1: the axis, x or y, that is nearest to the camera's line of sight. Motion is compared in the picture.
     buoyancy, dissipation
@@ -102,7 +102,7 @@ def fit_simulation(
     if dissipation is None:
         dissipation = _dissipation(states, dt, inflow.voxels)
     if buoyancy is None:
-        fitted, rise = _buoyancy([*earlier, *map(coarse, states)], dt, _coarse_mask(inflow.voxels), depth_axis)
+        fitted, rise = _buoyancy([*earlier, *map(coarsen_state, states)], dt, _coarse_mask(inflow.voxels), depth_axis)
         contradicted = fitted * rise < 0
         physics = Physics(0.0 if contradicted else fitted, dissipation, fitted if contradicted else 0.0)
     else:
@@ -111,26 +111,26 @@ def fit_simulation(
     return Simulation(physics, inflow.cropped(), around, dt, fit_fire(states, dt), small_eddy_speed(states))
 
 
-def coarse(state: SmokeState) -> SmokeState:
+def coarsen_state(state: SmokeState) -> SmokeState:
     """The state on the grid that the buoyancy is fitted on, without fire."""
-    while max(state.density.shape) > COARSE:
+    while max(state.density.shape) > COARSE_SIDE_VOXELS:
         state = SmokeState(coarsen_density(state.density), coarsen_velocity(state.velocity))
     return SmokeState(state.density, state.velocity)
 
 
 def _coarse_mask(voxels: Mask) -> Mask:
-    while max(voxels.shape) > COARSE:
+    while max(voxels.shape) > COARSE_SIDE_VOXELS:
         voxels = coarsen_density(voxels.astype(np.float32)) > 0
     return voxels
 
 
-def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
+def spin_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
     """The last of some consecutive states, with the velocity that the forces have made since the first, and its eddies.
 
     The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
     first = _first_typical(states)
-    along, velocity = _along(simulation), states[first].velocity
+    along, velocity = _replayed(simulation), states[first].velocity
     for step, state in enumerate(states[first:-1], first + 1):
         velocity = along.velocity(replace(state, velocity=velocity), step)
     with_eddies = with_small_eddies(velocity, states[-1].density, simulation.eddy_speed)
@@ -140,11 +140,11 @@ def spun_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
 def _first_typical(states: Sequence[SmokeState]) -> int:
     """The first state whose velocity is as fast as usual: a wrong one would go on through all others."""
     speeds = [sum(float(np.vdot(component, component)) for component in m.velocity.faces) ** 0.5 for m in states]
-    usual = UNUSUAL * float(np.median(speeds))
+    usual = MAX_SPEED_RATIO * float(np.median(speeds))
     return next((number for number in range(len(states) // 2) if speeds[number] <= usual), 0)
 
 
-def _along(simulation: Simulation) -> Simulation:
+def _replayed(simulation: Simulation) -> Simulation:
     """The simulation of the clip itself: step n goes to state n, and what entered then enters."""
     return Simulation(simulation.physics, simulation.inflow.forwards(), Surroundings(), simulation.dt)
 
@@ -158,9 +158,9 @@ def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis:
     if len(states) < MIN_FRAMES or not all(state.density.any() for state in states):
         return 0.0, 0.0
     half, first = len(states) // 2, _first_typical(states)
-    still = Simulation(Physics(0.0, 0.0), Inflow(inlets, states).cropped(), Surroundings(), dt)
-    compared = (~ndimage.binary_dilation(inlets, iterations=AROUND)).astype(np.float32)
-    compared[:, :, :BORDER] = compared[:, :, -BORDER:] = 0
+    unforced = Simulation(Physics(0.0, 0.0), Inflow(inlets, states).cropped(), Surroundings(), dt)
+    compared = (~ndimage.binary_dilation(inlets, iterations=INLET_MARGIN)).astype(np.float32)
+    compared[:, :, :BORDER_LAYERS] = compared[:, :, -BORDER_LAYERS:] = 0
 
     def picture(density: Array) -> Array:
         blurred: Array = ndimage.gaussian_filter((density * compared).sum(depth_axis), BLUR)
@@ -170,23 +170,23 @@ def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis:
 
     rise = float(np.mean([_rise(state, compared) for state in states]))
 
-    def too_high(buoyancy: float) -> float:
+    def excess_rise(buoyancy: float) -> float:
         """Voxels per frame by which the carried smoke rises more than the clip's."""
-        along = _along(replace(still, physics=Physics(buoyancy, 0.0)))
+        along = _replayed(replace(unforced, physics=Physics(buoyancy, 0.0)))
         velocity, carried = states[first].velocity, []
         for step, before in enumerate(states[first:-1], first + 1):
             velocity = along.velocity(replace(before, velocity=velocity), step)
             if step >= half:
                 carried.append(picture(advect(before.density, velocity, dt, conserve=True)))
-        return _higher(carried, found[half:], rise)
+        return _vertical_shift(carried, found[half:], rise)
 
     density = states[half].density
     typical = float(np.vdot(density, density) / density.sum(dtype=np.float64))
     by_a_voxel = states[0].velocity.voxel_size / (typical * (half * dt) ** 2)
-    return _root(too_high, by_a_voxel), rise
+    return _root(excess_rise, by_a_voxel), rise
 
 
-def _higher(carried: Sequence[Array], found: Sequence[Array], rise: float) -> float:
+def _vertical_shift(carried: Sequence[Array], found: Sequence[Array], rise: float) -> float:
     """Voxels by which carried pictures (n, nz) are higher than those that are found.
 
     It is the optical flow of Lucas and Kanade, common to all pixels, beside the brightness of each picture and one that
@@ -201,7 +201,7 @@ def _higher(carried: Sequence[Array], found: Sequence[Array], rise: float) -> fl
         changes -= np.outer(changes @ brightness, brightness)
         products += changes @ changes.T
         sums -= changes @ one.ravel()
-    products[1, 1] *= 1 + STEADINESS
+    products[1, 1] *= 1 + BRIGHTNESS_RIDGE
     if not products[0, 0] > 0:
         return 0.0
     higher, brighter = np.linalg.lstsq(products, sums, rcond=None)[0]
@@ -221,9 +221,9 @@ def _root(function: Callable[[float], float], start: float) -> float:
     Of the package's libraries `scipy.optimize` alone is not in the extension.
     """
     before, at_before, now = 0.0, function(0.0), start
-    for _ in range(TRIALS):
+    for _ in range(MAX_SECANT_STEPS):
         at_now = function(now)
-        if abs(at_now - at_before) <= MIN_RISE_DIFFERENCE:
+        if abs(at_now - at_before) <= RISE_ROUNDING:
             return 0.0
         before, now, at_before = now, now - at_now * (now - before) / (at_now - at_before), at_now
         if abs(now - before) <= PRECISION * abs(now):

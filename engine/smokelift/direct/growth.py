@@ -25,16 +25,16 @@ BLOCK = 8
 MARGIN_VOXELS = 4
 """Voxels of clear air between smoke and an open side. Pressure is zero there, which bends the flow nearby."""
 
-SEEN = np.float32(1e-3)
+MIN_DENSITY_FRACTION = np.float32(1e-3)
 """Fraction of the largest density above which smoke counts as there."""
 
 FADE = 0.25
 """Fraction of the box's length over which smoke dissolves before a side that cannot move."""
 
-FADE_POWER = 2.0
+FADE_EXPONENT = 2.0
 """Power of the distance to such a side that is left of the smoke: its value and its slope end at zero."""
 
-AT_SIDE = np.float32(0.5)
+HALF_VOXEL = np.float32(0.5)
 """Voxels from the surface at which smoke is gone to a voxel's center, at least."""
 
 BUMPS = 0.6
@@ -70,7 +70,7 @@ class Growth:
 
     def after(self, box: Domain, state: SmokeState, dt: float) -> Domain:
         """The box for the step that follows a state, whose smoke may be near a side of its own."""
-        smoke = box_around(state.density > SEEN * state.density.max(), 0)
+        smoke = box_around(state.density > MIN_DENSITY_FRACTION * state.density.max(), 0)
         grown = box
         for side, axis, is_high in open_sides(self.closed):
             if smoke[axis].stop == 0:
@@ -145,14 +145,12 @@ def in_larger_box(state: SmokeState, ends: Moves, before: Surroundings, after: S
     return SmokeState(np.pad(state.density, ends), flow.with_faces(faces), flame)
 
 
-def dissolved(
-    state: SmokeState, stopped: tuple[Side, ...], dt: float, first: tuple[int, ...] = (0, 0, 0)
-) -> SmokeState:
+def dissolve(state: SmokeState, stopped: tuple[Side, ...], dt: float, first: tuple[int, ...] = (0, 0, 0)) -> SmokeState:
     """A state whose smoke has lost what it loses in a step on its way to sides that cannot move.
 
-    What is left of it goes with the distance to the power `FADE_POWER`, to a surface before the side that has bumps. So
-    it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight. The box
-    begins at the voxel `first` of the clip's: the bumps stay where they are when the box grows.
+    What is left of it goes with the distance to the power `FADE_EXPONENT`, to a surface before the side that has bumps.
+    So it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight. The
+    box begins at the voxel `first` of the clip's: the bumps stay where they are when the box grows.
     """
     if not stopped:
         return state
@@ -168,8 +166,8 @@ def dissolved(
         moved = np.maximum(voxels * at_centres(state.velocity.faces)[axis], 0)
         now = np.clip(distance, 0, band)
         before = np.minimum(now + moved, band)
-        left = left * ((now + AT_SIDE) / (before + AT_SIDE)) ** np.float32(FADE_POWER)
-    return state.thinned(left)
+        left = left * ((now + HALF_VOXEL) / (before + HALF_VOXEL)) ** np.float32(FADE_EXPONENT)
+    return state.scaled(left)
 
 
 def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ...]) -> Array:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, write_copy, write_simulated
+from smokelift.direct.new_sequence import MIN_FRAMES, Written, directed_writer, write_copy, write_simulated
 from smokelift.direct.state import SmokeState, interpolate, read_state
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Side
@@ -19,7 +19,7 @@ from smokelift.scene.domain import open_sides
 from smokelift.transport import Array, Velocity
 from smokelift.velocity import estimate_velocity
 
-LONGEST_OVERLAP = 24
+MAX_OVERLAP = 24
 """Frames that the start and the end of a loop share, at most, unless said otherwise. In a second the way from the one
 to the other is slow beside the smoke's own motion."""
 
@@ -31,7 +31,7 @@ BORDER, BORDER_FACTOR = 0.2, 16.0
 """Fraction of the box's length before an open side where smoke of one end alone goes sooner, and how many times the
 usual density is at the side: smoke of that density is gone there after a tenth of the overlap."""
 
-STEADY = 0.15
+MAX_STEADY_CHANGE = 0.15
 """Fraction of the smoke that may be elsewhere, in profiles along the axes, after a loop that counts as steady."""
 
 
@@ -42,7 +42,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     Start and end share `overlap` frames, by default those of `default_overlap`.
     """
     whole = len(sequence.frames)
-    shortest = max(SHORTEST, math.ceil(whole / 2), 2 * (overlap or 0))
+    shortest = max(MIN_FRAMES, math.ceil(whole / 2), 2 * (overlap or 0))
     if shortest >= whole:
         return sequence.frames[0], sequence.frames[-1]
     profiles = [_profile(sequence.density(number)) for number in sequence.frames]
@@ -52,7 +52,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
         for first in range(whole - count + 1):
             middle = first + shared // 2
             parts.append((_change(profiles[middle], profiles[middle + count - shared]), first, first + count - 1))
-        if min(parts)[0] <= STEADY:
+        if min(parts)[0] <= MAX_STEADY_CHANGE:
             break
     _, first, last = min(parts)
     return sequence.frames[first], sequence.frames[last]
@@ -60,7 +60,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
 
 def default_overlap(count: int) -> int:
     """Return the frames that the start and the end share of so many: a third."""
-    return min(LONGEST_OVERLAP, count // 3)
+    return min(MAX_OVERLAP, count // 3)
 
 
 def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
@@ -75,10 +75,10 @@ def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
     if not sequence.frames[0] <= first <= last <= sequence.frames[-1]:
         raise ValueError(f"{there}, not {first} to {last}.")
     count = last - first + 1
-    if count < SHORTEST or not 1 <= overlap <= count // 2:
+    if count < MIN_FRAMES or not 1 <= overlap <= count // 2:
         raise ValueError(
             f"{there}; a loop of {count} of them can overlap by {max(count // 2, 1)} at most, not by {overlap}: "
-            f"choose another overlap, or more frames ({SHORTEST} at least)."
+            f"choose another overlap, or more frames ({MIN_FRAMES} at least)."
         )
     return count - overlap
 

@@ -19,7 +19,7 @@ from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
 from smokelift.transport import Velocity, divergence, faces_in
 
-SHORTEST = 4
+MIN_FRAMES = 4
 """Frames that a sequence needs to be continued, retimed or looped."""
 
 Written = tuple[int, Mapping[str, Any]]
@@ -29,10 +29,9 @@ Written = tuple[int, Mapping[str, Any]]
 def open_source(directory: str | Path) -> Sequence:
     """Open the sequence that is directed; ValueError if there is none, or it has too few frames."""
     sequence = Sequence.open(directory)
-    if len(sequence.frames) < SHORTEST:
-        raise ValueError(
-            f"{directory}: has {counted(len(sequence.frames), 'frame')}; {SHORTEST} are needed to see how smoke moves."
-        )
+    if len(sequence.frames) < MIN_FRAMES:
+        has = counted(len(sequence.frames), "frame")
+        raise ValueError(f"{directory}: has {has}; {MIN_FRAMES} are needed to see how smoke moves.")
     return sequence
 
 

@@ -30,7 +30,7 @@ from smokelift.direct.surroundings import Solid, Surroundings
 from smokelift.direct.turbulence import with_small_eddies
 from smokelift.transport import Array, Velocity, advect, on_faces, project
 
-TRACE = np.float32(1e-4)
+TRACE_FRACTION = np.float32(1e-4)
 """Fraction of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
 
 
@@ -137,7 +137,7 @@ class Simulation:
 
 def _without_traces(density: Array, solid: Mask | None) -> Array:
     """The density with zero for traces and in obstacles, where interpolation puts some, and with its mass restored."""
-    there = density > TRACE * density.max()
+    there = density > TRACE_FRACTION * density.max()
     if solid is not None:
         there &= ~solid
     cleared = np.where(there, density, np.float32(0))

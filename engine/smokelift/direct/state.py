@@ -44,10 +44,10 @@ class SmokeState:
     velocity: Velocity
     flame: Array | None = None
 
-    def thinned(self, left: Array | np.float32) -> SmokeState:
-        """What is left of it where a fraction of its smoke and fire is, (nx, ny, nz) or one number."""
-        flame = None if self.flame is None else self.flame * left
-        return replace(self, density=self.density * left, flame=flame)
+    def scaled(self, factor: Array | np.float32) -> SmokeState:
+        """The state with its smoke and fire times a factor, (nx, ny, nz) or one number."""
+        flame = None if self.flame is None else self.flame * factor
+        return replace(self, density=self.density * factor, flame=flame)
 
 
 def read_state(sequence: Sequence, number: int) -> SmokeState:

@@ -17,7 +17,7 @@ from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
 from smokelift.transport import Array, Faces, Velocity, divergence, face_shapes, outflow
 
-RISE = 0.5
+RISE_SECONDS = 0.5
 """Seconds in which the air takes on most (1 - 1/e) of a wind that sets in: a gust, and not a blow."""
 
 
@@ -167,7 +167,7 @@ class Surroundings:
 
     def air(self, like: Velocity, time: float) -> list[Array]:
         """The velocity in m/s that wind and turbulence have given to all air after a time in seconds, on faces."""
-        gained = np.float32(1 - math.exp(-time / RISE))
+        gained = np.float32(1 - math.exp(-time / RISE_SECONDS))
         faces = [np.full_like(component, speed) for component, speed in zip(like.faces, self.wind, strict=True)]
         for turbulence in self.turbulences:
             eddies = turbulence.velocity(like, time, self.first)

@@ -105,10 +105,10 @@ INTENSITY = 0.23
 """Speed of an octave's eddies, of each component, over that of a clip's smoke: .14 of the true one, of which estimates
 show .6 (docs/experiments/continuation.md)."""
 
-IN_SMOKE = np.float32(0.05)
+MIN_DENSITY_FRACTION = np.float32(0.05)
 """Fraction of the largest density above which a voxel is in the smoke."""
 
-EDGE = 5
+EDGE_VOXELS = 5
 """Voxels over which the eddies end beside the smoke."""
 
 
@@ -147,14 +147,14 @@ def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:
 
 def _in_smoke(density: Array) -> Array:
     """1 in the smoke, 0 elsewhere."""
-    smoke: Array = (density > IN_SMOKE * density.max()).astype(np.float32)
+    smoke: Array = (density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32)
     return smoke
 
 
 def _on_faces(density: Array) -> tuple[Faces, Faces]:
     """1 on faces in the smoke, 0 elsewhere; and the same, with soft edges."""
     smoke = _in_smoke(density)
-    inside, near = (on_faces(np.stack([each] * 3, -1)) for each in (smoke, ndimage.uniform_filter(smoke, EDGE)))
+    inside, near = (on_faces(np.stack([each] * 3, -1)) for each in (smoke, ndimage.uniform_filter(smoke, EDGE_VOXELS)))
     return inside, near
 
 

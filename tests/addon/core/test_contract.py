@@ -84,7 +84,7 @@ def test_directions() -> None:
             needed = ["--frames", "9"] if direction == "continue" else ["--speed", "2"] if direction == "retime" else []
             parser.parse_args([direction, "take", "--out", "new", *needed, option, *words])
     assert (contract.SLOWEST, contract.FASTEST) == directed.SPEEDS
-    assert contract.SHORTEST == new_sequence.SHORTEST
+    assert contract.SHORTEST == new_sequence.MIN_FRAMES
 
 
 def test_pictures() -> None:

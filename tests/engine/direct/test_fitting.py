@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, SmokeState, coarse, fit_simulation, spun_up
+from smokelift.direct import Ball, SmokeState, coarsen_state, fit_simulation, spin_up
 from smokelift.direct.simulation import Physics
 from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
@@ -56,7 +56,7 @@ def test_a_buoyancy_against_the_clips_own_motion_is_not_taken(buoyancy):
 
 def test_earlier_states_show_the_buoyancy_too():
     states = [slowed(state, 0.6) for state in course(free(), at_rest(blob()), 23)]
-    found = fit_simulation(states[-6:], DT, earlier=[coarse(state) for state in states[:-6]]).physics
+    found = fit_simulation(states[-6:], DT, earlier=[coarsen_state(state) for state in states[:-6]]).physics
     assert found.buoyancy == pytest.approx(fit_simulation(states, DT).physics.buoyancy)
 
 
@@ -80,7 +80,7 @@ def test_smoke_without_motion_has_no_physics():
 def test_the_forces_of_a_clip_make_its_velocity_from_one_that_is_too_slow():
     states = course(free(), at_rest(blob()), 16)[5:]
     slow = [slowed(state, 0.5) for state in states]
-    found = spun_up(free(), slow)
+    found = spin_up(free(), slow)
     assert found.density is slow[-1].density
     assert error(found.velocity, states[-1].velocity) < 0.5 * error(slow[-1].velocity, states[-1].velocity)
 
@@ -90,11 +90,11 @@ def test_a_velocity_that_is_estimated_wrong_does_not_go_on():
     wrong = [slowed(states[0], -5.0), *states[1:]]
     simulation = fit_simulation(wrong, DT, inlet)
     assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.2)
-    assert error(spun_up(replace(simulation, eddy_speed=0.0), wrong).velocity, states[-1].velocity) < 0.1
+    assert error(spin_up(replace(simulation, eddy_speed=0.0), wrong).velocity, states[-1].velocity) < 0.1
 
 
 def test_a_velocity_that_the_forces_explain_stays():
     states, inlet = plume(), Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     simulation = fit_simulation(states, DT, inlet)
     assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.1)
-    assert error(spun_up(replace(simulation, eddy_speed=0.0), states).velocity, states[-1].velocity) < 0.05
+    assert error(spin_up(replace(simulation, eddy_speed=0.0), states).velocity, states[-1].velocity) < 0.05

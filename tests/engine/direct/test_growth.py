@@ -11,7 +11,7 @@ from smokelift.direct.growth import (
     MARGIN_VOXELS,
     Growth,
     camera_and_lamp_places,
-    dissolved,
+    dissolve,
     in_larger_box,
     moves,
 )
@@ -81,13 +81,13 @@ def test_smoke_dissolves_softly_before_a_side_that_cannot_move():
         for _ in range(round(3 / (speed * DT))):  # smoke that comes in all the time
             carried = advect(np.pad(state.density, ((0, 0),) * 3), state.velocity, DT)
             carried[:2] = 1
-            state = dissolved(replace(state, density=carried), ("x+",), DT)
+            state = dissolve(replace(state, density=carried), ("x+",), DT)
         profile = state.density[:, 8, 12]
         assert (profile[:9] > 0.9).all()
         assert profile[-1] < 0.1
         assert np.abs(np.diff(profile)).max() < 0.5
     still = at_rest(blob((0.8, 0.0, 1.0)))
-    assert dissolved(still, ("x+",), DT).density == pytest.approx(still.density)
+    assert dissolve(still, ("x+",), DT).density == pytest.approx(still.density)
 
 
 def test_smoke_in_wind_leaves_the_clips_box_uncut(source, tmp_path):
