@@ -45,6 +45,12 @@ def at_rest(density: np.ndarray) -> SmokeState:
     return SmokeState(density, Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)))
 
 
+def along_x(speed: float) -> Velocity:
+    """All air goes along x."""
+    x, y, z = at_rest(blob()).velocity.faces
+    return Velocity((x + np.float32(speed), y, z), DOMAIN.voxel_size, ("z-",))
+
+
 def free(physics: Physics = PHYSICS, surroundings: Surroundings | None = None) -> Simulation:
     """A simulation without inlets."""
     nowhere = Inflow(np.zeros(DOMAIN.shape, bool), (at_rest(blob()),))

@@ -6,29 +6,24 @@ from smokelift.direct import Ball
 from smokelift.direct.constraint import faces_between, faces_of, project_with_given_faces
 from smokelift.direct.surroundings import Solid
 from smokelift.transport import Velocity, divergence, project
-from tests.engine.direct.rising import DOMAIN
-
-
-def uniform(speed: float = 1.0) -> Velocity:
-    x, y, z = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size).faces
-    return Velocity((x + np.float32(speed), y, z), DOMAIN.voxel_size, ("z-",))
+from tests.engine.direct.rising import DOMAIN, along_x
 
 
 def test_no_air_enters_an_obstacle_and_none_is_made_around_it():
     solid = Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
-    found = Solid(solid, None).projected(uniform())
+    found = Solid(solid, None).projected(along_x(1.0))
     for mask, component in zip(faces_of(solid), found.faces, strict=True):
         assert not component[mask].any()
     assert np.abs(divergence(found)).max() * DOMAIN.voxel_size < 0.005
     # the air goes round it: faster beside it than far away
     beside = found.faces[0][8, 2:14, 12]
     assert beside.max() > 1.1
-    assert project(uniform()).faces[0].max() < 1.01
+    assert project(along_x(1.0)).faces[0].max() < 1.01
 
 
 def test_the_force_of_an_obstacle_acts_on_its_surface_alone():
     """Elsewhere the field changes by a velocity without divergence only, which no projection would take away."""
-    field, solid = uniform(), Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
+    field, solid = along_x(1.0), Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
     still = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size).faces
     found = project_with_given_faces(field, faces_between(solid), still)
     again = project(Velocity(found.faces, field.voxel_size, field.closed))

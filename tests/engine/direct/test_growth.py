@@ -18,16 +18,9 @@ from smokelift.direct.growth import (
 from smokelift.direct.surroundings import Surroundings
 from smokelift.scene import PointLight
 from smokelift.transport import advect
-from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob, run, run_twice
+from tests.engine.direct.rising import DOMAIN, DT, SCENE, along_x, at_rest, blob, run, run_twice
 
 ROOMY = Growth(DOMAIN, ("z-",), 20 * DOMAIN.resolution[0] * DOMAIN.resolution[1] * DOMAIN.resolution[2])
-
-
-def blowing(speed: float, density: np.ndarray) -> SmokeState:
-    """Smoke that goes along x with all air."""
-    still = at_rest(density)
-    x, y, z = still.velocity.faces
-    return replace(still, velocity=still.velocity.with_faces((x + np.float32(speed), y, z)))
 
 
 def test_a_side_moves_before_smoke_arrives_there():
@@ -41,7 +34,7 @@ def test_a_side_moves_before_smoke_arrives_there():
     assert grown(at_rest(near)) == ((0, 0),) * 3
     assert grown(at_rest(np.roll(near, 1, axis=0)))[0] == (0, BLOCK)
     # fast smoke is expected
-    assert grown(blowing(2.5 * DOMAIN.voxel_size / DT, near))[0] == (0, BLOCK)
+    assert grown(SmokeState(near, along_x(2.5 * DOMAIN.voxel_size / DT)))[0] == (0, BLOCK)
     # the floor is a wall
     assert grown(at_rest(blob((0.0, 0.0, 0.0), 0.1)))[2] == (0, 0)
 
@@ -77,7 +70,7 @@ def test_a_larger_box_changes_nothing_where_the_smaller_was():
 def test_smoke_dissolves_softly_before_a_side_that_cannot_move():
     """What goes there fades with the distance, at any speed, and is gone at the side; what stays is not touched."""
     for speed in (0.5, 3.0):
-        state = blowing(speed, np.ones(DOMAIN.shape, np.float32))
+        state = SmokeState(np.ones(DOMAIN.shape, np.float32), along_x(speed))
         for _ in range(round(3 / (speed * DT))):  # smoke that comes in all the time
             carried = advect(np.pad(state.density, ((0, 0),) * 3), state.velocity, DT)
             carried[:2] = 1

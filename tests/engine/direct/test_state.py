@@ -7,19 +7,13 @@ from smokelift.direct import Ball, SmokeState, complete_velocity
 from smokelift.direct.constraint import faces_of
 from smokelift.direct.state import interpolate
 from smokelift.transport import Velocity, divergence, project
-from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob
-
-
-def moving(speed: float) -> Velocity:
-    """Everything goes along x."""
-    x, y, z = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)).faces
-    return Velocity((x + np.float32(speed), y, z), DOMAIN.voxel_size, ("z-",))
+from tests.engine.direct.rising import DOMAIN, DT, along_x, at_rest, blob
 
 
 @pytest.mark.parametrize("fraction", [0.25, 0.5, 0.75])
 def test_interpolation_moves_a_blob_and_does_not_blend_two(fraction):
     way = 2 * DOMAIN.voxel_size
-    velocity = moving(way / DT)
+    velocity = along_x(way / DT)
     first, last = SmokeState(blob((-0.2, 0, 1)), velocity), SmokeState(blob((-0.2 + way, 0, 1)), velocity)
     true = blob((-0.2 + fraction * way, 0, 1))
     found = interpolate(first, last, velocity, DT, fraction)
@@ -35,7 +29,7 @@ def test_interpolation_moves_a_blob_and_does_not_blend_two(fraction):
 
 
 def test_mass_goes_evenly_from_one_state_to_the_other():
-    still = moving(0.0)
+    still = along_x(0.0)
     first, last = at_rest(blob()), at_rest(3 * blob())
     found = interpolate(first, last, still, DT, 0.25)
     assert found.density.sum() == pytest.approx(1.5 * first.density.sum(), rel=1e-4)
@@ -43,7 +37,7 @@ def test_mass_goes_evenly_from_one_state_to_the_other():
 
 def test_a_flame_is_carried_as_the_smoke_is():
     way = 2 * DOMAIN.voxel_size
-    velocity = moving(way / DT)
+    velocity = along_x(way / DT)
     first, last = (SmokeState(blob((x, 0, 1)), velocity, 3 * blob((x, 0, 1))) for x in (-0.2, -0.2 + way))
     found = interpolate(first, last, velocity, DT, 0.5)
     np.testing.assert_allclose(found.flame, 3 * found.density, rtol=1e-4, atol=1e-5)
