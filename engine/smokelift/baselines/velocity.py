@@ -11,12 +11,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from smokelift.transport import StaggeredGrid, Velocity
 from smokelift.velocity.estimator import DensityPair, checked, in_meters, motion_weight, predict_velocity
 from smokelift.velocity.linearization import least_squares, linearize
-from smokelift.velocity.preparation import without_noise
+from smokelift.velocity.preparation import blurred
 from smokelift.velocity.solver import PrimalDual, Solver
 
 
@@ -41,11 +39,11 @@ class PaperVelocity:
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """Estimate as by `smokelift.velocity.estimate_velocity`; a prediction is not used."""
         pair = checked(pair)
-        (first, second, _), _ = without_noise(pair.before, pair.after, (self.blur,), np.inf)
-        rest = StaggeredGrid.zero(first.shape, 1.0, pair.closed)
-        linear = linearize(first, second, motion_weight(first.shape, pair.inflow), rest)
+        rest = StaggeredGrid.zero(pair.before.shape, 1.0, pair.closed)
+        smooth, _ = blurred(pair.before, pair.after, self.blur)
+        linear = linearize(smooth.before, smooth.after, motion_weight(rest.shape, pair.inflow), rest)
         if linear is None:
-            return Velocity.zero(first.shape, pair.voxel_size, pair.closed)
+            return Velocity.zero(rest.shape, pair.voxel_size, pair.closed)
         problem = least_squares(linear, rest, first_order=self.smoothness, kinetic=self.kinetic)
         u, figures = self.solver.solve(problem, rest)
         measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}

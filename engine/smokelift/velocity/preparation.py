@@ -12,7 +12,8 @@ are smooth ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -51,7 +52,7 @@ class PreparedPair:
     before: Array
     after: Array
     noise: float
-    reduced: bool
+    reduced: bool = False
 
     def density_dissipation(self, fraction: float) -> float:
         """The fraction of the density that dissolves where a fraction of the values does."""
@@ -60,14 +61,17 @@ class PreparedPair:
 
 def prepare(before: Array, after: Array) -> PreparedPair:
     """Blur two densities and reduce their contrast; leave smooth ones as they are, and only blur noisy ones."""
-    smooth, enough = without_noise(before, after, (0.0,), SMOOTH)
+    smooth, enough = blurred(before, after, 0.0, SMOOTH)
     if enough:
-        return PreparedPair(*smooth, reduced=False)
-    sharp, enough = without_noise(reduced_contrast(before), reduced_contrast(after), (BLUR,), NOISE)
+        return smooth
+    sharp, enough = blurred(reduced_contrast(before), reduced_contrast(after), BLUR, NOISE)
     if enough:
-        return PreparedPair(*sharp, reduced=True)
-    noisy, _ = without_noise(before, after, (BLUR, *NOISE_WIDTHS), NOISE)
-    return PreparedPair(*noisy, reduced=False)
+        return replace(sharp, reduced=True)
+    for width in (BLUR, *NOISE_WIDTHS):
+        noisy, enough = blurred(before, after, width, NOISE)
+        if enough:
+            break
+    return noisy
 
 
 def reduced_contrast(density: Array) -> Array:
@@ -91,24 +95,16 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
     return float(np.median(np.abs(finest[inside]))) / MAD
 
 
-def without_noise(
-    before: Array, after: Array, widths: tuple[float, ...], allowed: float
-) -> tuple[tuple[Array, Array, float], bool]:
-    """Blur two densities as much as their noise asks for.
+def blurred(before: Array, after: Array, width: float, allowed: float = math.inf) -> tuple[PreparedPair, bool]:
+    """Blur two densities by a standard deviation in voxels, 0 for none; and whether the noise that is left is allowed.
 
-    ``widths`` are standard deviations in voxels (0 for none), rising; the last is taken where none is enough. The noise
-    ``allowed`` is in root mean square gradients. Returned are the densities with the variance of the noise that is left
-    in their difference, and whether that is within the limit.
+    What is ``allowed`` is in root mean square gradients.
     """
     smoke = after > SMOKE_THRESHOLD * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
-    for width in widths:
-        first, second = (_core.blur(a, width, 4.0) if width > 0 else a for a in (before, after))
-        left = raw * _passed(width)
-        enough = left <= allowed * rms_gradient(gradient(second), smoke)
-        if enough:
-            break
-    return (first, second, left**2), enough
+    first, second = (_core.blur(a, width, 4.0) if width > 0 else a for a in (before, after))
+    left = raw * _passed(width)
+    return PreparedPair(first, second, left**2), left <= allowed * rms_gradient(gradient(second), smoke)
 
 
 def _passed(width: float) -> float:
