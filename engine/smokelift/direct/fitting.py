@@ -36,7 +36,7 @@ from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 COARSE_SIDE_VOXELS = 64
 """Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a mean motion needs no more."""
 
-MIN_FRAMES = 8
+MIN_BUOYANCY_FRAMES = 8
 """Frames that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
 which is within its error."""
 
@@ -155,7 +155,7 @@ def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis:
     The velocity spins up along all states, with their densities; the second half of them is compared.
     """
     states = states[-BUOYANCY_FRAMES:]
-    if len(states) < MIN_FRAMES or not all(state.density.any() for state in states):
+    if len(states) < MIN_BUOYANCY_FRAMES or not all(state.density.any() for state in states):
         return 0.0, 0.0
     half, first = len(states) // 2, _first_typical(states)
     unforced = Simulation(Physics(0.0, 0.0), Inflow(inlets, states).cropped(), Surroundings(), dt)

@@ -11,9 +11,9 @@ from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 
 
-def slowed(state: SmokeState, share: float) -> SmokeState:
+def slowed(state: SmokeState, factor: float) -> SmokeState:
     """A state with a velocity that is estimated too slow."""
-    faces = (np.float32(share) * component for component in state.velocity.faces)
+    faces = (np.float32(factor) * component for component in state.velocity.faces)
     return replace(state, velocity=state.velocity.with_faces(faces))
 
 
@@ -36,9 +36,9 @@ def test_buoyancy_is_found_from_velocities_that_are_too_slow():
 
 def test_a_head_that_dissolves_above_a_base_that_is_fed_rises():
     """Its center of mass sinks."""
-    share = np.linspace(0, 1, DOMAIN.resolution[2])
+    height = np.linspace(0, 1, DOMAIN.resolution[2])
     states = [
-        replace(state, density=(state.density * np.exp(-6 * DT * number * share)).astype(np.float32))
+        replace(state, density=(state.density * np.exp(-6 * DT * number * height)).astype(np.float32))
         for number, state in enumerate(plume())
     ]
     assert fit_simulation(states, DT, Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)).physics.buoyancy > 1

@@ -37,8 +37,8 @@ def test_smoke_that_one_end_has_alone_goes_by_its_edges():
     assert left[alone > 0.5].min() > 0.6
     assert left[(alone > 0.01) & (alone < 0.05) & (both == 0)].max() < 0.2
     assert found.sum() == pytest.approx((both + 0.5 * alone).sum(), rel=1e-4)
-    for share, is_left in ((0.0, both + alone), (1.0, both)):
-        np.testing.assert_allclose(mix_by_edges(both + alone, both, share), is_left, atol=1e-6)
+    for fraction, is_left in ((0.0, both + alone), (1.0, both)):
+        np.testing.assert_allclose(mix_by_edges(both + alone, both, fraction), is_left, atol=1e-6)
     high = blob((0.0, 0.0, 3.0), 0.3)  # the box ends there
     assert mix_by_edges(both + high, both, 0.2)[:, :, -1].max() < 0.25 * high.max()
     assert mix_by_edges(both + high, both, 0.2, SIDES)[:, :, -1].max() > 0.5 * high.max()

@@ -130,5 +130,5 @@ def test_only_what_changes_along_the_line_is_averaged() -> None:
         upwards = z + np.moveaxis(waves[: GRID[axis], None, None], 0, axis)
         mean = averaged_along(Velocity((*still, upwards), 0.1), (0.0, 1.0, 0.0)).faces[2]
         middle = (slice(4, -4),) * 3
-        share = float(np.linalg.norm(mean[middle]) / np.linalg.norm(upwards[middle]))
-        assert share == pytest.approx(1.0, abs=0.02) if left == 1.0 else share < left
+        ratio = float(np.linalg.norm(mean[middle]) / np.linalg.norm(upwards[middle]))
+        assert ratio == pytest.approx(1.0, abs=0.02) if left == 1.0 else ratio < left

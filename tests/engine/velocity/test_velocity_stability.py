@@ -114,7 +114,7 @@ def test_flicker_and_dissolving_are_no_motion(left):
 def test_dissolving_smoke_moves_at_its_own_speed(left):
     motion = (0.3, -0.2, 1.0)
     before, after, truth = translation(motion, **WIDE)
-    found, steady = (estimate_velocity(before, share * after, DT, VOXEL) for share in (left, 1))
+    found, steady = (estimate_velocity(before, factor * after, DT, VOXEL) for factor in (left, 1))
     assert mean_motion(found, after) == pytest.approx(motion, abs=0.25)
     assert error_in_smoke(found, after, truth) < error_in_smoke(steady, after, truth) + 0.15
     assert 0 < found.figures["dissipation"] < 1.2 * (1 - left)
