@@ -28,9 +28,7 @@ def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.
     camera = add_camera(scene, (0.0, -7.0, 1.5), (math.pi / 2, 0.0, 0.0))
     camera.data.sensor_fit, camera.data.sensor_height = "VERTICAL", 24.0
     camera.data.lens = 12.0 / math.tan(math.radians(15.0))
-    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy = 20.0
-    sun.rotation_euler = Vector((0.57, 0.46, -0.68)).to_track_quat("-Z", "Y").to_euler()
+    add_sun(scene, 20.0, Vector((0.57, 0.46, -0.68)).to_track_quat("-Z", "Y").to_euler())
     settings = smoke(scene).smokelift
     settings.clip = bpy.data.movieclips.load(str(folder / "clip.mp4"))
     settings.box = add_box(scene, (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0))
@@ -71,6 +69,13 @@ def add_camera(scene: bpy.types.Scene, location: Any, rotation: Any = (0.0, 0.0,
     camera = scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = location, rotation
     return camera
+
+
+def add_sun(scene: bpy.types.Scene, energy: float, rotation: Any = (0.0, 0.0, 0.0)) -> bpy.types.Object:
+    """A new sun."""
+    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = energy, rotation
+    return sun
 
 
 def add_box(scene: bpy.types.Scene, low: Any, high: Any) -> bpy.types.Object:

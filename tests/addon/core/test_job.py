@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from textwrap import indent
+from types import SimpleNamespace
 
 import pytest
 
@@ -43,6 +44,16 @@ except KeyboardInterrupt:
     sys.exit(130)
 """
 
+DEAF = """
+import json, time
+print(json.dumps({"event": "start", "total": 9, "done": 2}), flush=True)
+while True:
+    try:
+        time.sleep(60)
+    except KeyboardInterrupt:
+        pass
+"""
+
 
 @pytest.fixture
 def log(tmp_path) -> Path:
@@ -51,12 +62,12 @@ def log(tmp_path) -> Path:
 
 
 @pytest.fixture
-def engine(log) -> Iterator[Callable[[str], Job]]:
-    """Makes jobs that run a script; none outlives its test."""
+def start(log) -> Iterator[Callable[[list[str]], Job]]:
+    """Makes jobs; none outlives its test."""
     made = []
 
-    def make(script: str) -> Job:
-        made.append(Job([sys.executable, "-I", "-c", script], log))
+    def make(command: list[str]) -> Job:
+        made.append(Job(command, log))
         return made[-1]
 
     yield make
@@ -65,9 +76,14 @@ def engine(log) -> Iterator[Callable[[str], Job]]:
 
 
 @pytest.fixture
-def own_engine(tmp_path, monkeypatch, log) -> Iterator[Callable[[str], Job]]:
+def engine(start) -> Callable[[str], Job]:
+    """Makes jobs that run a script."""
+    return lambda script: start([sys.executable, "-I", "-c", script])
+
+
+@pytest.fixture
+def own_engine(tmp_path, monkeypatch, start) -> Callable[[str], Job]:
     """Makes jobs that start a script in the engine's place as the add-on starts the engine."""
-    made = []
 
     def make(script: str) -> Job:
         package = tmp_path / "site" / "smokelift"
@@ -77,16 +93,11 @@ def own_engine(tmp_path, monkeypatch, log) -> Iterator[Callable[[str], Job]]:
         (package / "app" / "cli.py").write_text(f"def main():\n{indent(script, '    ')}")
         shutil.copytree(Path(smokelift_command.__file__).parent, tmp_path / "site" / "smokelift_command")
 
-        class Found:
-            origin = str(package / "__init__.py")
+        found = SimpleNamespace(origin=str(package / "__init__.py"))
+        monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: found)
+        return start(engine_command(["one", "two words"]))
 
-        monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: Found)
-        made.append(Job(engine_command(["one", "two words"]), log))
-        return made[-1]
-
-    yield make
-    for job in made:
-        job.kill()
+    return make
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -118,10 +129,7 @@ def test_progress(engine, log) -> None:
     assert job.doubts == [("", "A cut."), ("", "No smoke found.")]
     assert job.sentence == "3 frames."
     assert job.details == {"text": "3 frames.", "frames": 3}
-    text = log.read_text()
-    assert "Light not given." in text
-    assert "frame 2: 2 of 3" in text
-    assert text.endswith("[done, status 0]\n")
+    assert {"Light not given.", "frame 2: 2 of 3", "[done, status 0]"} <= set(log.read_text().splitlines())
 
 
 def test_a_run_that_goes_on_counts_what_was_finished(engine, log) -> None:
@@ -198,29 +206,17 @@ def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
 # how an engine ends
 
 
-def test_cancelling_a_polite_engine(own_engine) -> None:
-    job = own_engine(POLITE)
+@pytest.mark.parametrize(("script", "listens"), [(POLITE, True), (DEAF, False)])
+def test_cancelling_an_engine(own_engine, monkeypatch, script, listens) -> None:
+    monkeypatch.setattr(module, "GRACE_SECONDS", 8.0 if listens else 0.3)
+    job = own_engine(script)
     job.start()
     until(lambda: job.poll() and job.total == 9)
     job.cancel()
     job.cancel()
     finished(job)
-    assert (job.outcome, job.status) == ("cancelled", 130)
+    assert job.outcome == "cancelled" and (job.status == 130) == listens
     assert job.sentence == "Cancelled; finished frames stay: 2."
-
-
-def test_cancelling_an_engine_that_does_not_listen(own_engine, monkeypatch) -> None:
-    monkeypatch.setattr(module, "GRACE_SECONDS", 0.3)
-    job = own_engine(
-        "import json, time\n"
-        "print(json.dumps({'event': 'start', 'total': 9, 'done': 4}), flush=True)\n"
-        "while True:\n    try:\n        time.sleep(60)\n    except KeyboardInterrupt:\n        pass\n"
-    )
-    job.start()
-    until(lambda: job.poll() and job.total == 9)
-    job.cancel()
-    assert finished(job).outcome == "cancelled"
-    assert job.sentence == "Cancelled; finished frames stay: 4."
 
 
 def test_an_engine_that_finishes_although_cancelled(engine) -> None:
@@ -289,7 +285,7 @@ def test_the_engine_gets_its_arguments_and_its_own_folder(own_engine, log, monke
 
 def test_no_engine(monkeypatch) -> None:
     monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(EngineMissingError, match="install the extension again"):
+    with pytest.raises(EngineMissingError, match="missing"):
         engine_command([])
 
 
@@ -303,49 +299,31 @@ def test_libraries_that_are_shipped_come_first(tmp_path, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("folder", "platforms", "said"),
+    ("folder", "platform", "blender", "said"),
     [
-        ("python3.9", '["linux-x64"]', r"Python 3\.9, .* install smokelift-1\.2\.3-blender4\.2-5\.0-linux_x64\.zip\."),
-        ("python3.11", '["windows-x64"]', r"for windows-x64 .* install smokelift-1\.2\.3-.*-linux_x64\.zip\."),
-        ("python3.11", '["linux-x64"]', None),
+        ("python3.9", "linux-x64", ("python3.11", "linux"), r"Python 3\.9, .*-1\.2\.3-blender4\.2-5\.0-linux_x64\.zip"),
+        ("python3.11", "windows-x64", ("python3.11", "linux"), r"for windows-x64 .*-1\.2\.3-.*-linux_x64\.zip"),
+        ("python3.11", "linux-x64", ("python3.14", "linux"), r"with Python 3\.14, for which there is none"),
+        ("python3.11", "linux-x64", ("python3.11", "linux"), None),
+        ("python3.13", "windows-x64", ("python3.13", "win32"), None),  # Blender for x64 on an ARM
     ],
 )
-def test_the_zip_for_another_blender_is_not_enabled(tmp_path, monkeypatch, folder, platforms, said) -> None:
+def test_the_zip_for_another_blender_is_not_enabled(tmp_path, monkeypatch, folder, platform, blender, said) -> None:
     """The error names the one that fits; a run says the same."""
     (tmp_path / folder).mkdir()
-    (tmp_path / "blender_manifest.toml").write_text(f'version = "1.2.3"\nplatforms = {platforms}\n')
+    (tmp_path / "blender_manifest.toml").write_text(f'version = "1.2.3"\nplatforms = ["{platform}"]\n')
+    python, system = blender
     monkeypatch.setattr(module, "HOME", tmp_path)
-    monkeypatch.setattr(module, "LIBRARIES", "python3.11")
-    monkeypatch.setattr(module.sys, "platform", "linux")
-    monkeypatch.setattr(module.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(module, "LIBRARIES", python)
+    monkeypatch.setattr(module.sys, "platform", system)
+    monkeypatch.setattr(module.sysconfig, "get_platform", lambda: "win-amd64")
+    monkeypatch.setattr(module.platform, "machine", lambda: "x86_64" if system == "linux" else "ARM64")
     if said is None:
         assert str(tmp_path / folder) in engine_command([])
         return
     for ask in (addon.register, lambda: engine_command([])):
         with pytest.raises(EngineMissingError, match=said):
             ask()
-
-
-def test_an_x64_blender_on_arm_takes_the_zip_for_x64(tmp_path, monkeypatch) -> None:
-    (tmp_path / "python3.13").mkdir()
-    (tmp_path / "blender_manifest.toml").write_text('version = "1.2.3"\nplatforms = ["windows-x64"]\n')
-    monkeypatch.setattr(module, "HOME", tmp_path)
-    monkeypatch.setattr(module, "LIBRARIES", "python3.13")
-    monkeypatch.setattr(module.sys, "platform", "win32")
-    monkeypatch.setattr(module.sysconfig, "get_platform", lambda: "win-amd64")
-    monkeypatch.setattr(module.platform, "machine", lambda: "ARM64")
-    assert str(tmp_path / "python3.13") in engine_command([])
-
-
-def test_a_blender_that_there_is_no_zip_for(tmp_path, monkeypatch) -> None:
-    (tmp_path / "python3.11").mkdir()
-    monkeypatch.setattr(module, "HOME", tmp_path)
-    monkeypatch.setattr(module, "LIBRARIES", "python3.14")
-    with pytest.raises(EngineMissingError, match=r"with Python 3\.14, for which there is none\."):
-        addon.register()
-
-
-# queues
 
 
 def test_a_waiting_job_can_be_cancelled(engine) -> None:

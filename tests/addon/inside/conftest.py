@@ -3,19 +3,20 @@
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 
 import addon
 from addon.core.job import Job
 from addon.core.take import Take
 from addon.result.smoke_takes import Run, runs
-from smokelift.output.vdb import write_vdb
+from smokelift.output.vdb import write_proxy, write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE, set_up_example
 
@@ -23,6 +24,8 @@ from tests.example_shot import EXAMPLE, set_up_example
 sys.path += [str(folder) for folder in Path(bpy.utils.resource_path("LOCAL"), "python", "lib").glob("*/site-packages")]
 
 FRAMES = 6
+DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
+MEDIUM = Medium(4.0, 0.8, 0.3)
 """Of a take that `made` makes."""
 
 _status = 0
@@ -73,23 +76,41 @@ def clip(blender) -> bpy.types.MovieClip:
     return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
 
 
-def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium | None = None, number: int = 1) -> Take:
-    """A take as the engine leaves it: smoke that fills a box in a corner of the domain, and the first frame empty."""
+def made(
+    folder: Path,
+    frames: int = FRAMES,
+    medium: Medium = MEDIUM,
+    number: int = 1,
+    used: Sequence[int] | None = None,
+    proxies: bool = False,
+    **tables: Any,
+) -> Take:
+    """A take as the engine leaves it: smoke that fills a box in a corner of the domain, and the first frame empty.
+
+    `used` are the first and the last frame of the clip (from 0), proxies are of smoke everywhere, and `tables` are of
+    the scene.
+    """
     take = Take(folder / f"take_{number:04d}")
     take.directory.mkdir(parents=True)
-    import numpy as np
-
-    domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
     for n in range(1, frames + 1):
-        density = np.zeros(domain.resolution, np.float32)
-        if n > 1:
-            density[10:13, 3:5, 12:14] = 1.0 + n
-        write_vdb(take.directory / f"smoke_{n:04d}.vdb", density, np.ones((*domain.resolution, 3)), domain)
-    scene = scene_to_dict(Scene(domain=domain, medium=medium or Medium(4.0, 0.8, 0.3)))
-    scene["clip"] = {"path": str(EXAMPLE / "clip.mp4"), "fps": fps}
-    index = {"complete": True, "scene": scene, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
-    (take.directory / "sequence.json").write_text(json.dumps(index))
+        density = np.zeros(DOMAIN.resolution, np.float32)
+        density[10:13, 3:5, 12:14] = 1.0 + n if n > 1 else 0.0
+        write_vdb(take.directory / f"smoke_{n:04d}.vdb", density, np.ones((*DOMAIN.resolution, 3)), DOMAIN)
+        if proxies:
+            write_proxy(take.directory / f"proxy_{n:04d}.vdb", np.ones(DOMAIN.resolution, np.float32), DOMAIN)
+    write_index(take, Scene(domain=DOMAIN, medium=medium), frames)
+    with changed(take) as index:
+        index["scene"] |= tables
+        if used is not None:
+            index["scene"]["clip"]["frames"] = list(used)
     return take
+
+
+def write_index(take: Take, scene: Scene, frames: int) -> None:
+    """Give a take the index of a finished run on the example's clip."""
+    described = scene_to_dict(scene) | {"clip": {"path": str(EXAMPLE / "clip.mp4"), "fps": 24.0}}
+    index = {"complete": True, "scene": described, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
+    (take.directory / "sequence.json").write_text(json.dumps(index))
 
 
 def known_run(smoke: bpy.types.Object, take: Take, outcome: str, sentence: str = "") -> Run:
@@ -118,27 +139,47 @@ def played(obj: bpy.types.Object, frame: int) -> str:
     return Path(data.grids.frame_filepath).name
 
 
-def rendered(scene: bpy.types.Scene, path: Path) -> Any:
-    """The current frame as Cycles renders it: linear (rows, columns, 3) for .exr, else as displayed."""
-    import numpy as np
+def ticked(obj: bpy.types.Object, *parts: str) -> bpy.types.PropertyGroup:
+    """Tick these parts of Set Up Shot alone; returns the settings of the smoke."""
+    for part in ("range", "camera", "light", "colors", "plate"):
+        setattr(obj.smokelift, f"set_up_{part}", part in parts)
+    return obj.smokelift
 
+
+def save_image(path: Path, size: tuple[int, int], values: Any = None) -> bpy.types.Image:
+    """A new picture in a file: float in an .exr, else eight bits with alpha."""
+    deep = path.suffix == ".exr"
+    image = bpy.data.images.new(path.stem, *size, alpha=True, float_buffer=deep)
+    if values is not None:
+        image.colorspace_settings.name = "Non-Color"  # or it is written as displayed
+        image.pixels.foreach_set(np.asarray(values, np.float32).ravel())
+    image.filepath_raw, image.file_format = str(path), "OPEN_EXR" if deep else "PNG"
+    image.save()
+    return image
+
+
+def rendered(scene: bpy.types.Scene, path: Path) -> np.ndarray:
+    """The current frame as Cycles renders it: linear (rows, columns, 3) for .exr, else as displayed."""
     scene.render.filepath = str(path)
     scene.render.image_settings.file_format = "OPEN_EXR" if path.suffix == ".exr" else "PNG"
     scene.render.image_settings.color_mode = "RGB"
     quietly(lambda: bpy.ops.render.render(write_still=True))
-    return np.ascontiguousarray(pixels(path))
+    return np.ascontiguousarray(pixels(path)[..., :3])
 
 
-def pixels(path: Path) -> Any:
-    """A picture file as Blender keeps its numbers, row 0 at the top."""
-    import numpy as np
-
+def pixels(path: Path) -> np.ndarray:
+    """A picture file as Blender keeps its numbers, row 0 at the top, with alpha."""
     image = bpy.data.images.load(str(path))
+    values = pixels_of(image)
+    bpy.data.images.remove(image)
+    return values
+
+
+def pixels_of(image: bpy.types.Image) -> np.ndarray:
+    """The colors and the alpha of an image, row 0 at the top."""
     values = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(values)
-    width, height = image.size
-    bpy.data.images.remove(image)
-    return values.reshape(height, width, -1)[::-1, :, :3]
+    return values.reshape(image.size[1], image.size[0], -1)[::-1]
 
 
 def quietly(do: Any) -> None:

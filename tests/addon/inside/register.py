@@ -50,16 +50,10 @@ def test_names_follow_blenders_rules() -> None:
             assert not setting.description.endswith("."), setting.identifier  # Blender adds it
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("quality", QUALITIES), ("device", get_args(DeviceName)), ("transfer", ("AUTO", *get_args(Transfer)))],
-)
-def test_choices_are_the_engines(scene, name, expected) -> None:
-    assert tuple(smoke(scene).smokelift.bl_rna.properties[name].enum_items.keys()) == expected
-
-
-def test_defaults_are_the_engines(scene) -> None:
+def test_choices_and_defaults_are_the_engines(scene) -> None:
     properties = smoke(scene).smokelift.bl_rna.properties
+    choices = {"quality": QUALITIES, "device": get_args(DeviceName), "transfer": ("AUTO", *get_args(Transfer))}
+    assert {name: tuple(properties[name].enum_items.keys()) for name in choices} == choices
     for owner, kind, names in ((Settings.preset(), Settings, ("detail", "seed")), (Medium(), Medium, MEDIUM)):
         for name in names:
             setting = properties[name]

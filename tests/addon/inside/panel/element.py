@@ -11,14 +11,15 @@ import bpy
 import pytest
 
 from addon.result import side_job
-from tests.addon.inside.panel.tab import drawn
+from conftest import save_image
+from tests.addon.inside.panel.tab import said
 from tests.example_shot import smoke
 
 ENGINE = """
 import json, shutil, sys
 from pathlib import Path
 words = sys.argv[1:]
-Path({said!r}).write_text(json.dumps(words))
+Path({journal!r}).write_text(json.dumps(words))
 out = words[words.index("--out") + 1]
 first, last = words[words.index("--frames") + 1].split(":") if "--frames" in words else ("20", "31")
 for number in range(int(first), int(last) + 1):
@@ -32,18 +33,14 @@ print(json.dumps({{"event": "done", "text": "Written."}}))
 @pytest.fixture
 def asked(shot, tmp_path, monkeypatch) -> Callable[[], tuple[list[str], dict[str, Any]]]:
     """Gives what the engine was asked for: its arguments, and the tables of the scene file."""
-    image = bpy.data.images.new("red", 2, 2, alpha=True, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"  # or it is written as displayed
-    image.pixels.foreach_set([0.25, 0.0, 0.0, 0.5] * 4)
-    image.filepath_raw, image.file_format = str(tmp_path / "red.exr"), "OPEN_EXR"
-    image.save()
-    said = tmp_path / "asked.json"
-    script = ENGINE.format(said=str(said), picture=str(tmp_path / "red.exr"))
+    save_image(tmp_path / "red.exr", (2, 2), [0.25, 0.0, 0.0, 0.5] * 4)
+    journal = tmp_path / "asked.json"
+    script = ENGINE.format(journal=str(journal), picture=str(tmp_path / "red.exr"))
     monkeypatch.setattr(side_job, "engine_command", lambda words: [sys.executable, "-I", "-c", script, *words])
     smoke(shot).smokelift.output = str(tmp_path / "out")
 
     def read() -> tuple[list[str], dict[str, Any]]:
-        words = json.loads(said.read_text())
+        words = json.loads(journal.read_text())
         return words, tomllib.loads(Path(words[1]).read_text())
 
     return read
@@ -105,5 +102,5 @@ def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
 @pytest.mark.parametrize("brush", [None, "a brush"])
 def test_strokes_say_where_there_is_no_brush(shot, brush) -> None:
     """Builds of some distributions bring none, and Blender paints nothing then, without a word."""
-    said = " ".join(text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_strokes, brush=brush))
-    assert ("without brushes" in said) == (brush is None)
+    texts = " ".join(said(shot, bpy.types.SMOKELIFT_PT_strokes, brush=brush))
+    assert ("without brushes" in texts) == (brush is None)

@@ -53,9 +53,19 @@ def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[s
         tool_settings=SimpleNamespace(image_paint=SimpleNamespace(brush=brush)),
         window_manager=bpy.context.window_manager,
     )
-    for kind in panels:
+    for kind in panels or (bpy.types.SMOKELIFT_PT_view,):
         kind.draw(SimpleNamespace(layout=Layout(texts)), context)
     return texts
+
+
+def said(scene: bpy.types.Scene, *panels: type, **drawing: object) -> list[str]:
+    """The texts of panels, or of the tab itself, without the room for icons."""
+    return [text.strip() for text in drawn(scene, *panels, **drawing)]
+
+
+def words(scene: bpy.types.Scene) -> str:
+    """The texts of the tab in one line."""
+    return " ".join(said(scene))
 
 
 def know(scene: bpy.types.Scene, doubts: list[tuple[str, str]] | None = None, **figures: Any) -> None:
@@ -89,11 +99,10 @@ def test_no_line_is_cut_off(shot, tmp_path) -> None:
 def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
     take = made(tmp_path)
     volume.show(smoke(shot), take)
-    offer = "This smoke is large"
-    assert not [text for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.startswith(offer)]
+    assert "This smoke is large" not in words(shot)
     with changed(take) as index:
         index["scene"]["domain"]["resolution"] = [160, 160, 240]
-    assert [text for text in drawn(shot, bpy.types.SMOKELIFT_PT_view) if text.startswith(offer)]
+    assert "This smoke is large" in words(shot)
 
 
 @pytest.mark.parametrize("name", ["longest_side", "fps", "overlap"])
@@ -101,14 +110,10 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     settings = smoke(shot).smokelift.directing if name == "overlap" else smoke(shot).smokelift
     smoke(shot).smokelift.directing.direction = "loop"
     panels = (bpy.types.SMOKELIFT_PT_view_advanced, bpy.types.SMOKELIFT_PT_view_direct)
-
-    def words() -> int:
-        return [text.strip() for text in drawn(shot, *panels)].count("Automatic")
-
-    before = words()
+    before = said(shot, *panels).count("Automatic")
     setattr(settings, f"use_{name}", True)
     assert getattr(settings, name) > 0
-    assert words() == before - 1
+    assert said(shot, *panels).count("Automatic") == before - 1
     setattr(settings, f"use_{name}", False)
     assert getattr(settings, name) == 0
 
@@ -131,24 +136,20 @@ def test_pictures_after_a_gap_are_offered_and_used(scene, tmp_path, capsys) -> N
         image.save(filepath=str(tmp_path / f"frame_{number:04d}.png"))
     settings = smoke(scene).smokelift
     settings.clip = bpy.data.movieclips.load(str(tmp_path / "frame_0017.png"))
-
-    def said() -> str:
-        return " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
-
     assert (settings.first, settings.last) == (1, 2)
-    assert "Missing: frame_0019.png." in said() and "Blender sees 2 of 6 frames." in said()
+    assert "Missing: frame_0019.png." in words(scene) and "Blender sees 2 of 6 frames." in words(scene)
     command_line._smoke(command_line._parser().parse_args([]))
-    assert "up to its frame 1 of 5 (frame_0019.png missing)" in capsys.readouterr().out
+    assert "frame 1 of 5 (frame_0019.png missing)" in capsys.readouterr().out
     assert bpy.ops.smokelift.use_all_files() == {"FINISHED"}
     assert clip_table(smoke(scene))["frames"] == [0, 5]
-    assert "Missing: frame_0019.png." in said() and "Blender sees" not in said()
+    assert "Missing: frame_0019.png." in words(scene) and "Blender sees" not in words(scene)
     image.save(filepath=str(tmp_path / "frame_0023.png"))
-    assert "Blender sees 2 of 7 frames." in said()
+    assert "Blender sees 2 of 7 frames." in words(scene)
     (tmp_path / "frame_0019.png").touch()
     bpy.ops.smokelift.use_all_files()
-    assert "Missing" not in said() and "Blender sees" not in said()
+    assert "Missing" not in words(scene) and "Blender sees" not in words(scene)
     settings.last = 1
-    assert "Missing" not in said()
+    assert "Missing" not in words(scene)
 
 
 def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
@@ -156,8 +157,7 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     state, cells = shot_check.state, ("12 s", "0.2 G", "30 M", "8%")
 
     def shown() -> list[int]:
-        texts = drawn(shot, bpy.types.SMOKELIFT_PT_view)
-        return [texts.count(cell) for cell in cells]
+        return [drawn(shot).count(cell) for cell in cells]
 
     know(shot)
     assert shown() == [4, 4, 4, 4]
@@ -175,7 +175,7 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
 def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_it(shot) -> None:
     """Not while the shot is checked anew, and of no other smoke."""
     know(shot, [("not all may be smoke", "A person moves."), ("cut", "There is a cut.")], lost=None)
-    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    texts = said(shot)
     place = texts.index("A person moves.")
     assert "[new_mask]" in texts[:place]  # beside Mask
     assert texts[place + 1 : place + 3] == ["[new_mask]", "New Mask"]
@@ -183,10 +183,10 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     assert texts.index("[vary]") < place  # the buttons stay where they are
     other = new_smoke(shot, smoke(shot).smokelift.clip)
     assert active_smoke(shot) == other
-    assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    assert "A person moves." not in said(shot)
     bpy.data.objects.remove(other)
     smoke(shot).smokelift.albedo = 0.5
-    assert "A person moves." not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    assert "A person moves." not in said(shot)
 
 
 def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot, tmp_path) -> None:
@@ -194,11 +194,10 @@ def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot, tmp_
     refused = f"{MOVING_CAMERA} from the clip. Stabilize the clip."
     shot_check.state.settings, shot_check.state.error = shot_check.settings_text(smoke(shot)), refused
     job = known_run(smoke(shot), Take(tmp_path), "failed", refused).job
-    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
-    assert texts.count("[track_clip]") == 2
+    assert said(shot).count("[track_clip]") == 2
     assert bpy.ops.smokelift.track_clip() == {"FINISHED"}
     shot_check.state.error = job.sentence = "The box is flat."
-    assert "[track_clip]" not in [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    assert "[track_clip]" not in said(shot)
 
 
 def buttons(texts: list[str]) -> int:
@@ -210,23 +209,22 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
     """Whatever the check and the runs say stands below them; those of another smoke warn in its own tab."""
     state, refused = shot_check.state, f"{MOVING_CAMERA} from the clip."
     know(shot)
-    places = [buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view))]
+    places = [buttons(drawn(shot))]
     state.error = refused
-    texts = drawn(shot, bpy.types.SMOKELIFT_PT_view)
-    assert buttons(texts) < texts.index("[track_clip]")
+    assert buttons(drawn(shot)) < drawn(shot).index("[track_clip]")
     know(shot)
     volume.show(smoke(shot), made(tmp_path))
     for outcome in ("done", "waiting", "running", "failed"):
         run = known_run(smoke(shot), Take(tmp_path / outcome), outcome, refused)
         run.job.doubts = [("not all is smoke", "A person moves.")]
-        places.append(buttons(drawn(shot, bpy.types.SMOKELIFT_PT_view)))
+        places.append(buttons(drawn(shot)))
     assert len(set(places)) == 1
-    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    texts = said(shot)
     assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 4
     assert {"[track_clip]", "[show_take]"} <= set(texts)
     for run in runs:
         run.smoke += 1
-    texts = [text.strip() for text in drawn(shot, bpy.types.SMOKELIFT_PT_view)]
+    texts = said(shot)
     assert texts.count("[cancel]") == 2
     assert not {"A person moves.", "[track_clip]", "[show_take]"} & set(texts)
 
@@ -244,18 +242,15 @@ def test_pictures_are_chosen_among_pictures(shot, tmp_path, name) -> None:
     assert settings.bl_rna.properties[name].subtype == "NONE"
     kind = bpy.ops.smokelift.choose_picture.get_rna_type().properties
     assert kind["filter_image"].default and kind["filter_movie"].default
-    assert drawn(shot, bpy.types.SMOKELIFT_PT_view).count("[choose_picture]") == 2
+    assert drawn(shot).count("[choose_picture]") == 2
     assert bpy.ops.smokelift.choose_picture(setting=name, filepath=str(tmp_path / "a.png")) == {"FINISHED"}
     assert getattr(settings, name) == str(tmp_path / "a.png")
 
 
 def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
-    def said() -> bool:
-        return "inside its lines" in " ".join(map(str.strip, drawn(shot, bpy.types.SMOKELIFT_PT_view)))
-
-    assert not said()
+    assert "inside its lines" not in words(shot)
     bpy.ops.smokelift.new_mask()
-    assert said()
+    assert "inside its lines" in words(shot)
 
 
 def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:

@@ -77,14 +77,8 @@ def cube(scale=0.5, location=(0.0, 0.0, 1.5)) -> tuple[bpy.types.Mesh, dict]:
 
 def words(options: list[str], name: str) -> list[list[float]]:
     """The numbers after an option, each time it is given."""
-    found = []
-    for place, word in enumerate(options):
-        if word == name:
-            count = next(
-                (n for n, w in enumerate(options[place + 1 :]) if w.startswith("--")), len(options) - place - 1
-            )
-            found.append([float(w) for w in options[place + 1 : place + 1 + count]])
-    return found
+    _, *given = " ".join(options).split(f"{name} ")
+    return [[float(word) for word in values.partition("--")[0].split()] for values in given]
 
 
 def solid(content: bytes, tmp_path) -> np.ndarray:

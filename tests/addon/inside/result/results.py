@@ -12,7 +12,7 @@ from addon.result import smoke_takes
 from addon.scene import volume
 from addon.scene.blender import absolute
 from conftest import changed, known_run, made
-from tests.addon.inside.panel.tab import drawn
+from tests.addon.inside.panel.tab import drawn, words
 from tests.example_shot import EXAMPLE, smoke
 
 
@@ -38,21 +38,18 @@ def finished(direction: str = "", source: Take | None = None) -> Take:
     return take
 
 
-def numbers(found: list[Take]) -> list[int]:
-    return [int(take.directory.name[-4:]) for take in found]
-
-
 def doomed() -> list[int]:
     """The results that Delete Earlier Results deletes."""
-    return numbers(smoke_takes.earlier_takes(bpy.context))
+    return [int(take.directory.name[-4:]) for take in smoke_takes.earlier_takes(bpy.context)]
 
 
 def own() -> list[int]:
-    return numbers(smoke_takes.own_takes(smoke(bpy.context.scene)))
+    return [int(take.directory.name[-4:]) for take in smoke_takes.own_takes(smoke(bpy.context.scene))]
 
 
-def show(take: Take) -> None:
+def show(take: Take) -> Take:
     assert bpy.ops.smokelift.show_take(take=str(take.directory)) == {"FINISHED"}
+    return take
 
 
 def test_earlier_results_are_earlier_and_needed_by_none(project) -> None:
@@ -63,8 +60,7 @@ def test_earlier_results_are_earlier_and_needed_by_none(project) -> None:
     assert own() == [1, 2, 3, 4]
     show(later[-1])
     assert doomed() == [2, 3]
-    fresh = finished()
-    show(fresh)
+    fresh = show(finished())
     assert doomed() == [1, 2, 3, 4]
     again = finished("loop", later[0])
     show(fresh)
@@ -83,8 +79,7 @@ def test_what_another_file_may_show_stays_and_each_file_has_its_own(project) -> 
     assert doomed() == [1]
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "second.blend"))
     assert (own(), doomed()) == ([1, 2], [])
-    third = finished()
-    show(third)
+    third = show(finished())
     assert (own(), doomed()) == ([1, 2, 3], [])
     first = takes(third.directory.parent)[0]
     assert smoke_takes.consequences(bpy.context, first) == ["It may be shown by shot.blend."]
@@ -146,24 +141,20 @@ def test_results_of_a_file_that_was_never_saved_are_its(shot, tmp_path) -> None:
 
 def test_results_that_were_moved_are_said_to_be_missing_and_found_in_their_new_folder(project) -> None:
     earlier, take = finished(), finished()
-    show(earlier)
-    show(take)
+    for each in (earlier, take):
+        show(each)
     bpy.ops.wm.save_mainfile()
     (project / "archive").mkdir()
     folder = take.directory.parent.rename(project / "archive" / "smoke")
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     scene = bpy.context.scene
-
-    def said() -> str:
-        return " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
-
-    assert "are missing" in said() and "[choose_results]" in said()
-    with pytest.raises(RuntimeError, match="There is no take_0002"):
+    assert "are missing" in words(scene) and "[choose_results]" in words(scene)
+    with pytest.raises(RuntimeError, match="no take_0002"):
         bpy.ops.smokelift.choose_results(directory=str(project))
     assert bpy.ops.smokelift.choose_results(directory=str(folder)) == {"FINISHED"}
     assert volume.shown_take(smoke(scene)) == Take(folder / take.directory.name)
     assert volume.take_before(smoke(scene)) == Take(folder / earlier.directory.name)
-    assert own() == [1, 2] and "are missing" not in said()
+    assert own() == [1, 2] and "are missing" not in words(scene)
 
 
 @pytest.mark.parametrize("frames", [0, 6])
@@ -177,9 +168,8 @@ def test_a_run_that_was_interrupted_is_said_when_its_file_is_opened(project, fra
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     scene = bpy.context.scene
-    said = " ".join(text.strip() for text in drawn(scene, bpy.types.SMOKELIFT_PT_view))
-    assert "Take 2 was interrupted" in said
-    assert ("[resume]" in said) == ("before its first frame" not in said) == bool(frames)
+    assert "Take 2 was interrupted" in words(scene)
+    assert ("[resume]" in words(scene)) == ("before its first frame" not in words(scene)) == bool(frames)
     listed = drawn(scene, bpy.types.SMOKELIFT_PT_view_results)
     assert listed.count("[show_take]") == (2 if frames else 1)
     assert smoke_takes.write_take(smoke(scene)) == Take(
@@ -256,6 +246,6 @@ def test_undo_to_before_a_run_finds_its_result(project, saved_elsewhere) -> None
     assert smoke_takes.output_folder(obj) == take.directory.parent
     assert own() == [1]
     known_run(obj, take, "done")
-    assert "[show_take]" in drawn(bpy.context.scene, bpy.types.SMOKELIFT_PT_view)  # beside what the run said
+    assert "[show_take]" in drawn(bpy.context.scene)  # beside what the run said
     show(take)
     assert volume.shown_take(obj) == take

@@ -1,6 +1,7 @@
 """The queue of runs: one after the other, whatever becomes of each."""
 
 import sys
+from unittest.mock import Mock
 
 import bpy
 import pytest
@@ -64,21 +65,26 @@ def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, 
         assert scene.frame_current in ((frame,) if frame == 40 else (1, 2))
 
 
-def test_runs_follow_one_another_and_a_failed_one_stops_none(scene, clip, tmp_path) -> None:
-    obj, journal = new_smoke(scene, clip), tmp_path / "journal"
+@pytest.fixture
+def obj(scene, clip, tmp_path) -> bpy.types.Object:
+    """A smoke whose takes lie in a folder of their own."""
+    obj = new_smoke(scene, clip)
     obj.smokelift.output = str(tmp_path / "takes")
+    return obj
+
+
+def test_runs_follow_one_another_and_a_failed_one_stops_none(obj, tmp_path) -> None:
+    journal = tmp_path / "journal"
     written = queued(obj, 3, ENGINE, str(journal))
     run_queue.work(bpy.context)
-    assert [run.job.outcome for run in runs] == ["done", "failed", "done"]
-    assert [run.job.sentence for run in runs] == ["Done.", "No clip.", "Done."]
+    found = [(run.job.outcome, run.job.sentence) for run in runs]
+    assert found == [("done", "Done."), ("failed", "No clip."), ("done", "Done.")]
     first, second, third = (take.directory for take in written)
     wanted = [f"begin {first}", f"end {first}", f"begin {second}", f"begin {third}", f"end {third}"]
     assert journal.read_text().splitlines() == wanted
 
 
-def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
-    obj = new_smoke(scene, clip)
-    obj.smokelift.output = str(tmp_path)
+def test_a_deleted_smoke_is_made_no_more(scene, obj) -> None:
     (take,) = queued(obj, 1)
     assert find_smoke(obj.session_uid) == obj
     scene.collection.objects.unlink(obj)
@@ -88,26 +94,19 @@ def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
     assert take.read().resumable
 
 
-def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(scene, clip, tmp_path) -> None:
-    obj = new_smoke(scene, clip)
-    obj.smokelift.output = str(tmp_path)
+def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(obj, tmp_path) -> None:
     first, second, third = queued(obj, 3, "import sys; sys.stdin.read()")
     running = runs[0].job
     running.start()
     assert bpy.ops.smokelift.cancel(take=str(second.directory)) == {"FINISHED"}
-    assert [run.take for run in runs] == takes(tmp_path) == [first, third]
+    assert [run.take for run in runs] == takes(tmp_path / "takes") == [first, third]
     assert bpy.ops.smokelift.cancel() == {"FINISHED"}
     assert running.stopping and [run.job.outcome for run in runs] == ["running", "waiting"]
     running.kill()
 
 
-def test_what_cannot_be_started_is_not_queued(scene, clip, tmp_path, monkeypatch) -> None:
-    def missing(_words: list[str]) -> list[str]:
-        raise EngineMissingError("It is missing.")
-
-    monkeypatch.setattr(run_queue, "engine_command", missing)
-    obj = new_smoke(scene, clip)
-    obj.smokelift.output = str(tmp_path)
+def test_what_cannot_be_started_is_not_queued(obj, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(run_queue, "engine_command", Mock(side_effect=EngineMissingError("It is missing.")))
     with pytest.raises(RuntimeError, match="missing"):
         bpy.ops.smokelift.run()
-    assert runs == takes(tmp_path) == []
+    assert runs == takes(tmp_path / "takes") == []

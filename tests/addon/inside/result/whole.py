@@ -17,7 +17,7 @@ from addon.scene import look, volume
 from addon.scene.lights import sun_irradiance
 from addon.scene.scene_file import shot_tables
 from addon.scene.smoke import activate, smokes
-from conftest import quietly, rendered
+from conftest import quietly, rendered, save_image
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb, read_image
 from smokelift.output.images import write_image
@@ -132,7 +132,8 @@ def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
 def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None:
     """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead goes to it."""
     bpy.ops.mesh.primitive_cube_add(size=2.0)
-    cube, lamp = scene.objects["Cube"], lamp_of_a_new_file(scene)
+    cube, lamp = scene.objects["Cube"], add(scene, "Light", bpy.data.lights.new("Light", "POINT"))
+    lamp.location, lamp.data.energy = (4.0762453, 1.0054539, 5.9038620), 1000.0  # as a new file has it
     scene.frame_set(7)
     activate(smoke(scene), scene)
     smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
@@ -152,13 +153,6 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     assert whole > WANTED_DB + 5
     assert within > WANTED_DB
     assert scene.camera.name == "Smokelift Camera"
-
-
-def lamp_of_a_new_file(scene: bpy.types.Scene) -> bpy.types.Object:
-    """Add it."""
-    lamp = add(scene, "Light", bpy.data.lights.new("Light", "POINT"))
-    lamp.location, lamp.data.energy = (4.0762453, 1.0054539, 5.9038620), 1000.0
-    return lamp
 
 
 def test_a_camera_that_moves(shot, tmp_path) -> None:
@@ -316,12 +310,8 @@ def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) 
     if kind == "panorama":
         light_by_picture(shot, tmp_path)
     bpy.context.view_layer.update()
-    tables = {
-        **shot_tables(smoke(shot)),
-        "background": {"color": [0.0, 0.0, 0.0]},
-        "medium": vars(sequence.scene.medium),
-    }
-    lit = scene_from_dict(tables)
+    known = {"background": {"color": [0.0, 0.0, 0.0]}, "medium": vars(sequence.scene.medium)}
+    lit = scene_from_dict(shot_tables(smoke(shot)) | known)
     wanted = smokelift.render(sequence.density(LAST - FIRST + 1), lit)
     shot.render.engine = "CYCLES"
     shot.cycles.samples, shot.cycles.use_denoising = 128, False
@@ -338,14 +328,9 @@ def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) 
 
 def light_by_picture(scene: bpy.types.Scene, folder: Path) -> None:
     """A sky that is bright on one side, turned by 40 degrees."""
-    rows, columns = 16, 32
-    values = np.full((rows, columns, 4), 0.05, np.float32)
+    values = np.full((16, 32, 4), 0.05, np.float32)
     values[9:13, 4:9] = (6.0, 4.0, 2.0, 1.0)
-    image = bpy.data.images.new("sky", columns, rows, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"  # or it is written as displayed
-    image.pixels.foreach_set(values.ravel())
-    image.filepath_raw, image.file_format = str(folder / "sky.exr"), "OPEN_EXR"
-    image.save()
+    save_image(folder / "sky.exr", (32, 16), values)
     tree = scene.world.node_tree
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = bpy.data.images.load(str(folder / "sky.exr"))

@@ -1,6 +1,5 @@
 """Frames between those of a take: where the smoke is, and that renders have it and its motion blur."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -9,10 +8,10 @@ import pytest
 
 from addon.core.take import Take
 from addon.scene import modifiers, volume
-from conftest import rendered
+from conftest import rendered, write_index
 from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
-from smokelift.scene import Domain, Medium, Scene, scene_to_dict
-from tests.example_shot import EXAMPLE, add_camera, smoke
+from smokelift.scene import Domain, Medium, Scene
+from tests.example_shot import add_camera, set_world, smoke
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (32, 32, 48))
 FRAMES, FPS, VOXELS_A_FRAME = 4, 24.0, 4.0
@@ -38,11 +37,7 @@ def flying(folder: Path, *, fire: bool = False, proxies: bool = False) -> Take:
         write_vdb(take.directory / f"smoke_{number:04d}.vdb", rho, velocity, DOMAIN, flame=flame)
         if proxies:
             write_proxy(take.directory / f"proxy_{number:04d}.vdb", rho, DOMAIN)
-    scene = scene_to_dict(Scene(domain=DOMAIN, medium=Medium(20.0, 0.8)))
-    scene["clip"] = {"path": str(EXAMPLE / "clip.mp4"), "fps": FPS}
-    frames = {str(number): {} for number in range(1, FRAMES + 1)}
-    index = {"complete": True, "scene": scene, "settings": {}, "frames": frames}
-    (take.directory / "sequence.json").write_text(json.dumps(index))
+    write_index(take, Scene(domain=DOMAIN, medium=Medium(20.0, 0.8)), FRAMES)
     return take
 
 
@@ -84,7 +79,7 @@ def test_a_render_has_them_and_their_motion_blur(slow, tmp_path) -> None:
     scene.render.resolution_x, scene.render.resolution_y, scene.cycles.use_denoising = 32, 12, False
     camera = add_camera(scene, (0.0, -4.0, 1.5), (np.pi / 2, 0.0, 0.0))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
-    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    set_world(scene, (1.0, 1.0, 1.0))
     bpy.data.objects["Sun"].hide_render = True
     volume.show(slow, flying(tmp_path))
     found = []

@@ -9,13 +9,11 @@ import pytest
 from addon.core.take import Take
 from addon.scene import look, volume
 from addon.scene.smoke import is_override, smokes
-from conftest import made, rendered
+from conftest import MEDIUM, made, rendered
 from smokelift.output.vdb import vdb_module
 from smokelift.scene import Medium
 from tests.addon.inside.panel.tab import drawn
-from tests.example_shot import add, add_camera, smoke
-
-MEDIUM = Medium(4.0, 0.8, 0.3)
+from tests.example_shot import add_camera, add_sun, set_world, smoke
 
 
 @pytest.fixture
@@ -26,12 +24,8 @@ def lit(scene) -> bpy.types.Scene:
     scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.seed = 64, False, 1
     camera = add_camera(scene, (0.44, -3.0, 1.62), (np.pi / 2, 0.0, 0.0))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
-    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy, sun.rotation_euler = 5.0, (0.8, 0.0, 0.0)
-    world = scene.world = bpy.data.worlds.new("World")
-    if world.node_tree is None:
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.2, 0.2, 0.2, 1.0)
+    add_sun(scene, 5.0, (0.8, 0.0, 0.0))
+    set_world(scene, (0.2, 0.2, 0.2))
     scene.frame_set(3)
     return scene
 
@@ -58,24 +52,24 @@ def burning(folder: Path, grid: str, medium: Medium, number: int = 1) -> Take:
     return take
 
 
+def middle(scene: bpy.types.Scene, preset: str) -> np.ndarray:
+    """Color of the smoke's middle with a preset."""
+    assert bpy.ops.smokelift.use_look(preset=preset) == {"FINISHED"}
+    return rendered(scene, Path("middle.exr").absolute())[2:6, 2:6].mean((0, 1))
+
+
 def test_presets_look_different(lit, tmp_path) -> None:
     """In the sun before black: soot is dark, mist thin, dust red, steam white and brightest against the light."""
     blacken(lit)
     volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
-    seen = {}
-    for name in look.PRESETS:
-        assert bpy.ops.smokelift.use_look(preset=name) == {"FINISHED"}
-        seen[name] = rendered(lit, tmp_path / "seen.exr")[2:6, 2:6].mean((0, 1))
+    seen = {name: middle(lit, name) for name in look.PRESETS}
     assert seen["SOOT"].max() < 0.3 * seen["SMOKE"].min()
     assert seen["SOOT"].max() < seen["MIST"].min() < 0.9 * seen["STEAM"].min()
     assert seen["DUST"][0] > 1.3 * seen["DUST"][2]
     assert np.ptp(seen["STEAM"]) < 0.1 * seen["STEAM"].mean()
     bpy.data.objects["Sun"].rotation_euler = (-1.4, 0.0, 0.0)
-    for name in ("SMOKE", "STEAM"):
-        bpy.ops.smokelift.use_look(preset=name)
-        against = rendered(lit, tmp_path / "against.exr")[2:6, 2:6].mean()
-        seen[name] = against / seen[name].mean()
-    assert seen["STEAM"] > 2.0 * seen["SMOKE"]
+    steam, smoke_ = (middle(lit, name).mean() / seen[name].mean() for name in ("STEAM", "SMOKE"))
+    assert steam > 2.0 * smoke_
 
 
 def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) -> None:

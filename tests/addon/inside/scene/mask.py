@@ -12,6 +12,7 @@ from addon.result import shot_check, smoke_takes
 from addon.scene import mask
 from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables, shot_tables
+from conftest import pixels
 from smokelift.footage.clip import Clip
 from smokelift.scene import Scene
 from tests.example_shot import smoke
@@ -20,39 +21,28 @@ RECTANGLE = ((0.3, 0.1), (0.7, 0.1), (0.7, 0.4), (0.3, 0.4))
 """Corners in shares of the picture's longer side, from its middle column and its lower edge."""
 
 
-def draw(scene: bpy.types.Scene, corners: tuple[tuple[float, float], ...] = RECTANGLE) -> bpy.types.MaskSpline:
+def draw(scene: bpy.types.Scene) -> bpy.types.MaskSpline:
     """Press New Mask and draw a closed line with sharp corners."""
     assert bpy.ops.smokelift.new_mask() == {"FINISHED"}
     line = smoke(scene).smokelift.drawn_mask.layers[0].splines.new()
-    line.points.add(len(corners) - len(line.points))
+    line.points.add(len(RECTANGLE) - len(line.points))
     line.use_cyclic = True
-    put(line, corners)
+    put(line)
     return line
 
 
-def put(line: bpy.types.MaskSpline, corners: tuple[tuple[float, float], ...]) -> None:
-    for point, corner in zip(line.points, corners, strict=True):
+def put(line: bpy.types.MaskSpline, right: float = 0.0, up: float = 0.0) -> None:
+    """Put the corners where the rectangle has them, moved."""
+    for point, (x, y) in zip(line.points, RECTANGLE, strict=True):
         point.handle_type = "VECTOR"
-        point.co = point.handle_left = point.handle_right = corner
+        point.co = point.handle_left = point.handle_right = (x + right, y + up)
 
 
 def white(picture: Path) -> np.ndarray:
     """Where a picture is white, row 0 at the top; it has hardly any other value than black."""
-    image = bpy.data.images.load(str(picture))
-    image.colorspace_settings.name = "Non-Color"
-    values = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(values)
-    width, height = image.size
-    bpy.data.images.remove(image)
-    values = values.reshape(height, width, -1)[::-1, :, 0]
+    values = pixels(picture)[..., 0]
     assert np.minimum(values, 1 - values).mean() < 0.01
     return values > 0.5
-
-
-def box_of(seen: np.ndarray) -> tuple[float, ...]:
-    """First and last column, first and last row that are white, in pixels."""
-    rows, columns = np.nonzero(seen)
-    return columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
 
 
 def test_inside_its_lines_smoke_may_be(shot) -> None:
@@ -65,7 +55,9 @@ def test_inside_its_lines_smoke_may_be(shot) -> None:
     seen = white(Path(table["mask"]))
     assert seen.shape == (height, width)
     wanted = (*(width / 2 + height * x for x in (-0.2, 0.2)), 0.6 * height, 0.9 * height)
-    assert box_of(seen) == pytest.approx(wanted, abs=1)
+    rows, columns = np.nonzero(seen)
+    found = (columns.min(), columns.max() + 1, rows.min(), rows.max() + 1)
+    assert found == pytest.approx(wanted, abs=1)
     assert seen.mean() == pytest.approx(0.4 * height * 0.3 * height / (width * height), rel=0.02)
     assert footage_tables(smoke(shot))["clip"] == table  # drawn once
     settings.drawn_mask.layers[0].invert = True
@@ -92,7 +84,7 @@ def move(scene: bpy.types.Scene, line: bpy.types.MaskSpline, keys: dict[int, tup
     region = next(region for region in area.regions if region.type == "WINDOW")
     for frame, (right, up) in keys.items():
         scene.frame_set(frame)
-        put(line, tuple((x + right, y + up) for x, y in RECTANGLE))
+        put(line, right, up)
         with bpy.context.temp_override(window=window, area=area, region=region):
             for point in line.points:
                 point.select = True
@@ -109,40 +101,30 @@ def test_a_mask_that_moves_has_a_picture_for_every_frame_of_the_file(shot) -> No
     shot.frame_set(107)
     pattern = Path(footage_tables(smoke(shot))["clip"]["mask"])
     assert pattern.name == "mask_####.png"
-    height = settings.clip.size[1]
 
-    def lower_edge(number: int) -> float:
-        return 1 - box_of(white(Path(str(pattern).replace("####", f"{number:04d}"))))[3] / height
+    def lower_edge(picture: Path) -> float:
+        return np.flatnonzero(white(picture)[::-1].any(1))[0] / settings.clip.size[1]
 
     assert len(list(pattern.parent.iterdir())) == 3 + settings.clip.frame_duration
     # the frame 105 of the scene is the clip's fifth, which is number 7 of the file
-    found = [lower_edge(number) for number in (0, 7, 9, 11, 30)]
+    found = [lower_edge(pattern.with_name(f"mask_{number:04d}.png")) for number in (0, 7, 9, 11, 30)]
     assert found == pytest.approx([0.1, 0.1, 0.3, 0.5, 0.5], abs=0.01)
     quick = Path(shot_tables(smoke(shot), quick=True)["clip"]["mask"])
     assert quick.name == "mask.png"
-    assert 1 - box_of(white(quick))[3] / height == pytest.approx(0.3, abs=0.01)
+    assert lower_edge(quick) == pytest.approx(0.3, abs=0.01)
     assert shot.frame_current == 107
 
 
 def test_a_line_that_is_not_closed_says_what_to_do(shot) -> None:
     line = draw(shot)
     line.use_cyclic = False
-    with pytest.raises(ShotError, match="no closed line yet"):
+    with pytest.raises(ShotError, match="closed line"):
         footage_tables(smoke(shot))
     smoke(shot).smokelift.drawn_mask = None
     assert "mask" not in footage_tables(smoke(shot))["clip"]
     smoke(shot).smokelift.mask = "//no such file.png"
     with pytest.raises(ShotError, match=r"no such file\.png is not there"):
         footage_tables(smoke(shot))
-
-
-def test_new_mask_opens_the_one_that_there_is(shot) -> None:
-    draw(shot)
-    found = smoke(shot).smokelift.drawn_mask
-    assert bpy.ops.smokelift.new_mask() == {"FINISHED"}
-    assert smoke(shot).smokelift.drawn_mask == found
-    assert len(bpy.data.masks) == 1
-    assert not shot.frame_current_final < found.frame_start
 
 
 @pytest.mark.parametrize("moves", [False, True])
@@ -190,10 +172,12 @@ def test_a_mask_that_is_drawn_on_is_checked_anew(shot) -> None:
     assert not state.settings
 
 
-def test_a_mask_is_drawn_on_a_frame_that_is_used(shot) -> None:
+def test_there_is_one_mask_that_is_drawn_on_a_frame_that_is_used(shot) -> None:
     settings = smoke(shot).smokelift
     settings.first, settings.last = 21, 30
     for frame, shown in ((5, 21), (25, 25)):
         shot.frame_set(frame)
         assert bpy.ops.smokelift.new_mask() == {"FINISHED"}
         assert shot.frame_current == shown
+        assert [settings.drawn_mask] == list(bpy.data.masks)
+        assert shown >= settings.drawn_mask.frame_start

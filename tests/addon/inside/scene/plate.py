@@ -11,6 +11,7 @@ from addon.panel import element_panel
 from addon.result.smoke_takes import output_folder
 from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables, shot_tables
+from conftest import pixels, pixels_of, save_image
 from smokelift.scene import Background, Scene
 from tests.example_shot import EXAMPLE, smoke
 
@@ -56,26 +57,11 @@ def test_one_color_is_the_background(shot) -> None:
 # strokes
 
 
-def pixels_of(image: bpy.types.Image) -> np.ndarray:
-    """The colors and the alpha of an image, row 0 at the top."""
-    values = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(image.size[1], image.size[0], 4)[::-1]
-
-
 def paint(image: bpy.types.Image, color: tuple[float, float, float], opacity: float, rows: slice) -> None:
     """Paint some rows of an image, as a brush does."""
     values = pixels_of(image).copy()
     values[rows, :, :3] += opacity * (color - values[rows, :, :3])
     image.pixels.foreach_set(values[::-1].ravel())
-
-
-def in_file(file: Path) -> np.ndarray:
-    """The strokes that the engine reads."""
-    image = bpy.data.images.load(str(file))
-    values = pixels_of(image)
-    bpy.data.images.remove(image)
-    return values
 
 
 def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
@@ -89,12 +75,12 @@ def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
     first = pixels_of(image).copy()
     assert first[..., 3].min() == 1.0 and first[..., :3].max() > 0.5
     assert footage_tables(smoke(shot))["background"] == {"image": str(EXAMPLE / "plate.png"), "strokes": str(file)}
-    assert not in_file(file).any()
+    assert not pixels(file).any()
     green, red, black = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for color, opacity, rows in ((green, 0.8, slice(9)), (red, 1.0, slice(9, 12)), (black, 1.0, slice(4))):
         paint(image, color, opacity, rows)
     footage_tables(smoke(shot))
-    found = in_file(file)
+    found = pixels(file)
     assert (found[4:9] == (*green, 1.0)).all() and (found[9:12] == (*red, 1.0)).all()
     assert not found[:4].any() and not found[12:].any()
     assert not image.is_dirty
@@ -106,7 +92,7 @@ def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
     assert np.abs(second[12:] - first[12:]).max() > 0.05
     image.save()  # by the artist, with the frame below
     footage_tables(smoke(shot))
-    assert (in_file(file) == found).all()
+    assert (pixels(file) == found).all()
     assert len(bpy.data.scenes) == 1
     assert [each for each in bpy.data.images if each.source != "VIEWER"] == [image]
     # they are opened again where they were made
@@ -117,13 +103,10 @@ def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
 
 
 def test_other_images_are_strokes_too(shot, tmp_path) -> None:
-    image = bpy.data.images.new("mine", *smoke(shot).smokelift.clip.size, alpha=True)
-    image.filepath_raw, image.file_format = str(tmp_path / "mine.png"), "PNG"
-    image.save()
-    smoke(shot).smokelift.strokes = image
+    image = smoke(shot).smokelift.strokes = save_image(tmp_path / "mine.png", smoke(shot).smokelift.clip.size)
     paint(image, (0.3, 0.6, 0.3), 1.0, slice(4))
     assert footage_tables(smoke(shot))["background"]["strokes"] == str(tmp_path / "mine.png")
-    assert in_file(tmp_path / "mine.png")[:4, :, 1] == pytest.approx(0.6, abs=0.01)
+    assert pixels(tmp_path / "mine.png")[:4, :, 1] == pytest.approx(0.6, abs=0.01)
 
 
 def test_the_engine_reads_frames_and_strokes(shot, tmp_path) -> None:
@@ -148,10 +131,8 @@ def test_strokes_that_cannot_be_written_are_named(shot, tmp_path) -> None:
 
 @pytest.mark.parametrize(("size", "saved", "said"), [((8, 8), True, "8 x 8 pixels"), ((256, 384), False, "in no file")])
 def test_an_image_that_does_not_fit_is_refused(shot, tmp_path, size, saved, said) -> None:
-    image = bpy.data.images.new("mine", *size, alpha=True)
-    if saved:
-        image.filepath_raw, image.file_format = str(tmp_path / "mine.png"), "PNG"
-        image.save()
+    file = tmp_path / "mine.png"
+    image = save_image(file, size) if saved else bpy.data.images.new("mine", *size, alpha=True)
     smoke(shot).smokelift.strokes = image
     with pytest.raises(ShotError, match=said):
         footage_tables(smoke(shot))

@@ -11,20 +11,12 @@ from addon.core.take import Take
 from addon.scene import projection, volume
 from conftest import changed, made, rendered
 from smokelift.output.images import write_image
-from smokelift.scene import Camera
-from tests.example_shot import add, smoke
+from smokelift.scene import Camera, Scene, scene_to_dict
+from tests.example_shot import add, add_sun, smoke
 
 WIDTH, HEIGHT = 48, 32
 BEFORE = Camera.look_at((0.3, -6.0, 2.5), (0.0, 0.0, 1.5), fov_y_degrees=40, size=(WIDTH, HEIGHT))
-TABLE = {
-    "type": "perspective",
-    "matrix": [list(row) for row in BEFORE.matrix],
-    "size": [WIDTH, HEIGHT],
-    "fx": BEFORE.fx,
-    "fy": BEFORE.fy,
-    "cx": BEFORE.cx,
-    "cy": BEFORE.cy,
-}
+TABLE = scene_to_dict(Scene(camera=BEFORE))["camera"]
 
 
 def picture(shift: int = 0) -> np.ndarray:
@@ -40,13 +32,11 @@ def filmed(scene: bpy.types.Scene, folder: Path, table: dict | None = None, plat
         write_image(folder / f"clip_{number:04d}.png", picture())
     for number in range(1, plates + 1):
         write_image(folder / f"plate_{number:04d}.exr", picture(number - 1))
-    take = made(folder / "out")
-    with changed(take) as index:
-        index["scene"] |= {"camera": table or TABLE, "background": {"image": str(folder / "plate_0001.exr")}}
-        index["scene"]["clip"]["frames"] = [0, 5]
+    background = {"image": str(folder / "plate_0001.exr")}
+    take = made(folder / "out", used=[0, 5], camera=table or TABLE, background=background)
     settings = smoke(scene).smokelift
     settings.clip = bpy.data.movieclips.load(str(folder / "clip_0001.png"))
-    settings.camera_mode, settings.light_mode, settings.plate_place = "ESTIMATE", "SCENE", "PROJECTION"
+    settings.light_mode, settings.plate_place = "SCENE", "PROJECTION"
     volume.show(smoke(scene), take)
     smoke(scene).hide_render = True
     scene.cycles.samples, scene.cycles.use_denoising = 16, False
@@ -102,8 +92,8 @@ def test_a_camera_that_moved_projects_each_frame_from_its_place(scene, tmp_path)
         poses.append([list(row) for row in at.matrix])
     table = {key: value for key, value in TABLE.items() if key != "matrix"} | {"matrices": poses}
     scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
-    smoke(scene).smokelift.camera_mode = "SCENE"
-    scene = filmed_by_the_scene(scene, tmp_path, table)
+    smoke(scene).smokelift.set_up_camera = False  # it needs an assumed one
+    filmed(scene, tmp_path, table, plates=6)
     scene.camera = scene.objects[projection.PROJECTOR]
     for frame in (1, 4):
         scene.frame_set(frame)
@@ -112,18 +102,11 @@ def test_a_camera_that_moved_projects_each_frame_from_its_place(scene, tmp_path)
         assert rendered(scene, tmp_path / "found.exr") == pytest.approx(picture(frame - 1), abs=0.02)
 
 
-def filmed_by_the_scene(scene: bpy.types.Scene, folder: Path, table: dict) -> bpy.types.Scene:
-    """`filmed` with a plate for every frame, and without the ticks that need an assumed camera."""
-    smoke(scene).smokelift.set_up_camera = False
-    return filmed(scene, folder, table, plates=6)
-
-
 def test_it_neither_lights_the_smoke_nor_shades_it(scene, tmp_path) -> None:
     filmed(scene, tmp_path)
     smoke(scene).hide_render = False
     card(scene).hide_render = True
-    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy = 10.0
+    add_sun(scene, 10.0)
     scene.frame_set(3)
     alone = rendered(scene, tmp_path / "alone.exr")
     other = add(scene, "Roof", card(scene).data)

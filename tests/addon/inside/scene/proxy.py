@@ -6,28 +6,15 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.core.take import Take
 from addon.scene import modifiers, volume
 from conftest import FRAMES, changed, made, played, rendered
-from smokelift.output.vdb import write_proxy
-from smokelift.scene import Domain
 from tests.example_shot import add_camera, smoke
-
-DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
-
-
-def with_proxy(folder: Path, number: int = 1) -> Take:
-    """A take of `made` beside whose files lie coarse copies, of smoke everywhere."""
-    take = made(folder, number=number)
-    for n in range(1, FRAMES + 1):
-        write_proxy(take.directory / f"proxy_{n:04d}.vdb", np.ones(DOMAIN.resolution, np.float32), DOMAIN)
-    return take
 
 
 @pytest.fixture
 def obj(scene, tmp_path) -> bpy.types.Object:
     """A smoke with a proxy."""
-    return volume.show(smoke(scene), with_proxy(tmp_path))
+    return volume.show(smoke(scene), made(tmp_path, proxies=True))
 
 
 def in_render(obj: bpy.types.Object) -> list[str]:
@@ -38,13 +25,9 @@ def in_render(obj: bpy.types.Object) -> list[str]:
         if depsgraph.mode == "RENDER":
             found.append(Path(obj.evaluated_get(depsgraph).data.filepath).name)
 
-    bpy.app.handlers.frame_change_post.append(look)
-    bpy.app.handlers.depsgraph_update_post.append(look)
-    try:
-        rendered(bpy.context.scene, Path("out.exr").absolute())
-    finally:
-        bpy.app.handlers.frame_change_post.remove(look)
-        bpy.app.handlers.depsgraph_update_post.remove(look)
+    for handlers in (bpy.app.handlers.frame_change_post, bpy.app.handlers.depsgraph_update_post):
+        handlers.append(look)  # until the next test's file is read
+    rendered(bpy.context.scene, Path("out.exr").absolute())
     return found
 
 
@@ -63,7 +46,7 @@ def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) ->
 def test_it_has_a_switch(obj, tmp_path) -> None:
     modifiers.proxy_modifier(obj).show_viewport = False
     volume.show(obj, volume.shown_take(obj))
-    volume.show(obj, with_proxy(tmp_path, number=2))
+    volume.show(obj, made(tmp_path, number=2, proxies=True))
     assert played(obj, 3) == "smoke_0003.vdb"
     assert modifiers.in_viewport(obj) == obj.data
     modifiers.proxy_modifier(obj).show_viewport = True
@@ -74,7 +57,7 @@ def test_it_has_a_switch(obj, tmp_path) -> None:
 @pytest.mark.parametrize("speed", ["FRAMES", "REAL"])
 def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, speed) -> None:
     """From the first used frame of the clip's own numbers, say; the frames themselves count from 1."""
-    take = with_proxy(tmp_path)
+    take = made(tmp_path, proxies=True)
     for kind in ("smoke", "proxy"):
         for n in range(FRAMES, 0, -1):
             (take.directory / f"{kind}_{n:04d}.vdb").rename(take.directory / f"{kind}_{n + 1000}.vdb")
@@ -94,11 +77,10 @@ def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, spee
 
 
 def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
-    settings = smoke(shot).smokelift
-    shot.render.fps, settings.speed = 48, "REAL"
-    obj = volume.show(smoke(shot), with_proxy(tmp_path))
+    shot.render.fps, smoke(shot).smokelift.speed = 48, "REAL"
+    obj = volume.show(smoke(shot), made(tmp_path, proxies=True))
     assert [played(obj, frame) for frame in (1, 2, 3)] == ["proxy_0001.vdb"] * 2 + ["proxy_0002.vdb"]
-    settings.clip.frame_start = 101
+    obj.smokelift.clip.frame_start = 101
     volume.synchronize_playback()
     assert [played(obj, frame) for frame in (1, 103)] == ["", "proxy_0002.vdb"]
 
@@ -114,8 +96,8 @@ def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
     twin = obj.copy()
     twin.data = obj.data.copy()
     scene.collection.objects.link(twin)
-    volume.show(twin, with_proxy(tmp_path, number=2))
-    beside = volume.show_beside(obj, with_proxy(tmp_path, number=3))
+    volume.show(twin, made(tmp_path, number=2, proxies=True))
+    beside = volume.show_beside(obj, made(tmp_path, number=3, proxies=True))
     proxies = [modifiers.proxy_of(each) for each in (obj, twin, beside)]
     assert len(set(proxies)) == 3
     assert [volume.take_of(data).directory.name for data in proxies] == ["take_0001", "take_0002", "take_0003"]
@@ -130,7 +112,7 @@ def test_it_is_saved_with_the_file(scene, obj, tmp_path) -> None:
 
 
 def test_it_follows_a_run(scene, tmp_path) -> None:
-    take = with_proxy(tmp_path)
+    take = made(tmp_path, proxies=True)
     for number in range(3, FRAMES + 1):
         (take.directory / f"proxy_{number:04d}.vdb").unlink()
     index = (take.directory / "sequence.json").read_text()

@@ -14,11 +14,10 @@ from addon.core.take import Take
 from addon.scene.blender import ShotError
 from addon.scene.box import box_corners, engine_to_world
 from addon.scene.scene_file import options, shot_tables
+from conftest import save_image
 from smokelift.scene import Scene
 from smokelift.scene.projection import project_points
 from tests.example_shot import EXAMPLE, add, smoke
-
-CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.0)]
 
 
 def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
@@ -28,8 +27,11 @@ def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
     return Scene.load(take.scene_file)
 
 
-def load_clip(scene: bpy.types.Scene, path: Path) -> None:
-    smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(path))
+def refusal(scene: bpy.types.Scene) -> str:
+    """The sentence with which a shot is refused."""
+    with pytest.raises(ShotError) as caught:
+        shot_tables(smoke(scene))
+    return str(caught.value)
 
 
 @pytest.fixture
@@ -37,10 +39,8 @@ def picture(shot, tmp_path):
     """Gives the shot a clip (of one picture) of another size, and the same render size."""
 
     def of_size(width: int, height: int) -> bpy.types.Scene:
-        image = bpy.data.images.new("picture", width, height)
-        image.filepath_raw, image.file_format = str(tmp_path / "picture.png"), "PNG"
-        image.save()
-        load_clip(shot, tmp_path / "picture.png")
+        save_image(tmp_path / "picture.png", (width, height))
+        smoke(shot).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "picture.png"))
         shot.render.resolution_x, shot.render.resolution_y = width, height
         smoke(shot).smokelift.plate_mode = "ESTIMATE"
         return shot
@@ -89,28 +89,17 @@ def test_a_camera_that_is_turned_scaled_and_parented(picture, tmp_path) -> None:
     agree(scene, tmp_path)
 
 
-def agree(scene: bpy.types.Scene, folder: Path) -> None:
+def agree(scene: bpy.types.Scene, folder: Path) -> Scene:
     """Compare the picture's places of the box's corners, and of points inside, in pixels of the clip."""
-    camera = engines(scene, folder).camera
-    points = np.array([*CORNERS, (0.1, 0.2, 1.1), (-0.4, 0.3, 2.0)])
-    found, _ = project_points(camera, points)
+    read, to_engine = engines(scene, folder), engine_to_world(smoke(scene)).inverted()
+    points = [*box_corners(smoke(scene).smokelift.box), Vector((0.1, 0.2, 1.1)), Vector((-0.4, 0.3, 2.0))]
+    found, _ = project_points(read.camera, np.array([to_engine @ point for point in points]))
     width, height = smoke(scene).smokelift.clip.size
-    assert camera.size == (width, height)
-    seen = [world_to_camera_view(scene, scene.camera, Vector(point)) for point in points]
+    assert read.camera.size == (width, height)
+    seen = [world_to_camera_view(scene, scene.camera, point) for point in points]
     wanted = np.array([(place.x * width, (1.0 - place.y) * height) for place in seen])
     np.testing.assert_allclose(found, wanted, atol=1e-3 * max(1.0, np.abs(wanted).max() / 1000))
-
-
-# what a camera must not do
-
-
-def refusal(scene: bpy.types.Scene) -> str:
-    """The sentence with which a shot is refused."""
-    with pytest.raises(ShotError) as caught:
-        shot_tables(smoke(scene))
-    text = str(caught.value)
-    assert text.endswith(".")
-    return text
+    return read
 
 
 # a camera that moves
@@ -199,14 +188,13 @@ def test_what_is_missing_is_said(shot, spoil, words) -> None:
 
 def test_frames_are_counted_from_nought(shot) -> None:
     smoke(shot).smokelift.first, smoke(shot).smokelift.last = 5, 9
-    table = shot_tables(smoke(shot))["clip"]
-    assert table == {"path": str(EXAMPLE / "clip.mp4"), "frames": [4, 8]}
+    assert shot_tables(smoke(shot))["clip"] == {"path": str(EXAMPLE / "clip.mp4"), "frames": [4, 8]}
 
 
 def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
     for number in range(7, 12):
         (tmp_path / f"smoke_{number:03d}.png").write_bytes((EXAMPLE / "plate.png").read_bytes())
-    load_clip(shot, tmp_path / "smoke_007.png")
+    smoke(shot).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "smoke_007.png"))
     shot.render.fps, shot.render.fps_base = 30, 1.001
     table = shot_tables(smoke(shot))["clip"]
     assert table["frames"] == [0, 4]
@@ -218,16 +206,12 @@ def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
     assert (table["fps"], table["transfer"]) == (120.0, "linear")
 
 
-@pytest.mark.parametrize(("space", "transfer"), [("sRGB", None), ("Linear Rec.709", "linear"), ("Non-Color", "linear")])
-def test_the_clips_color_space_counts(shot, space, transfer) -> None:
-    smoke(shot).smokelift.clip.colorspace_settings.name = space
-    assert shot_tables(smoke(shot))["clip"].get("transfer") == transfer
-
-
-def test_a_color_space_that_cannot_be_read_is_refused(shot) -> None:
+def test_the_clips_color_space_counts_or_is_refused(shot) -> None:
+    for space, transfer in (("sRGB", None), ("Linear Rec.709", "linear"), ("Non-Color", "linear")):
+        smoke(shot).smokelift.clip.colorspace_settings.name = space
+        assert shot_tables(smoke(shot))["clip"].get("transfer") == transfer
     smoke(shot).smokelift.clip.colorspace_settings.name = "Filmic Log"
-    with pytest.raises(ShotError, match=r"color space is Filmic Log.*convert the clip.*Advanced"):
-        shot_tables(smoke(shot))
+    assert "Filmic Log" in refusal(shot)
     smoke(shot).smokelift.transfer = "srgb"
     assert shot_tables(smoke(shot))["clip"]["transfer"] == "srgb"
 
@@ -270,16 +254,11 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     box = smoke(shot).smokelift.box
     box.rotation_euler = (0.2, -0.1, 0.5)
     bpy.context.view_layer.update()
-    found = engines(shot, tmp_path)
-    world = engine_to_world(smoke(shot))
+    found, world = agree(shot, tmp_path), engine_to_world(smoke(shot))
     corners = np.array([world.inverted() @ corner for corner in box_corners(box)])
     low, high = corners.min(0), corners.max(0)
     assert (np.array(found.domain.min) <= low + 1e-5).all()
     assert (np.array(found.domain.max) >= high - 1e-5).all()
-    pixels, _ = project_points(found.camera, corners)
-    width, height = found.camera.size
-    seen = [world_to_camera_view(shot, shot.camera, corner) for corner in box_corners(box)]
-    np.testing.assert_allclose(pixels, [(p.x * width, (1 - p.y) * height) for p in seen], atol=1e-3)
     direction = world.to_3x3() @ Vector(found.lights[0].direction)
     assert direction.dot(Vector((0.57, 0.46, -0.68)).normalized()) == pytest.approx(1.0)
 
@@ -374,13 +353,9 @@ def test_a_point_light(shot) -> None:
 @pytest.fixture
 def panorama(shot, tmp_path):
     """A world lit by a picture; returns the picture's node."""
-    path = tmp_path / "sky.exr"
-    image = bpy.data.images.new("sky", 16, 8, float_buffer=True)
-    image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
-    image.save()
     tree = shot.world.node_tree
     node = tree.nodes.new("ShaderNodeTexEnvironment")
-    node.image = bpy.data.images.load(str(path))
+    node.image = save_image(tmp_path / "sky.exr", (16, 8))
     tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
     tree.nodes["Background"].inputs["Strength"].default_value = 1.5
     return node
@@ -388,12 +363,9 @@ def panorama(shot, tmp_path):
 
 def test_a_world_picture(shot, panorama, tmp_path) -> None:
     table = lights(shot)[-1]
-    assert table == {
-        "type": "environment",
-        "image": str(tmp_path / "sky.exr"),
-        "rotation_degrees": pytest.approx(0.0),
-        "strength": 1.5,
-    }
+    rotation = pytest.approx(0.0)
+    image = str(tmp_path / "sky.exr")
+    assert table == {"type": "environment", "image": image, "rotation_degrees": rotation, "strength": 1.5}
 
 
 def test_a_world_picture_that_is_turned(shot, panorama) -> None:

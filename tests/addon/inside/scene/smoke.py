@@ -12,8 +12,10 @@ from addon.result import smoke_takes
 from addon.scene import shot_setup, volume
 from addon.scene.blender import absolute
 from addon.scene.smoke import active_smoke, hide_default_cube, new_smoke
-from conftest import changed, made
+from conftest import changed, made, ticked
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
+
+SUN = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
 
 
 def test_new_smoke_is_a_volume_that_is_selected_and_active(scene, clip) -> None:
@@ -48,73 +50,68 @@ def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> 
     assert smoke_takes.output_folder(second) == folders[1]
 
 
-@pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
-def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
+@pytest.mark.parametrize(
+    ("change", "hides"),
+    [
+        (lambda cube: None, True),
+        (lambda cube: setattr(cube.location, "x", 3.0), False),
+        (lambda cube: setattr(cube, "name", "Crate"), False),
+        (lambda cube: setattr(cube.data.vertices[0].co, "x", -2.0), False),
+    ],
+)
+def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change, hides) -> None:
     cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
-    if change == "location":
-        cube.location.x = 3.0
-    elif change == "name":
-        cube.name = "Crate"
-    elif change == "vertex":
-        cube.data.vertices[0].co.x = -2.0
-    assert hide_default_cube(scene) == (change is None)
-    assert cube.hide_render == cube.hide_viewport == (change is None)
+    change(cube)
+    assert hide_default_cube(scene) == hides
+    assert cube.hide_render == cube.hide_viewport == hides
     assert not hide_default_cube(scene)
 
 
 @pytest.mark.parametrize(("scattering", "even"), [("unshadowed", True), ("multiple", False)])
 def test_light_that_casts_no_shadow_says_how_it_lights_from_a_side(scene, clip, tmp_path, scattering, even) -> None:
     """Else to turn the light changes nothing, without a word why."""
-    obj, take = new_smoke(scene, clip), made(tmp_path)
+    obj, take = new_smoke(scene, clip), made(tmp_path, lights=SUN)
     with changed(take) as index:
-        index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
         index["scene"]["medium"]["scattering"] = scattering
-    volume.show(obj, take)
-    for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
-        setattr(obj.smokelift, name, False)
+    ticked(volume.show(obj, take), "light")
     said = shot_setup.set_up(obj)
     assert [sentence for sentence in said if "give Smokelift Light a shadow" in sentence] == said[: int(even)]
     assert scene.objects["Smokelift Light"].data.use_shadow != even
 
 
-@pytest.mark.parametrize("change", [None, "location", "energy", "animated", "hidden", "scene"])
-def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(scene, clip, tmp_path, change) -> None:
+@pytest.mark.parametrize(
+    ("change", "hidden", "doubled"),
+    [
+        (lambda lamp, obj: None, True, False),
+        (lambda lamp, obj: setattr(lamp.location, "x", 1.0), False, True),
+        (lambda lamp, obj: setattr(lamp.data, "energy", 100.0), False, True),
+        (lambda lamp, obj: lamp.keyframe_insert("location", frame=1), False, True),
+        (lambda lamp, obj: setattr(lamp, "hide_render", True), False, False),
+        (lambda lamp, obj: setattr(obj.smokelift, "light_mode", "SCENE"), False, False),
+    ],
+)
+def test_the_lamp_of_a_new_file_does_not_light_smoke_that_has_its_light(blender, tmp_path, change, hidden, doubled):
     """Set Up Shot hides it and says so; a lamp that anybody changed, or that the smoke was made with, stays."""
     bpy.ops.wm.read_factory_settings()
     scene = bpy.context.scene
     lamp, obj = scene.objects["Light"], new_smoke(scene, bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4")))
-    for name in ("set_up_range", "set_up_camera", "set_up_plate", "set_up_colors"):
-        setattr(obj.smokelift, name, False)
-    if change == "location":
-        lamp.location.x += 1.0
-    elif change == "energy":
-        lamp.data.energy = 100.0
-    elif change == "animated":
-        lamp.keyframe_insert("location", frame=1)
-    elif change == "hidden":
-        lamp.hide_render = True
-    elif change == "scene":
-        obj.smokelift.light_mode = "SCENE"
-    take = made(tmp_path)
-    with changed(take) as index:
-        index["scene"]["lights"] = [{"irradiance": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0]}]
-    volume.show(obj, take)
+    ticked(obj, "light")
+    change(lamp, obj)
+    before = lamp.hide_render
+    volume.show(obj, made(tmp_path, lights=SUN))
     said = " ".join(shot_setup.set_up(obj))
-    assert ("lamp of the new file is hidden" in said) == (change is None)
-    assert lamp.hide_viewport == (change is None)
-    assert lamp.hide_render == (change in (None, "hidden"))
-    assert ("has that of Light" in said) == (change in ("location", "energy", "animated"))
+    assert ("lamp of the new file is hidden" in said) == lamp.hide_viewport == hidden
+    assert lamp.hide_render == (hidden or before)
+    assert ("has that of Light" in said) == doubled
     assert scene.cycles.samples == shot_setup.SAMPLES
 
 
 def test_samples_that_the_artist_chose_stay(shot, tmp_path) -> None:
-    take = made(tmp_path)
-    volume.show(smoke(shot), take)
+    ticked(volume.show(smoke(shot), made(tmp_path)), "light")
     for samples, wanted in ((4096, shot_setup.SAMPLES), (4096, shot_setup.SAMPLES), (128, 128)):
         shot.cycles.samples = samples
-        smoke(shot).smokelift.set_up_plate = smoke(shot).smokelift.set_up_camera = False
         assert bpy.ops.smokelift.set_up() == {"FINISHED"}
         assert shot.cycles.samples == wanted
 
@@ -159,12 +156,9 @@ def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path,
         found = takes(smoke_takes.output_folder(smoke(bpy.context.scene)))
         return [take.directory for take in found] == [there / "take_0001"]
 
-    bpy.ops.wm.save_as_mainfile(filepath=str(first))
-    assert kept()
-    bpy.ops.wm.save_as_mainfile(filepath=str(second))
-    assert kept()
-    bpy.ops.wm.save_as_mainfile(filepath=str(copied), copy=True)
-    assert kept()
+    for file in (first, second, copied):
+        bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=file == copied)
+        assert kept()
     for file in (second, copied):
         bpy.ops.wm.open_mainfile(filepath=str(file))
         assert kept()
@@ -179,19 +173,25 @@ def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path,
     assert smoke_takes.write_take(smoke(bpy.context.scene)).read().title == "Take 2"
 
 
-def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:
+def with_masses(folder: Path, masses: list[float], planned: int = 0, complete: bool = True, **tables: object) -> Take:
     """A take whose frames hold so much smoke, of so many that it will have."""
-    take = made(folder, frames=len(masses))
+    take = made(folder, frames=len(masses), used=[10, 9 + (planned or len(masses))], **tables)
     with changed(take) as index:
         index["frames"] = {str(n): {"mass": mass} for n, mass in enumerate(masses, 1)}
-        index["scene"]["clip"]["frames"] = [10, 9 + (planned or len(masses))]
+        index["complete"] = complete
     return take
 
 
-def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
-    """The range is the result's, also of one that is still made; the playhead goes to smoke unless it shows some."""
+@pytest.fixture
+def obj(scene, clip) -> bpy.types.Object:
+    """A smoke that the scene's camera filmed."""
     obj = new_smoke(scene, clip)
     obj.smokelift.camera_mode = "SCENE"
+    return obj
+
+
+def test_a_new_result_is_seen(scene, obj, tmp_path) -> None:
+    """The range is the result's, also of one that is still made; the playhead goes to smoke unless it shows some."""
     take = with_masses(tmp_path, [0.0, 0.0, 1.0, 1.0])
     smoke_takes.present(obj, take)
     assert (scene.frame_start, scene.frame_end) == (11, 14)
@@ -201,23 +201,18 @@ def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 14
     scene.frame_set(16)
-    begun = with_masses(tmp_path / "begun", [1.0, 1.0], planned=6)
-    with changed(begun) as index:
-        index["complete"] = False
-    smoke_takes.present(obj, begun)
+    smoke_takes.present(obj, with_masses(tmp_path / "begun", [1.0, 1.0], planned=6, complete=False))
     assert (scene.frame_start, scene.frame_end) == (11, 16)
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 16
-    longer = with_masses(tmp_path / "longer", [1.0] * 80)
-    smoke_takes.present(obj, longer)
+    smoke_takes.present(obj, with_masses(tmp_path / "longer", [1.0] * 80))
     assert scene.frame_end == 90
     bpy.ops.smokelift.match_clip()
     assert (scene.frame_start, scene.frame_end) == (11, 90)
     scene.frame_end = 60
     smoke_takes.present(obj, take)
     assert scene.frame_end == 60
-    empty = with_masses(tmp_path / "empty", [0.0, 0.0])
-    smoke_takes.present(obj, empty)
+    smoke_takes.present(obj, with_masses(tmp_path / "empty", [0.0, 0.0]))
     assert not volume.go_to_smoke(obj)
 
 
@@ -228,9 +223,8 @@ def test_the_cube_is_hidden_with_the_first_result_that_stands_where_it_does(scen
     obj.smokelift.output = str(tmp_path)
     smoke_takes.write_take(obj)
     assert not cube.hide_render
-    take = with_masses(tmp_path / "made", [1.0])
-    with changed(take) as index:
-        index["scene"]["camera"] = {"matrix": [list(row) for row in Matrix()], "fx": 50.0, "size": [32, 48]}
+    camera = {"matrix": [list(row) for row in Matrix()], "fx": 50.0, "size": [32, 48]}
+    take = with_masses(tmp_path / "made", [1.0], camera=camera)
     assert "cube" in smoke_takes.present(obj, take)
     assert cube.hide_render
     cube.hide_viewport = cube.hide_render = False
@@ -238,16 +232,12 @@ def test_the_cube_is_hidden_with_the_first_result_that_stands_where_it_does(scen
     assert not cube.hide_render
 
 
-def test_the_range_stays_while_a_directed_result_grows(scene, clip, tmp_path) -> None:
-    obj = new_smoke(scene, clip)
-    obj.smokelift.camera_mode = "SCENE"
+def test_the_range_stays_while_a_directed_result_grows(scene, obj, tmp_path) -> None:
     first = with_masses(tmp_path, [1.0] * 8)
     smoke_takes.present(obj, first)
     before = (scene.frame_start, scene.frame_end)
-    loop = with_masses(tmp_path / "loop", [1.0] * 2)
+    loop = with_masses(tmp_path / "loop", [1.0] * 2, complete=False)
     loop.write_directed("loop", first, [])
-    with changed(loop) as index:
-        index["complete"] = False
     smoke_takes.present(obj, loop)
     assert (scene.frame_start, scene.frame_end) == before
     with changed(loop) as index:
@@ -267,17 +257,14 @@ def test_other_objects_get_nothing(scene, clip, tmp_path) -> None:
     assert not set(bpy.data.objects["Box"].keys())
 
 
-def test_the_range_is_that_of_what_is_used_or_shown(scene, clip, tmp_path) -> None:
+def test_the_range_is_that_of_what_is_used_or_shown(scene, obj, clip, tmp_path) -> None:
     """Before a run that of the used frames, then the result's; of several smokes all; a longer one of a result is."""
-    obj = new_smoke(scene, clip)
-    obj.smokelift.camera_mode = "SCENE"
     obj.smokelift.first, obj.smokelift.last = 10, 20
     bpy.ops.smokelift.match_clip()
     assert (scene.frame_start, scene.frame_end) == (10, 20)
     smoke_takes.present(obj, with_masses(tmp_path, [1.0] * 8))
     assert (scene.frame_start, scene.frame_end) == (11, 18)
-    continued = with_masses(tmp_path / "continued", [1.0] * 30, planned=8)
-    smoke_takes.present(obj, continued)
+    smoke_takes.present(obj, with_masses(tmp_path / "continued", [1.0] * 30, planned=8))
     assert (scene.frame_start, scene.frame_end) == (11, 40)
     other = new_smoke(scene, clip)
     other.smokelift.first, other.smokelift.last = 3, 5

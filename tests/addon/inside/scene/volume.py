@@ -1,8 +1,6 @@
 """The result in Blender: what plays when, where it is, and what it is made of."""
 
-import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -20,14 +18,6 @@ from smokelift.scene import Camera, Medium, Scene, scene_to_dict
 from tests.example_shot import smoke
 
 HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
-
-
-def evaluated(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
-    """The smoke as it is seen in a frame, its grids loaded."""
-    scene.frame_set(frame)
-    obj = smoke(scene).evaluated_get(bpy.context.evaluated_depsgraph_get())
-    obj.data.grids.load()
-    return obj
 
 
 def plays(scene: bpy.types.Scene, frame: int) -> int | None:
@@ -62,11 +52,8 @@ def test_in_real_time_at_another_frame_rate(shot, tmp_path, fps, wanted) -> None
     assert smoke(shot).data.velocity_scale == 1.0
 
 
-def tracked(take: Take, **tables: dict) -> dict:
-    """Make the take one of a camera that moves, and return its index."""
-    with changed(take) as index:
-        index["scene"] |= {"camera": {"matrices": [np.eye(4).tolist()] * FRAMES}, **tables}
-    return index
+TRACKED = {"matrices": [np.eye(4).tolist()] * FRAMES}
+"""A camera that moves."""
 
 
 @pytest.mark.parametrize("kind", ["pictures", "video"])
@@ -80,9 +67,7 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
     else:
         for number, plate in enumerate(plates, 101):
             write_image(tmp_path / f"plate_{number:04d}.png", plate)
-    take = made(tmp_path)
-    tracked(take, background={"image": str(path)})
-    obj = volume.show(smoke(shot), take)
+    obj = volume.show(smoke(shot), made(tmp_path, camera=TRACKED, background={"image": str(path)}))
     places = []
     for _ in range(2):
         shot_setup.set_up(smoke(shot))
@@ -99,9 +84,9 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
 @pytest.mark.parametrize(("model", "bounces"), [("multiple", shot_setup.BOUNCES), ("single", 0), ("unshadowed", 0)])
 def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model, bounces) -> None:
     take = made(tmp_path)
+    with changed(take) as index:
+        index["scene"]["medium"]["scattering"] = model
     volume.show(smoke(shot), take)
-    index = take.read().index
-    index["scene"]["medium"]["scattering"] = model
     shot.cycles.volume_bounces, shot.cycles.max_bounces = 3, 4
     shot_setup.set_up(smoke(shot))
     assert shot.cycles.volume_bounces == bounces
@@ -116,8 +101,7 @@ def test_a_set_up_needs_no_denoiser_that_is_not_there(shot, tmp_path, monkeypatc
     """Cycles of some distributions has none, and ends a render in an error if it is asked for."""
     monkeypatch.setattr(shot_setup, "has_denoiser", lambda: there)
     shot.cycles.use_denoising = True
-    take = made(tmp_path)
-    volume.show(smoke(shot), take)
+    volume.show(smoke(shot), made(tmp_path))
     said = shot_setup.set_up(smoke(shot))
     assert shot.cycles.use_denoising == there
     assert any("no denoiser" in sentence for sentence in said) == (not there)
@@ -125,10 +109,7 @@ def test_a_set_up_needs_no_denoiser_that_is_not_there(shot, tmp_path, monkeypatc
 
 def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     """Frames chosen for the next run move nothing; a start that the artist gave the Volume stays."""
-    take = made(tmp_path)
-    with changed(take) as index:
-        index["scene"]["clip"]["frames"] = [10, 15]
-    data = volume.show(smoke(shot), take).data
+    data = volume.show(smoke(shot), made(tmp_path, used=[10, 15])).data
     assert data.frame_start == 11
     smoke(shot).smokelift.first = 3
     smoke(shot).smokelift.clip.frame_start = 101
@@ -146,9 +127,10 @@ def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
 
 
 def test_grids_and_their_place(shot, tmp_path) -> None:
-    take = made(tmp_path)
-    volume.show(smoke(shot), take)
-    obj = evaluated(shot, 3)
+    volume.show(smoke(shot), made(tmp_path))
+    shot.frame_set(3)
+    obj = smoke(shot).evaluated_get(bpy.context.evaluated_depsgraph_get())
+    obj.data.grids.load()
     grids = {grid.name: grid for grid in obj.data.grids}
     assert {name: grid.data_type for name, grid in grids.items()} == {"density": "FLOAT", "velocity": "VECTOR_FLOAT"}
     voxel = 0.125
@@ -205,61 +187,42 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     assert data.display.density == 4.0
 
 
+def part(what: str, how: str = "", origin: str = "made up", **settings: float) -> dict[str, object]:
+    """A part of a provenance."""
+    return {"what": what, "origin": origin, "how": how, "settings": settings}
+
+
+CONTINUED = "Frames {} to {} are a simulation that starts from frame {}, with 3 of the clip."
+LOOP = "In frames {} to {} the end of the loop becomes its start."
+MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
+
+
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        (
-            [
-                {"what": "velocity", "origin": "estimated", "how": "", "settings": {}},
-                {"what": "detail", "origin": "made up", "how": "", "settings": {"detail": 0.5, "seed": 3}},
-            ],
-            "What the camera sees is measured, good to about 30 degrees beside it. Made up: "
-            "Depth Detail 0.5, Variation 3.",
-        ),
-        (
-            [{"what": "velocity", "origin": "estimated", "how": "", "settings": {}}],
-            "What the camera sees is measured, good to about 30 degrees beside it. Nothing is made up: "
-            "its depth is smooth.",
-        ),
+        ([part("velocity", origin="estimated"), part("detail", detail=0.5, seed=3)], MADE),
+        ([part("velocity", origin="estimated")], "degrees beside it. Nothing is made up"),
         ([], ""),
+        ([part("continue", CONTINUED.format(7, 11, 6))], CONTINUED.format(46, 50, 45)),
+        (
+            [part("continue", CONTINUED), part("retime"), part("loop", LOOP.format(1, 3))],
+            f"{LOOP.format(40, 42)} Before",
+        ),
     ],
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
+    """With the clip's frames; those of earlier results are not said of what was made of them."""
     assert volume.provenance_note(smoke(shot)) == ""
-    take = made(tmp_path)
-    file = take.directory / "sequence.json"
-    file.write_text(json.dumps({**json.loads(file.read_text()), "provenance": parts}))
+    take = made(tmp_path, used=[39, 44])
+    with changed(take) as index:
+        index["provenance"] = parts
     volume.show(smoke(shot), take)
-    assert volume.provenance_note(smoke(shot)) == said
-    assert smoke(shot).data[volume.PROVENANCE] == said
+    note = volume.provenance_note(smoke(shot))
+    assert said in note and bool(note) == bool(parts)
+    assert ("simulation" in note) == (said.startswith("Frames"))
+    assert smoke(shot).data[volume.PROVENANCE] == note
     volume.show(smoke(shot), made(tmp_path, number=2))
     assert volume.provenance_note(smoke(shot)) == ""
-
-
-def test_a_simulation_is_said_with_the_clips_frames(shot, tmp_path) -> None:
-    how = "Frames 7 to 11 are a simulation that starts from frame 6, with 3 of the clip."
-    take = made(tmp_path)
-    with changed(take) as index:
-        index["provenance"] = [{"what": "continue", "origin": "made up", "how": how, "settings": {}}]
-        index["scene"]["clip"]["frames"] = [39, 44]
-    volume.show(smoke(shot), take)
-    said = "Frames 46 to 50 are a simulation that starts from frame 45, with 3 of the clip."
-    assert volume.provenance_note(smoke(shot)) == said
-
-
-def test_frames_of_earlier_results_are_not_said_of_what_was_made_of_them(shot, tmp_path) -> None:
-    take = made(tmp_path)
-    hows = {
-        "continue": "Frames 7 to 11 are a simulation that starts from frame 6.",
-        "retime": "Frames between two of the source are made.",
-        "loop": "In frames 1 to 3 the end of the loop becomes its start.",
-    }
-    with changed(take) as index:
-        index["provenance"] = [
-            {"what": what, "origin": "made up", "how": how, "settings": {}} for what, how in hows.items()
-        ]
-    volume.show(smoke(shot), take)
-    assert volume.provenance_note(smoke(shot)) == f"{hows['loop']} Before that: Continued, Retimed."
 
 
 def test_a_new_result_replaces_the_old_one_in_the_same_object(shot, tmp_path) -> None:
@@ -342,9 +305,7 @@ def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tm
     plate = tmp_path / "plate.png"
     write_image(plate, np.full((16, 16, 3), 0.2, np.float32))
     shot = reopened(tmp_path / "shot")
-    take = made(tmp_path / "out")
-    tracked(take, background={"image": str(plate)})
-    volume.show(smoke(shot), take)
+    volume.show(smoke(shot), made(tmp_path / "out", camera=TRACKED, background={"image": str(plate)}))
     own = shot.world
     for _ in range(3):
         shot.world = own
@@ -365,9 +326,7 @@ def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
     smoke(shot).smokelift.camera_mode = "ESTIMATE"
     shot.render.resolution_x, shot.render.resolution_y = size
     camera = Camera.look_at((0.0, -5.0, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=30.0, size=size)
-    take = made(tmp_path)
-    with changed(take) as index:
-        index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
+    take = made(tmp_path, camera=scene_to_dict(Scene(camera=camera))["camera"])
     for _ in range(2):
         smoke_takes.present(smoke(shot), take)
     assert shot.camera == own
@@ -381,4 +340,3 @@ def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
     shot.camera = None
     smoke_takes.present(smoke(shot), take)
     assert shot.camera == obj
-    assert replace(camera, size=size) == camera
