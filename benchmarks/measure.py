@@ -17,13 +17,16 @@ Figures = dict[str, float | str | None]
 """Figures by their names; None where there is nothing to say. ``refused`` is the sentence of a refusal."""
 
 
-def reconstructed(clip: Clip, scene: Scene, settings: Settings) -> tuple[CompleteScene, list[Frame]] | str:
-    """Return the scene with what was estimated and all frames, or the sentence with which the engine refuses."""
+def reconstructed(
+    clip: Clip, scene: Scene, settings: Settings, score: Callable[[CompleteScene, list[Frame]], Figures]
+) -> Figures:
+    """Return the figures of the scene with what was estimated and of all frames; of a refusal its sentence alone."""
     try:
         shot = prepare_shot(clip, scene, settings)
-        return shot.scene, list(Reconstruction(shot, compose(shot.settings)))
+        frames = list(Reconstruction(shot, compose(shot.settings)))
     except ValueError as error:
-        return str(error)
+        return {"refused": str(error)}
+    return score(shot.scene, frames)
 
 
 def view_figures(

@@ -58,21 +58,17 @@ def chart(runs: Runs) -> Any:
         raise ValueError("No run has both a time and an error; there is nothing to draw.")
     from matplotlib.figure import Figure
 
-    columns = min(len(shown), 2)
-    rows = -(-len(shown) // columns)
-    figure = Figure(figsize=(6.5 * columns, 5.2 * rows), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(6.5 * len(shown), 5.2), dpi=DPI, layout="constrained")
     colors = {name: f"C{index}" for index, name in enumerate(dict.fromkeys(run.series for run in runs.runs))}
-    panels = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-    for axes, panel in zip(panels, shown, strict=False):
+    panels = figure.subplots(1, len(shown), squeeze=False)[0]
+    for axes, panel in zip(panels, shown, strict=True):
         _panel(axes, runs, panel, colors)
-    for axes in panels[len(shown) :]:
-        axes.set_axis_off()
     handles = {name: handle for axes in panels for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles, loc="outside upper center", ncols=len(handles), fontsize=9, frameon=False)
     figure.supxlabel(runs.caption, fontsize=7)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # places in pixels hold from here on
-    for axes, panel in zip(panels, shown, strict=False):
+    for axes, panel in zip(panels, shown, strict=True):
         _label(axes, runs, panel)
     return figure
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.tables import sizes_of
+
 ERRORS = {
     "view_error": "error of new views (RMS of sRGB values, white is 1)",
     "patches": "patches of the orbit, distance from the truth's",
@@ -70,7 +72,7 @@ class Run:
             return ", ".join(f"{key} {value}" for key, value in self.changes.items())
         if self.chosen or not self.resolution:
             return self.series
-        return str(max(int(count) for count in self.resolution.split("x")))
+        return str(max(sizes_of(self.resolution)[0]))
 
     @property
     def _said(self) -> list[str]:
@@ -121,19 +123,13 @@ def read_runs(path: Path) -> Runs:
 
 def _mean(name: str, rows: list[dict[str, str]]) -> Run:
     def mean(column: str) -> float | None:
-        values = [float(row[column]) for row in rows if row[column] != ""]
+        values = [float(row[column]) for row in rows if row.get(column)]
         return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
 
     decibels = mean("psnr_new")
-    errors = {
-        "view_error": None if decibels is None else 10 ** (-decibels / 20),
-        "patches": mean("patches") if "patches" in rows[0] else None,
-    }
-    known = {key: value for key, value in errors.items() if value is not None and value > 0}
-    seconds = mean("seconds")
-    if seconds is not None and seconds <= 0:
-        seconds = None
-    return Run(name, rows[0].get("resolution") or "", seconds, known)
+    errors = {"view_error": None if decibels is None else 10 ** (-decibels / 20), "patches": mean("patches")}
+    known = {key: value for key, value in errors.items() if value}
+    return Run(name, rows[0].get("resolution") or "", mean("seconds") or None, known)
 
 
 def _caption(rows: list[dict[str, str]], scenes: Sequence[str]) -> str:

@@ -27,7 +27,6 @@ _COST: list[Column] = [
     ("MiB", ["memory_mib"], ".0f"),
 ]
 
-
 ORBIT_COLUMNS: list[Column] = [
     ("patches, worst", ["patches", "patches_worst"], ".3f"),
     ("(own)", ["patches_own"], ".3f"),
@@ -36,7 +35,6 @@ ORBIT_COLUMNS: list[Column] = [
     ("halo", ["halo"], ".1%"),
     ("flicker", ["flicker"], ".2f"),
 ]
-
 
 SHAPE_COLUMNS: list[Column] = [(f"{name.replace('_', ' ')} (true)", [name, f"{name}_truth"], ".2f") for name in SHAPES]
 

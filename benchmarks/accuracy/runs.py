@@ -19,11 +19,12 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from benchmarks.accuracy.ablations import leave_out, smear
 from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.baked import VIEWS, camera_of
+from benchmarks.tables import sizes_of
 from smokelift import ClipSource, Scene, Settings
 from smokelift.density import DensitySettings, GradientFit, ViewSet
 from smokelift.output.images import write_image
@@ -37,7 +38,6 @@ from smokelift.velocity import PrimalDual, ProjectedCG
 SMEAR = "smear"
 SMEAR_FIT = GradientFit(DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3))
 """Only whole rays are scaled, so that a density which is constant along them stays so."""
-
 
 SOLVERS = {"primal-dual": PrimalDual(), "projected-cg": ProjectedCG()}
 
@@ -93,7 +93,7 @@ def run_settings(run: str) -> Settings:
         if key == "without":
             continue
         if key == "resolution":
-            settings = replace(settings, resolution=_resolution(text))
+            settings = replace(settings, resolution="auto" if text == "auto" else sizes_of(text)[0])
         else:
             settings = _changed(settings, key, text)
     return settings
@@ -124,14 +124,6 @@ def _changes(run: str) -> list[tuple[str, str]]:
     """Return the keys and values behind the colon of a run's name."""
     pairs = [change.partition("=") for change in run.partition(":")[2].split(",") if change]
     return [(key, text) for key, _, text in pairs]
-
-
-def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
-    """Return the voxels that "64x64x96" says; "auto" is chosen by the clip."""
-    if text == "auto":
-        return "auto"
-    x, y, z = (int(count) for count in text.split("x"))
-    return x, y, z
 
 
 def _changed(settings: Settings, key: str, text: str) -> Settings:

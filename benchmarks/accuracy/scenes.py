@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
 from benchmarks.baked import FRONT, Baked, camera_of
 from smokelift import Camera, Clip, Scene
@@ -67,10 +68,9 @@ def baked_scene(folder: Path, frames: int | None = None) -> KnownScene:
     def seen(view: str, frame: int) -> Image:
         return np.repeat(baked.views[view].radiance[frame][..., None], 3, axis=-1)
 
-    def billboard(_: str, frame: int) -> Image:
-        return seen(FRONT, frame)
-
-    return KnownScene(folder.name, folder / "scene.toml", span, span, baked.cameras, seen, billboard, truth)
+    return KnownScene(
+        folder.name, folder / "scene.toml", span, span, baked.cameras, seen, lambda _, frame: seen(FRONT, frame), truth
+    )
 
 
 def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
@@ -112,12 +112,7 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
 
 def moved(picture: Image, down: int, right: int) -> Image:
     """Return a picture (rows, columns, 3) moved by whole pixels; what comes in is black."""
-    rows, columns = picture.shape[:2]
-    whole = np.zeros_like(picture)
-    whole[max(down, 0) : rows + min(down, 0), max(right, 0) : columns + min(right, 0)] = picture[
-        max(-down, 0) : rows - max(down, 0), max(-right, 0) : columns - max(right, 0)
-    ]
-    return whole
+    return np.asarray(ndimage.shift(picture, (down, right, 0), order=0))
 
 
 def picture_on_screen(picture: Image, source: Camera, view: Camera, center: npt.NDArray[np.float64]) -> Image:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -77,29 +77,19 @@ def images(known: KnownScene, run: str, folder: Path, frames: range) -> Iterator
     elif run == "black":
         yield from ((frame, {view: 0 * known.seen(view, frame) for view in views}) for frame in frames)
     elif (densities := known_densities(known, run, folder)) is not None:
-        ours = {view: scene_renderer(densities.scene, camera, BLACK) for view, camera in views.items()}
+        scene, density = densities
+        ours = {view: scene_renderer(scene, camera, BLACK) for view, camera in views.items()}
         for frame in frames:
-            density = densities.of_frame(frame)
-            yield frame, {view: ours[view].image(density) for view in views}
+            volume = density(frame)
+            yield frame, {view: ours[view].image(volume) for view in views}
 
 
-@dataclass(frozen=True)
-class KnownDensities:
-    """The densities of a run, or the true ones.
-
-    Attributes
-    ----------
-    scene
-        On their grid; with the scattering that they are rendered with.
-    of_frame
-        Returns the density of a frame of the clip, (nx, ny, nz).
-    """
-
-    scene: CompleteScene
-    of_frame: Callable[[int], Array]
+Densities = tuple[CompleteScene, Callable[[int], Array]]
+"""A scene on the densities' grid with the scattering that they are rendered with, and what returns the density of a
+frame of the clip, (nx, ny, nz)."""
 
 
-def known_densities(known: KnownScene, run: str, folder: Path) -> KnownDensities | None:
+def known_densities(known: KnownScene, run: str, folder: Path) -> Densities | None:
     """Return the densities of a run; None if it is a picture without any."""
     if run_name(run) in BILLBOARDS or run == "black":
         return None
@@ -107,12 +97,11 @@ def known_densities(known: KnownScene, run: str, folder: Path) -> KnownDensities
         if known.truth is None:
             sys.exit(f"{known.name}: its volumes are not known, so there is no run truth.")
         scene = replace(Scene.load(known.scene_path), scattering="single")
-        return KnownDensities(on_grid(completed(scene), known.truth.shape), known.truth.density)
+        return on_grid(completed(scene), known.truth.shape), known.truth.density
     about = json.loads((folder / "run.json").read_text())
     scene = replace(Scene.load(folder / "scene.toml"), scattering=about["scattering"])
-    return KnownDensities(
-        on_grid(completed(scene), tuple(about["resolution"])), lambda frame: _volume(folder, known, frame)["density"]
-    )
+    whole = on_grid(completed(scene), tuple(about["resolution"]))
+    return whole, lambda frame: _volume(folder, known, frame)["density"]
 
 
 def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
@@ -136,7 +125,7 @@ def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
         row["resolution"] = "x".join(map(str, about["resolution"]))
     row |= _view_figures(known, run, folder)
     if (densities := known_densities(known, run, folder)) is not None:
-        scores = around(known, densities)
+        scores = around(known, *densities)
         row |= {name: scores.get(name) for name in (*ORBIT_FIGURES, *SHAPE_FIGURES)}
     if known.truth is None:
         row |= _exposure_figures(known, run, folder)
@@ -145,16 +134,16 @@ def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
     return row
 
 
-def around(known: KnownScene, densities: KnownDensities) -> dict[str, Any]:
+def around(known: KnownScene, scene: CompleteScene, density: Callable[[int], Array]) -> dict[str, Any]:
     """Return the `orbit_scores` of a run over the frames from the first to the last that is scored."""
     truth, frames = known.truth, range(known.scored[0], known.scored[-1] + 1)
     if truth is None:
-        return orbit_scores(densities.scene, len(frames), lambda index: densities.of_frame(frames[index]))
+        return orbit_scores(scene, len(frames), lambda index: density(frames[index]))
     shape = truth.shape
     return orbit_scores(
-        on_grid(densities.scene, shape),
+        on_grid(scene, shape),
         len(frames),
-        lambda index: resampled(densities.of_frame(frames[index]), shape),
+        lambda index: resampled(density(frames[index]), shape),
         lambda index: truth.density(frames[index]),
     )
 

@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +24,13 @@ from benchmarks.disturbances.known import GRID, SIZE
 from benchmarks.measure import Figures, optical_mass, reconstructed, view_figures
 from benchmarks.plates import BRIGHT
 from benchmarks.tables import line, markdown
-from smokelift import Background, Clip, Domain, Settings
+from smokelift import Background, Clip, Domain, Frame, Settings
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates, evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
+from smokelift.scene import CompleteScene
 
 FIGURES = ("plate", "lost", "missed", "false", "unknown")
 
@@ -132,10 +133,11 @@ def run_figures(case: Case, baked: Baked) -> Figures:
             medium=smoke.scene.medium if case.medium else None,
             background=background,
         )
-        found = reconstructed(case.clip(smoke.front), scene, replace(Settings.preset(), detail=0.0))
-    if isinstance(found, str):
-        return {"refused": found}
-    estimated, frames = found
+        settings = replace(Settings.preset(), detail=0.0)
+        return reconstructed(case.clip(smoke.front), scene, settings, partial(_run_score, case, smoke))
+
+
+def _run_score(case: Case, smoke: Baked, estimated: CompleteScene, frames: list[Frame]) -> Figures:
     small = smoke.at(SCORED).sized(SIZE)
     behind = np.full(3, BRIGHT if case.smoke == "dark" else 0, np.float32)
     figures = view_figures(

@@ -19,7 +19,7 @@ from benchmarks.blender.looks import rendered, shown_example
 from benchmarks.blender.pictures import beside, save
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
-from tests.example_shot import FULL_SIZE, add, set_world
+from tests.example_shot import FULL_SIZE, add, add_sun, set_world
 
 FRAME = 36
 SIZE, SAMPLES = (640, 960), 32  # three quarters of it are rendered
@@ -79,10 +79,8 @@ def light(scene: bpy.types.Scene, direction: tuple[float, float, float], degrees
     """One sun, which shines in a direction as the turned camera sees it."""
     for obj in [obj for obj in scene.objects if obj.type == "LIGHT"]:
         bpy.data.objects.remove(obj)
-    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy, sun.data.angle = 20.0, math.radians(1.0)
     turned = Matrix.Rotation(math.radians(degrees), 3, "Z") @ Vector(direction)
-    sun.rotation_euler = turned.to_track_quat("-Z", "Y").to_euler()
+    add_sun(scene, 20.0, turned.to_track_quat("-Z", "Y").to_euler()).data.angle = math.radians(1.0)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ goes. With --heads the upper part of the smoke dissolves before anything is fitt
 import argparse
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -99,18 +100,20 @@ def rise(velocities: list[Velocity], density: Array, dt: float) -> float:
     return way
 
 
+def cut_at_two_thirds(truth: Truth, folder: Path | None = None) -> tuple[list[SmokeState], range]:
+    """Return the last moments before the cut, of the truth or of a run in a folder, and the frames behind it."""
+    count = truth.frames if folder is None else len(list(folder.glob("[0-9]*.npz")))
+    cut = 2 * count // 3
+    moment = true_moment if folder is None else partial(reconstructed_moment, folder)
+    return [moment(truth, frame) for frame in range(max(1, cut - BUOYANCY_FRAMES), cut)], range(cut, count)
+
+
 def table(known: KnownScene, folder: Path | None, heads: float) -> Iterator[list[str]]:
     """Yield the rows of a scene from its truth, or from a run in a folder; its head dissolves at a rate (1/s)."""
     truth = known.truth
     assert truth is not None
-    count = truth.frames if folder is None else len(list(folder.glob("[0-9]*.npz")))
-    cut = 2 * count // 3
-    shown, frames = range(max(1, cut - BUOYANCY_FRAMES), cut), range(cut, count)
-    if folder is None:
-        moments = [true_moment(truth, frame) for frame in shown]
-    else:
-        moments = [reconstructed_moment(folder, truth, frame) for frame in shown]
-    really = rise([truth.velocity(frame - 1) for frame in frames], truth.density(cut - 1), truth.dt)
+    moments, frames = cut_at_two_thirds(truth, folder)
+    really = rise([truth.velocity(frame - 1) for frame in frames], truth.density(frames[0] - 1), truth.dt)
     fitted = with_dissolving_heads(moments, truth.dt, heads)
     for how, found, physics in ways(moments, len(frames), truth.dt, fitted, true=folder is None):
         errors = [density_error(m.density, truth.density(f)) for m, f in zip(found, frames, strict=True)]
@@ -129,9 +132,7 @@ def picture(known: KnownScene, path: Path) -> None:
     """Write a sheet: what came and every way to continue, over time."""
     truth = known.truth
     assert truth is not None
-    cut = 2 * truth.frames // 3
-    frames = range(cut, truth.frames)
-    moments = [true_moment(truth, frame) for frame in range(max(1, cut - BUOYANCY_FRAMES), cut)]
+    moments, frames = cut_at_two_thirds(truth)
     shown = [0, len(frames) // 3, 2 * len(frames) // 3, len(frames) - 1]
     white = float(max(truth.density(f).mean(axis=1).max() for f in frames))
     columns = {"what came": [truth.density(frames[i]) for i in shown]}

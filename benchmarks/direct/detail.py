@@ -47,12 +47,6 @@ def lines(picture: Doubles) -> float:
     return float(np.hypot(a - c, 2 * b).sum() / (a + c).sum())
 
 
-def height(density: Array) -> float:
-    """Return the voxel, counted from below, in which the center of mass is."""
-    sums = density.sum((0, 1), dtype=np.float64)
-    return float(np.average(np.arange(len(sums)), weights=sums))
-
-
 def rows(directory: Path) -> list[list[str]]:
     """Return the rows of a continued sequence, those of its clip first."""
     sequence = Sequence.open(directory)
@@ -66,7 +60,8 @@ def rows(directory: Path) -> list[list[str]]:
     found = []
     for number in (seam, *(seam + after for after in AFTER)):
         density, since = sequence.density(number), min(clip) if number == seam else seam
-        rise = (height(density) - height(clip[since])) * speed / (number - since)
+        low, high = (ndimage.center_of_mass(each)[2] for each in (clip[since], density))
+        rise = (high - low) * speed / (number - since)
         mass = density.sum(dtype=np.float64) / clip[seam].sum(dtype=np.float64)
         for name, picture in views(density).items():
             own = PatchStatistics.of(picture)

@@ -8,6 +8,7 @@ degrees.
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,15 +66,11 @@ def left_by_a_face(sequence: Sequence, start: int) -> float:
     return left / float(sequence.density(start).sum(dtype=np.float64))
 
 
-def seen(sequence: Sequence, number: int, around: Domain, degrees: float) -> npt.NDArray[np.uint8]:
-    """Return smoke in a box, from the front or turned."""
-    part = sequence.within(around)
-    return eight_bit(Orbit(part.scene).image(part.density(number), degrees))
-
-
 def rows_of(sequence: Sequence, numbers: list[int], around: Domain) -> list[list[npt.NDArray[np.uint8]]]:
-    """Return frames from the front, and from 45 degrees."""
-    return [[seen(sequence, number, around, degrees) for number in numbers] for degrees in (0.0, 45.0)]
+    """Return frames in a box from the front, and from 45 degrees."""
+    part = sequence.within(around)
+    orbit = Orbit(part.scene)
+    return [[eight_bit(orbit.image(part.density(n), degrees)) for n in numbers] for degrees in (0.0, 45.0)]
 
 
 def main() -> None:
@@ -90,9 +87,7 @@ def main() -> None:
     for name, case in cases(source.scene.domain).items():
         for room in (1.0, ROOM):
             out = options.out / f"{name}_{room:g}"
-            continuation = Continuation(
-                options.frames, options.start, wind=case.wind, fans=case.fans, obstacles=case.obstacles, room=room
-            )
+            continuation = replace(case, frames=options.frames, start=options.start, room=room)
             figures = [figures for number, figures in continue_sequence(source, out, continuation)][-options.frames :]
             made[name] = sequence = Sequence.open(out)
             seconds = [each["seconds_velocity"] for each in figures]
@@ -100,16 +95,8 @@ def main() -> None:
             mass = sequence.figures(options.start)["mass"]
             dissolved = sum(each[DISSOLVED] * each["mass"] for each in figures) / mass
             grown = np.prod(sequence.box(last).resolution) / np.prod(source.scene.domain.resolution)
-            table.append(
-                [
-                    name,
-                    f"{room:g}",
-                    f"{left_by_a_face(sequence, options.start):.3f}",
-                    f"{dissolved:.3f}",
-                    f"{grown:.1f}",
-                    f"{np.mean(seconds[:6]):.2f}, {np.mean(seconds[-6:]):.2f}",
-                ]
-            )
+            cells = [f"{left_by_a_face(sequence, options.start):.3f}", f"{dissolved:.3f}", f"{grown:.1f}"]
+            table.append([name, f"{room:g}", *cells, f"{np.mean(seconds[:6]):.2f}, {np.mean(seconds[-6:]):.2f}"])
     print(markdown(HEADER, table), flush=True)
     if options.picture:
         first, last = steady_part(source)

@@ -17,7 +17,7 @@ from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Method, compose
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import MethodName
-from smokelift.transport import Velocity, advect, project
+from smokelift.transport import Velocity, advect, on_faces, project
 from smokelift.velocity import DensityPair
 
 
@@ -25,7 +25,7 @@ def motion(known: Known, voxels: float, method: MethodName) -> Figures:
     """A density and the same one carried by its true flow, scaled to a mean way of so many voxels."""
     density = known.density(FIRST)
     smoke = density > SMOKE_FRACTION * density.max()
-    flow = _on_faces(known)
+    flow = project(Velocity(on_faces(known.velocities[FIRST]), known.domain.voxel_size))
     way = np.linalg.norm(flow.centres()[smoke], axis=-1).mean() / (known.fps * flow.voxel_size)
     flow = flow.with_faces(np.float32(voxels / way) * component for component in flow.faces)
     after = advect(density, flow, 1 / known.fps)
@@ -61,13 +61,3 @@ def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
     start = np.float32(factor) * resampled(known.densities[FIRST], GRID)
     density = composed.density_fit.fit(views, depth, start).density
     return view_figures(shot.scene, lambda _: density, known.cameras, seen_in(take), [0])
-
-
-def _on_faces(known: Known) -> Velocity:
-    """The true flow of the first moment on the faces of the small grid, without divergence."""
-    centers = np.pad(known.velocities[FIRST], [(1, 1), (1, 1), (1, 1), (0, 0)], mode="edge")
-    inside = slice(1, -1)
-    x = (centers[1:, inside, inside, 0] + centers[:-1, inside, inside, 0]) / 2
-    y = (centers[inside, 1:, inside, 1] + centers[inside, :-1, inside, 1]) / 2
-    z = (centers[inside, inside, 1:, 2] + centers[inside, inside, :-1, 2]) / 2
-    return project(Velocity((x, y, z), known.domain.voxel_size))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -78,6 +78,10 @@ class Known(Baked):
         """What the smoke does to light."""
         assert self.scene.medium is not None
         return self.scene.medium
+
+    def with_medium(self, **changes: Any) -> Self:
+        """Return it with another medium; its pictures stay."""
+        return replace(self, scene=replace(self.scene, medium=replace(self.medium, **changes)))
 
     @property
     def light(self) -> DirectionalLight:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -58,19 +59,16 @@ class Results(tables.Rows):
         measured = dict.fromkeys(scene for n, _, scene, m in self.keys if (n, m) == (name, method))
         return [scene for scene in measured if self.find(self.key(name, rest, scene, METHODS[0])) is not None]
 
-    def values(self, name: str, strength: float, method: str, figure: str) -> Doubles:
-        """Return a figure of every scene; NaN where it was not measured."""
-        return self._values(name, strength, method, figure, self.scenes(name, method))
+    def values(self, name: str, strength: float, method: str, figure: str, scenes: Sequence[str] = ()) -> Doubles:
+        """Return a figure of some scenes, or of every one of a method; NaN where it was not measured."""
+        keys = [self.key(name, strength, scene, method) for scene in scenes or self.scenes(name, method)]
+        found = [(self.find(key) or {}).get(figure) for key in keys]
+        return np.array([math.nan if value is None else value for value in found], np.float64)
 
     def changes(self, name: str, strength: float, method: str) -> Doubles:
         """Return the new views' PSNR of every scene less that of the default undisturbed (dB)."""
         rest, scenes = DISTURBANCES[name].undisturbed, self.scenes(name, method)
-        undisturbed = self._values(name, rest, METHODS[0], "psnr_new", scenes)
-        return np.subtract(self._values(name, strength, method, "psnr_new", scenes), undisturbed)
-
-    def _values(self, name: str, strength: float, method: str, figure: str, scenes: Sequence[str]) -> Doubles:
-        rows = [self.find(self.key(name, strength, scene, method)) or {} for scene in scenes]
-        return np.array([math.nan if row.get(figure) is None else row[figure] for row in rows], np.float64)
+        return self.values(name, strength, method, "psnr_new") - self.values(name, rest, METHODS[0], "psnr_new", scenes)
 
 
 def losing(strengths: Sequence[float], changes: Sequence[float], undisturbed: float, logarithmic: bool) -> list[float]:
@@ -108,13 +106,8 @@ def mean(values: Doubles) -> float:
 
 def curves(results: Results, name: str, method: str, figure: str) -> Doubles:
     """Return a disturbance's curves (scenes, strengths): of ``psnr_new`` the changes, else the figure; NaN for none."""
-    each = [
-        results.changes(name, strength, method)
-        if figure == "psnr_new"
-        else results.values(name, strength, method, figure)
-        for strength in DISTURBANCES[name].strengths
-    ]
-    return np.stack(each, axis=1)
+    read = results.changes if figure == "psnr_new" else partial(results.values, figure=figure)
+    return np.stack([read(name, strength, method) for strength in DISTURBANCES[name].strengths], axis=1)
 
 
 def draw(results: Results, figure: str, label: str, path: Path) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 
 from benchmarks.disturbances.known import Known, Take
 from benchmarks.disturbances.spoiled import GRAY, LENGTH, taken, usual
@@ -28,22 +29,17 @@ def optical_depth(known: Known, depth: float) -> Take:
     _, _, z = part.densities.shape[1:]
     voxel = (part.domain.max[2] - part.domain.min[2]) / z
     now = part.medium.extinction * voxel * float(part.densities.sum(axis=2).max())
-    medium = replace(part.medium, extinction=part.medium.extinction * depth / now)
-    return taken(exposed(replace(part, scene=replace(part.scene, medium=medium))))
+    return taken(exposed(part.with_medium(extinction=part.medium.extinction * depth / now)))
 
 
 def anisotropy(known: Known, mean_cosine: float) -> Take:
     """Smoke that scatters forward (up to 1) or backward (down to -1)."""
-    part = usual(known)
-    medium = replace(part.medium, anisotropy=mean_cosine)
-    return taken(exposed(replace(part, scene=replace(part.scene, medium=medium))))
+    return taken(exposed(usual(known).with_medium(anisotropy=mean_cosine)))
 
 
 def albedo(known: Known, fraction: float) -> Take:
     """Smoke that scatters a fraction of the light that it stops, before a gray background, which is given."""
-    part = usual(known)
-    part = replace(part, scene=replace(part.scene, medium=replace(part.medium, albedo=fraction))).pictured()
-    return replace(taken(part, GRAY), behind=GRAY)
+    return replace(taken(usual(known).with_medium(albedo=fraction).pictured(), GRAY), behind=GRAY)
 
 
 def event(known: Known, number: float) -> Take:
@@ -107,13 +103,7 @@ def _unknown_flow(known: Known) -> Known:
 
 def _moved(density: Array, fraction: float) -> Array:
     """Return a density (x, y, z) moved along x by a fraction of the box; nothing comes in."""
-    voxels = round(fraction * len(density))
-    moved = np.roll(density, voxels, axis=0)
-    if voxels > 0:
-        moved[:voxels] = 0
-    elif voxels < 0:
-        moved[voxels:] = 0
-    return moved
+    return np.asarray(ndimage.shift(density, (round(fraction * len(density)), 0, 0), order=0))
 
 
 EVENTS: dict[str, Callable[[Known], Known]] = {

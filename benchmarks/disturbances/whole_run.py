@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from smokelift.evaluation.metrics import velocity_error, volume_error
 from smokelift.evaluation.truth import resampled
 from smokelift.pipeline import Frame
 from smokelift.render import Image
+from smokelift.scene import CompleteScene
 from smokelift.setup.settings import MethodName
 
 _done: dict[tuple[object, ...], Figures] = {}
@@ -32,7 +34,7 @@ def whole_run(take: Take, method: MethodName) -> Figures:
     """
     key = (take.known.name, take.pictures.tobytes(), take.given, take.gain, take.behind, take.scored, method)
     if key not in _done:
-        _done[key] = _measured(take, method)
+        _done[key] = reconstructed(filmed(take.pictures), take.given, smooth(method), partial(_figures, take))
     return _done[key]
 
 
@@ -47,11 +49,7 @@ def seen_in(take: Take) -> Callable[[str, int], Image]:
     return lambda view, frame: take.known.views[view].at(slice(frame, frame + 1)).before(behind)[0]
 
 
-def _measured(take: Take, method: MethodName) -> Figures:
-    found = reconstructed(filmed(take.pictures), take.given, smooth(method))
-    if isinstance(found, str):
-        return {"refused": found}
-    scene, frames = found
+def _figures(take: Take, scene: CompleteScene, frames: list[Frame]) -> Figures:
     figures = view_figures(
         scene,
         lambda frame: frames[frame].density,

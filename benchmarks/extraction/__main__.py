@@ -26,8 +26,9 @@ from benchmarks.extraction.compose import CRF, GIVEN, KNOWN, Composed, Filming, 
 from benchmarks.extraction.score import score_densities
 from benchmarks.measure import Figures, reconstructed
 from benchmarks.plates import PAINTED, PHOTOGRAPHS, plate_name
-from benchmarks.tables import Rows, cell, line, markdown
-from smokelift import Clip, Scene, Settings
+from benchmarks.tables import Rows, cell, line, markdown, sizes_of
+from smokelift import Clip, Frame, Scene, Settings
+from smokelift.scene import CompleteScene
 from smokelift.setup.settings import QUALITIES
 
 RESOLUTION = "48x48x72"
@@ -65,8 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--drift", action="store_true", help="exposure and white balance drift")
     options = parser.parse_args(arguments)
     filming = Filming(options.crf, options.noise / 100, options.drift)
-    x, y, z = (int(count) for count in options.resolution.split("x"))
-    settings = Settings.preset(options.quality, resolution=(x, y, z))
+    settings = Settings.preset(options.quality, resolution=sizes_of(options.resolution)[0])
     rows = Rows(options.out / "rows.csv", KEYS, FIGURES)
     wanted = [(plate, known) for plate in options.plates for known in options.known]
     if options.black and ("black", GIVEN) not in wanted:
@@ -89,14 +89,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def measured(smoke: Baked, composed: Composed, path: Path, settings: Settings) -> Figures:
     """Reconstruct a scene file, and return its figures, or the sentence in which the engine refuses."""
+
+    def score(scene: CompleteScene, frames: list[Frame]) -> Figures:
+        return score_densities(scene, lambda number: frames[number].density, smoke, composed)
+
     described = Scene.load(path)
     assert described.clip is not None
     with Clip.open(described.clip) as clip:
-        found = reconstructed(clip, described, settings)
-    if isinstance(found, str):
-        return {"refused": found}
-    scene, frames = found
-    return score_densities(scene, lambda number: frames[number].density, smoke, composed)
+        return reconstructed(clip, described, settings, score)
 
 
 def cells(figures: Figures) -> list[str]:

@@ -15,7 +15,7 @@ import argparse
 import math
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +24,9 @@ from scipy.optimize import nnls
 from benchmarks import machine
 from benchmarks.machine import UNTIMED
 from benchmarks.pipeline.clip import with_grid, write_clip
-from benchmarks.pipeline.worker import CLOCKS, Job, Run, run_apart
+from benchmarks.pipeline.worker import CLOCKS, Run, run_apart
 from benchmarks.tables import line, markdown, number, size_text, sizes_of
-from smokelift.setup.settings import QUALITIES
+from smokelift.setup.settings import QUALITIES, Settings
 
 MEMORY = 24.0
 """GiB of the largest machine that a grid is foretold for."""
@@ -126,16 +126,14 @@ def main() -> None:
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="what a user waits, or the work of all cores")
     options = parser.parse_args()
     print(machine.provenance("numpy", "scipy"), markdown(HEADER), sep="\n\n", flush=True)
-    runs = []
+    runs, settings = [], replace(Settings.preset(options.quality), detail=options.detail)
     for extent in options.extents:
         with tempfile.TemporaryDirectory() as made:
             folder = Path(made)
             known = write_clip(folder, UNTIMED + options.frames, extent)
             for shape in options.sizes:
                 with_grid(known, shape).save(folder / "scene.toml")
-                path = str(folder / "scene.toml")
-                job = Job(path, shape, options.quality, options.detail, options.frames, options.clock)
-                runs.append(run_apart(job))
+                runs.append(run_apart(folder / "scene.toml", settings, shape, options.frames, options.clock))
                 print(line(_cells(runs[-1])), flush=True)
     print("", *laws(runs), sep="\n")
 

@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,36 +14,10 @@ from benchmarks.process import apart
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
-from smokelift.setup.settings import Quality, Settings
+from smokelift.setup.settings import Settings
 
 CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
 """What a user waits; and the work of all cores, which is the same beside other work."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """What is run.
-
-    Attributes
-    ----------
-    scene
-        Path of a scene file with a clip.
-    size
-        Voxels along x, y and z.
-    quality, detail
-        As in `Settings`.
-    frames
-        How many are timed.
-    clock
-        Name in `CLOCKS`.
-    """
-
-    scene: str
-    size: tuple[int, int, int]
-    quality: Quality
-    detail: float
-    frames: int
-    clock: Literal["wall", "processor"]
 
 
 @dataclass(frozen=True)
@@ -79,32 +53,31 @@ class Run:
     failure: str = ""
 
 
-def run_apart(job: Job) -> Run:
-    """Do a job in a process of its own."""
-    found = apart(measure, job)
-    return Run(job.size, failure=found) if isinstance(found, str) else found
+def run_apart(path: Path, settings: Settings, size: tuple[int, int, int], frames: int, clock: str) -> Run:
+    """Measure in a process of its own."""
+    found = apart(measure, path, settings, size, frames, clock)
+    return Run(size, failure=found) if isinstance(found, str) else found
 
 
-def measure(job: Job) -> Run:
-    """Do a job in this process.
+def measure(path: Path, settings: Settings, size: tuple[int, int, int], frames: int, clock: str) -> Run:
+    """Reconstruct in this process the clip of a scene file on a grid, and time some frames by a clock of `CLOCKS`.
 
     Raises
     ------
     ValueError
         If the scene, its clip or the resolution cannot be used.
     """
-    scene = Scene.load(job.scene)
+    scene = Scene.load(path)
     if scene.clip is None:
-        raise ValueError(f"{job.scene}: has no [clip].")
-    source = replace(scene.clip, frames=(0, UNTIMED + job.frames - 1))
-    settings = replace(Settings.preset(job.quality, resolution=job.size), detail=job.detail)
-    times = FrameTimes(job.size, CLOCKS[job.clock])
+        raise ValueError(f"{path}: has no [clip].")
+    source = replace(scene.clip, frames=(0, UNTIMED + frames - 1))
+    times = FrameTimes(size, CLOCKS[clock])
     with tempfile.TemporaryDirectory() as out, Clip.open(source) as clip:
         figures: list[Mapping[str, Any]] = []
-        run = reconstruct(clip, scene, settings)
+        run = reconstruct(clip, scene, replace(settings, resolution=size))
         run.write(Path(out) / "smoke", on_frame=times.before(lambda frame: figures.append(frame.figures)))
     return Run(
-        size=job.size,
+        size=size,
         seconds=times.seconds,
         seconds_density=median([found["seconds_density"] for found in figures]),
         seconds_velocity=median([found["seconds_velocity"] for found in figures]),

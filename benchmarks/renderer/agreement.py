@@ -160,11 +160,15 @@ class Comparison:
     def medium(self, case: tuple[int, int]) -> Medium:
         return Medium(self.extinctions[case[0]], ALBEDO, ANISOTROPIES[case[1]])
 
+    def renderer(self, case: tuple[int, int], lights: tuple[FiniteLight, ...], grid: int) -> Renderer:
+        black = np.zeros(3, np.float32)
+        return Renderer(CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), lights, black)
+
     def errors(
         self, kind: str, case: tuple[int, int], lights: tuple[FiniteLight, ...], grid: int
     ) -> tuple[float, float]:
         """Difference of the scattered light alone, and of the picture before the background where smoke is."""
-        renderer = Renderer(CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), lights, np.zeros(3, np.float32))
+        renderer = self.renderer(case, lights, grid)
         scattered = renderer.image(self.densities[grid])
         ours = scattered + renderer.transmittance[..., None] * BACKGROUND
         true = self.finest(kind)[case]
@@ -208,10 +212,7 @@ class Comparison:
             cells = []
             for grid in GRIDS:
                 same_voxels = self.reference[f"grid/{grid}"][case]
-                renderer = Renderer(
-                    CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), (SUN,), np.zeros(3, np.float32)
-                )
-                ours = renderer.image(self.densities[grid])
+                ours = self.renderer(case, (SUN,), grid).image(self.densities[grid])
                 cells.append(f"{difference(same_voxels, true[case]):.2f} + {difference(ours, same_voxels):.2f}")
             rows.append([*self.named(case), *cells])
         return markdown(["depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
@@ -220,15 +221,13 @@ class Comparison:
         """How far the references are from being exact."""
         rows = []
         for kind in (*LIGHTS, "environment"):
-            *coarser, best = self.pictures(kind)
             pictures = self.pictures(kind)
+            *coarser, best = pictures
             for number in coarser:
                 cells = [f"{difference(pictures[number][c], pictures[best][c]):.3f}" for c in self.cases]
                 rows.append([kind, str(number), str(best), *cells])
-        return markdown(
-            ["light", "steps a voxel or directions", "against", *(", ".join(self.named(case)) for case in self.cases)],
-            rows,
-        )
+        columns = [", ".join(self.named(case)) for case in self.cases]
+        return markdown(["light", "steps a voxel or directions", "against", *columns], rows)
 
     def tables(self) -> Iterator[tuple[str, str]]:
         """Yield what each table shows, and the table."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -77,38 +76,30 @@ def _in_folder(peer: str, folder: Path, lights: int, device: DeviceName) -> Resu
 
 def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
     """Run a peer in this process; returns its image and gradient too."""
-    prepare = prepare_function(peer)
     small = bench_scene(plume(TINY, 0.5), np.zeros((TINY, TINY, 3), np.float32), len(scene.lights))
-    tiny = prepare(small)
+    tiny = prepared(peer, small)
     tiny.run(tiny.upload(small.density))
     del tiny
     before = _reset_peak()
-    iteration = prepare(scene)
+    iteration = prepared(peer, scene)
     density = iteration.upload(scene.density)
     for _ in range(WARM_UPS):
         iteration.run(density)
     seconds, outcome = _clocked(iteration, density)
     peak = peak_memory()
     image, gradient = iteration.download(*outcome)
-    result = Result(
-        seconds=tuple(seconds),
-        peak_bytes=None if peak is None or before is None else max(peak - before, 0),
-    )
-    return result, image, gradient
+    used = None if peak is None or before is None else max(peak - before, 0)
+    return Result(seconds=tuple(seconds), peak_bytes=used), image, gradient
 
 
-def prepare_function(peer: str) -> Callable[[BenchScene], Iteration]:
-    """Import a peer, and return the function that prepares it for a scene."""
+def prepared(peer: str, scene: BenchScene) -> Iteration:
+    """Import a peer and prepare it for a scene."""
     described = PEERS[peer]
     module = importlib.import_module(f"benchmarks.renderer.peers.{described.module}")
-
-    def prepare(scene: BenchScene) -> Iteration:
-        if described.before_black:
-            scene = replace(scene, background=(0.0, 0.0, 0.0))
-        iteration: Iteration = module.prepare(scene, *described.arguments)
-        return iteration
-
-    return prepare
+    if described.before_black:
+        scene = replace(scene, background=(0.0, 0.0, 0.0))
+    iteration: Iteration = module.prepare(scene, *described.arguments)
+    return iteration
 
 
 def _clocked(iteration: Iteration, density: Any) -> tuple[list[float], Any]:

@@ -203,10 +203,8 @@ def lacking(name: str, folder: Path) -> str:
     if name in ("full disk", "no inodes"):
         mount = subprocess.run(["unshare", "--mount", "mount", "-t", "tmpfs", "none", folder], capture_output=True)
         return "the system mounts no file system" if mount.returncode else ""
-    if name == "no network":
-        return (
-            "the system gives no network of its own" if subprocess.run(["unshare", "--net", "true"]).returncode else ""
-        )
+    if name == "no network" and subprocess.run(["unshare", "--net", "true"]).returncode:
+        return "the system gives no network of its own"
     return ""
 
 

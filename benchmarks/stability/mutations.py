@@ -64,6 +64,7 @@ def damaged_bytes(content: bytes, random: np.random.Generator) -> bytes:
 def damaged_json(text: str, random: np.random.Generator) -> str:
     """A JSON file with a few of its values replaced, or taken out, wherever they stand."""
     data: Any = json.loads(text)
+    raw: list[str] = []
     for _ in range(1 + int(random.integers(3))):
         holders = list(_holders(data))
         holder = holders[int(random.integers(len(holders)))]
@@ -72,8 +73,9 @@ def damaged_json(text: str, random: np.random.Generator) -> str:
         if random.random() < 0.2:
             del holder[key]
         else:
-            holder[key] = _Raw(_one_of(EXTREMES, random).replace("nan", "NaN").replace("inf", "Infinity"))
-    return _with_raw(data)
+            holder[key] = f"@{len(raw)}@"
+            raw.append(_one_of(EXTREMES, random).replace("nan", "NaN").replace("inf", "Infinity"))
+    return re.sub(r'"@(\d+)@"', lambda match: raw[int(match[1])], json.dumps(data))
 
 
 def extreme_array(array: np.ndarray[Any, Any], random: np.random.Generator) -> np.ndarray[Any, Any]:
@@ -90,24 +92,6 @@ def extreme_array(array: np.ndarray[Any, Any], random: np.random.Generator) -> n
     if kind == 6:
         return np.zeros((*changed.shape, 2), np.float32)
     return np.array(["text"])
-
-
-class _Raw:
-    """Words that stand in the file as they are."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-
-
-def _with_raw(data: Any) -> str:
-    raw: list[str] = []
-
-    def mark(value: Any) -> str:
-        raw.append(value.text)
-        return f"@{len(raw) - 1}@"
-
-    text = json.dumps(data, default=mark)
-    return re.sub(r'"@(\d+)@"', lambda match: raw[int(match[1])], text)
 
 
 def _holders(data: Any) -> Any:

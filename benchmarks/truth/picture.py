@@ -227,12 +227,8 @@ def main() -> None:
         print(f"frame {frame}: against volpath {difference:.2%} RMS, {marched.sum() / traced.sum() - 1:+.2%} in all")
 
     walled = options.background == "wall"
-    behind = (
-        wall(*camera["size"], EXAMPLES_WALL if options.scene else len(name))
-        if walled
-        else np.zeros((*camera["size"][::-1], 3))
-    )
-    plate = srgb_encode(behind)
+    behind = wall(*camera["size"], EXAMPLES_WALL if options.scene else len(name)) if walled else 0.0
+    plate = srgb_encode(np.broadcast_to(behind, (*camera["size"][::-1], 3)))
     stored: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {view: [] for view in views}
     for density in densities:
         for view, pair in zip(views, renderer.images(density.astype(np.float32)), strict=True):

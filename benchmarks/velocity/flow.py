@@ -149,13 +149,10 @@ class Flow:
 
 def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
     """Return two densities and the motion between them."""
-    stirred = Stirred.random(shape, seed)
-    positions = _positions(shape)
-    near = _near(positions)
+    stirred, positions = Stirred.random(shape, seed), _positions(shape)
     before, after = (np.zeros(positions.shape[1], np.float32) for _ in range(2))
     motion = np.zeros_like(positions)
-    for start in range(0, len(near), BATCH):
-        part = near[start : start + BATCH]
+    for part in _batches(positions):
         x = positions[:, part]
         last = stirred.flow.back(x, 1.0, STEPS_A_FRAME)
         motion[:, part] = (x - last) * np.float32(max(shape))
@@ -166,13 +163,10 @@ def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
 
 def built_in_densities(shape: tuple[int, int, int], seed: int, frames: int) -> Iterator[Array]:
     """Yield the densities of successive frames."""
-    stirred = Stirred.random(shape, seed)
-    positions = _positions(shape)
-    near = _near(positions)
+    stirred, positions = Stirred.random(shape, seed), _positions(shape)
     for frame in range(frames):
         density = np.zeros(positions.shape[1], np.float32)
-        for start in range(0, len(near), BATCH):
-            part = near[start : start + BATCH]
+        for part in _batches(positions):
             density[part] = stirred.density(positions[:, part], frame)
         yield density.reshape(shape)
 
@@ -199,9 +193,11 @@ class Stirred:
         return np.asarray(ball * np.maximum(varied, 0))
 
 
-def _near(positions: Array) -> npt.NDArray[np.intp]:
-    """Return the numbers of the points that smoke can reach."""
-    return np.flatnonzero(np.sum(positions * positions, 0) < REACH**2)
+def _batches(positions: Array) -> Iterator[npt.NDArray[np.intp]]:
+    """Yield the numbers of the points that smoke can reach, so many at a time."""
+    near = np.flatnonzero(np.sum(positions * positions, 0) < REACH**2)
+    for start in range(0, len(near), BATCH):
+        yield near[start : start + BATCH]
 
 
 def _positions(shape: tuple[int, int, int]) -> Array:

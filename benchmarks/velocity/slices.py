@@ -14,15 +14,12 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.velocity.accuracy import CHAIN, estimates
 from benchmarks.velocity.pairs import near_smoke
 from smokelift.evaluation.truth import Truth, resampled
 
 RUN = "balanced:detail=0"
-
-Field = npt.NDArray[np.float32]
 
 
 def draw(out: Path, runs: Path, scenes: list[Path]) -> None:
@@ -34,10 +31,12 @@ def draw(out: Path, runs: Path, scenes: list[Path]) -> None:
     for row, scene in zip(axes, scenes, strict=True):
         truth = Truth.load(scene / "truth.npz")
         *_, (_, chained) = estimates(truth)
+        with np.load(runs / scene.name / RUN / f"{frame + 2:04d}.npz") as file:  # what arrives there, from 1
+            of_run = file["velocity"].astype(np.float32)
         fields = {
             "truth": truth.velocity(frame).centres(),
             "from true densities": chained.centres(),
-            "from the front video": resampled(_of_run(runs / scene.name / RUN, frame + 1), truth.shape),
+            "from the front video": resampled(of_run, truth.shape),
         }
         density = truth.density(frame + 1)
         smoke = near_smoke(density)
@@ -53,12 +52,6 @@ def draw(out: Path, runs: Path, scenes: list[Path]) -> None:
                 plot.axis("off")
     figure.tight_layout()
     figure.savefig(out, dpi=70)
-
-
-def _of_run(folder: Path, frame: int) -> Field:
-    """The velocity (nx, ny, nz, 3) with which a run's smoke arrives in a frame of the clip, from 0."""
-    with np.load(folder / f"{frame + 1:04d}.npz") as file:
-        return np.asarray(file["velocity"], np.float32)
 
 
 def main() -> None:

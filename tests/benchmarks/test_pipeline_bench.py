@@ -8,7 +8,8 @@ from benchmarks.machine import UNTIMED
 from benchmarks.pipeline import clip
 from benchmarks.pipeline.__main__ import Law, exponents
 from benchmarks.pipeline.clip import with_grid, write_clip
-from benchmarks.pipeline.worker import Job, Run, run_apart
+from benchmarks.pipeline.worker import Run, run_apart
+from smokelift import Settings
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 
 SHAPE = (16, 16, 24)
@@ -32,8 +33,8 @@ def test_a_run_is_timed_in_a_process_of_its_own(tmp_path, monkeypatch):
     monkeypatch.setattr(clip, "PIXELS", (48, 72))
     monkeypatch.setattr(clip, "SHAPE", SHAPE)
     with_grid(write_clip(tmp_path, UNTIMED + 1), SHAPE).save(tmp_path / "scene.toml")
-    found = run_apart(Job(str(tmp_path / "scene.toml"), SHAPE, "balanced", 1.0, 1, "wall"))
+    found = run_apart(tmp_path / "scene.toml", Settings.preset(), SHAPE, 1, "wall")
     assert found.failure == ""
     assert 0 < found.seconds_density + found.seconds_velocity <= found.seconds
     assert found.solves > 0 and found.psnr > 30
-    assert "none.toml" in run_apart(Job(str(tmp_path / "none.toml"), SHAPE, "balanced", 1.0, 1, "wall")).failure
+    assert "none.toml" in run_apart(tmp_path / "none.toml", Settings.preset(), SHAPE, 1, "wall").failure

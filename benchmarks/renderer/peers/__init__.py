@@ -63,15 +63,10 @@ class Peer:
     before_black: bool = False
 
     @property
-    def missing(self) -> tuple[str, ...]:
-        """The packages that are not installed."""
-        return tuple(name for name in self.packages if find_spec(name) is None)
-
-    @property
     def needs(self) -> str:
         """What has to be installed before it can run, one sentence; else empty."""
-        if self.missing:
-            return f"not installed: pip install {' '.join(self.missing)}"
+        if missing := [name for name in self.packages if find_spec(name) is None]:
+            return f"not installed: pip install {' '.join(missing)}"
         if self.packages and not finds_llvm():  # they all compile with Dr.Jit
             return "Dr.Jit finds no LLVM: install one (Debian: apt install llvm), or set DRJIT_LIBLLVM_PATH to libLLVM."
         return ""
