@@ -9,10 +9,9 @@ import pytest
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import score
 from benchmarks.baked import BLACK
-from smokelift.evaluation.truth import Truth
 from smokelift.render import scene_renderer
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed, orbit
-from smokelift.transport import Velocity
+from tests.benchmarks.ball import truth
 
 SHAPE, FRAMES, VOXEL = (16, 16, 24), 10, 0.1
 DOMAIN = Domain((-0.8, -0.8, 0), (0.8, 0.8, 2.4), SHAPE)
@@ -37,25 +36,17 @@ def density(frame: int) -> np.ndarray:
 def known(tmp_path_factory) -> KnownScene:
     path = tmp_path_factory.mktemp("ball") / "scene.toml"
     SCENE.save(path)
-    rest = Velocity.zero(SHAPE, VOXEL).faces
-    truth = Truth(
-        densities=np.stack([density(frame) for frame in range(FRAMES)]).astype(np.float16),
-        faces=tuple(np.stack([face] * FRAMES).astype(np.float16) for face in rest),
-        inflow_packed=np.zeros((FRAMES, int(np.prod(SHAPE)) // 8), np.uint8),
-        voxel_size=VOXEL,
-        fps=24.0,
-        closed=(),
-    )
+    known = truth(np.stack([density(frame) for frame in range(FRAMES)]), VOXEL)
     cameras = {str(angle): orbit(SCENE.camera, DOMAIN, angle) for angle in (0, 20, 45, 90)}
     renderers = {view: scene_renderer(completed(SCENE), camera, BLACK) for view, camera in cameras.items()}
     seen = {
-        (view, frame): renderer.image(truth.density(frame))
+        (view, frame): renderer.image(known.density(frame))
         for view, renderer in renderers.items()
         for frame in range(FRAMES)
     }
     span = range(FRAMES)
     return KnownScene(
-        "ball", path, span, span, cameras, lambda view, frame: seen[view, frame], lambda *_: seen["0", 0], truth
+        "ball", path, span, span, cameras, lambda view, frame: seen[view, frame], lambda *_: seen["0", 0], known
     )
 
 

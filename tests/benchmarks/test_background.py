@@ -7,12 +7,13 @@ import pytest
 
 from benchmarks.background.__main__ import plate_score as score
 from benchmarks.background.cases import CASES, with_column
-from benchmarks.baked import FRONT, Baked
+from benchmarks.baked import Baked
 from benchmarks.measure import optical_mass, view_figures
-from smokelift import Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift import Medium
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.plate import known_plate
 from smokelift.scene import completed
+from tests.benchmarks.ball import cameras, scene
 
 COUNT, GRID, SIZE = 40, (8, 8, 12), (32, 48)
 
@@ -22,19 +23,8 @@ def ball() -> Baked:
     """A ball of smoke that grows, seen from two sides."""
     x, y, z = np.meshgrid(*((np.arange(n) + 0.5) / n - 0.5 for n in GRID), indexing="ij")
     grows = 0.05 + 0.05 * np.arange(COUNT)[:, None, None, None] / COUNT
-    cameras = {
-        FRONT: Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=SIZE),
-        "90": Camera.look_at((7, 0, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=SIZE),
-    }
-    scene = Scene(
-        camera=cameras[FRONT],
-        domain=Domain((-1, -1, 0), (1, 1, 3), GRID),
-        medium=Medium(3, 0.8),
-        lights=(DirectionalLight((-0.4, 0.5, -0.8), (8, 8, 8)),),
-        scattering="single",
-    )
     densities = np.maximum(1 - (x**2 + y**2 + z**2) / grows, 0).astype(np.float32)
-    return Baked("ball", scene, cameras, {}, densities).pictured()
+    return Baked("ball", scene(GRID, SIZE, 3), cameras(SIZE), {}, densities).pictured()
 
 
 @pytest.mark.parametrize("name", ["wall, given", "wall, 12 frames", "both ways"])
@@ -66,12 +56,10 @@ def test_true_volumes_have_the_true_views_and_mass(ball) -> None:
     def seen(view: str, frame: int) -> np.ndarray:
         return ball.views[view].at([frame]).before(np.full(3, 0.2))[0]
 
-    scene, frames = completed(ball.scene), range(0, COUNT, 10)
-    figures = view_figures(
-        scene, lambda k: 1.01 * ball.densities[k], ball.cameras, seen, frames, np.full(3, 0.2, np.float32)
-    )
+    whole, frames, gray = completed(ball.scene), range(0, COUNT, 10), np.full(3, 0.2, np.float32)
+    figures = view_figures(whole, lambda k: 1.01 * ball.densities[k], ball.cameras, seen, frames, gray)
     assert figures["psnr_new"] == figures["psnr_90"] > 50
-    doubled = view_figures(scene, lambda k: 2 * ball.densities[k], ball.cameras, seen, frames)
+    doubled = view_figures(whole, lambda k: 2 * ball.densities[k], ball.cameras, seen, frames)
     assert doubled["psnr_new"] < 30
     halved = replace(ball.scene, medium=Medium(1.5, 0.8))
     assert optical_mass(ball.scene, ball.densities) == pytest.approx(2 * optical_mass(halved, ball.densities))

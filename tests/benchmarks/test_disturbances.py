@@ -6,15 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.baked import FRONT
 from benchmarks.disturbances import calls, smoke, spoiled
 from benchmarks.disturbances.known import GRID, SIZE, Known
 from benchmarks.disturbances.report import Results, losing
 from benchmarks.disturbances.table import DISTURBANCES
 from benchmarks.disturbances.whole_run import flow_error, whole_run
-from smokelift import Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift import Camera
+from tests.benchmarks.ball import cameras, scene
 
-DOMAIN = Domain((-1, -1, 0), (1, 1, 3), GRID)
 FPS = 24.0
 
 
@@ -28,17 +27,13 @@ def blob(moment: int, shape: tuple[int, int, int] = GRID) -> np.ndarray:
 @pytest.fixture(scope="module")
 def known() -> Known:
     """Smoke with all its moments, pictured by the renderer."""
-    front = Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=SIZE)
-    side = Camera.look_at((7, 0, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=SIZE)
-    light = DirectionalLight((-0.4, 0.5, -0.8), (8, 8, 8))
-    scene = Scene(camera=front, domain=DOMAIN, medium=Medium(1, 0.8), lights=(light,))
     count = spoiled.MOMENTS
     velocities = np.zeros((count, *GRID, 3), np.float32)
     velocities[..., 2] = 0.03 * FPS
     return Known(
         name="ball",
-        scene=scene,
-        cameras={FRONT: front, "90": side},
+        scene=scene(GRID, SIZE, 1),
+        cameras=cameras(SIZE),
         views={},
         densities=np.stack([blob(moment) for moment in range(count)]),
         velocities=velocities,

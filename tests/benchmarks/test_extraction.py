@@ -6,18 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.baked import Baked
+from benchmarks.baked import BLACK, VIEWS, Baked
 from benchmarks.extraction.__main__ import main
 from benchmarks.extraction.compose import FRAME, GIVEN, KNOWN, UNKNOWN, Composed, Filming, compose
 from benchmarks.extraction.score import score_densities, score_element
-from smokelift import Background, Camera, Clip, DirectionalLight, Domain, Medium, Scene
+from smokelift import Background, Clip, Scene
 from smokelift.footage.images import linear_to_srgb, read_image
 from smokelift.render import scene_renderer
 from smokelift.scene import completed, orbit
-from smokelift.transport import face_shapes
+from tests.benchmarks.ball import scene, truth
 
 SHAPE, FRAMES, VOXEL = (16, 16, 24), 12, 0.125
-FILES = {"front": 0, "nov20": 20, "nov45": 45, "side": 90}
 
 
 @pytest.fixture(scope="module")
@@ -27,24 +26,16 @@ def folder(tmp_path_factory) -> Path:
     x, y, z = np.meshgrid(*((np.arange(n) + 0.5 - n / 2) * VOXEL for n in SHAPE), indexing="ij")
     ball = np.maximum(1 - 2 * (x**2 + y**2 + z**2), 0)
     density = np.stack([ball * (1 - 0.05 * frame) for frame in range(FRAMES)]).astype(np.float16)
-    faces = {
-        f"velocity_{axis}": np.zeros((FRAMES, *shape), np.float16)
-        for axis, shape in zip("xyz", face_shapes(SHAPE), strict=True)
-    }
-    inflow = np.zeros((FRAMES, density[0].size // 8), np.uint8)
+    known = truth(density, VOXEL)
+    faces = {f"velocity_{axis}": face for axis, face in zip("xyz", known.faces, strict=True)}
+    inflow = known.inflow_packed
     np.savez(folder / "truth.npz", density=density, inflow_packed=inflow, voxel_size=VOXEL, fps=24, **faces)
-    scene = Scene(
-        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(48, 72)),
-        domain=Domain((-1, -1, 0), (1, 1, 3), SHAPE),
-        medium=Medium(3.0, 0.8),
-        lights=(DirectionalLight((-0.4, 0.5, -0.8), (8, 8, 8)),),
-        scattering="single",
-    )
-    scene.save(folder / "scene.toml")
-    for name, angle in FILES.items():
-        camera = orbit(scene.camera, scene.domain, angle)
+    described = scene(SHAPE, (48, 72), 3)
+    described.save(folder / "scene.toml")
+    for view, name in VIEWS.items():
+        camera = orbit(described.camera, described.domain, float(view))
         Scene(camera=camera).save(folder / f"{name}.toml")
-        renderer = scene_renderer(completed(scene), camera, np.zeros(3, np.float32))
+        renderer = scene_renderer(completed(described), camera, BLACK)
         pictures = [renderer.image(each.astype(np.float32))[..., 0] for each in density]
         np.savez(folder / f"{name}.npz", image=np.stack(pictures).astype(np.float16))
     return folder
@@ -119,12 +110,12 @@ def test_a_cut_tail_and_too_thin_smoke_are_seen(composed) -> None:
 
 
 def test_the_true_volumes_score_as_the_truth(smoke, composed) -> None:
-    scene = completed(smoke.scene)
-    figures = score_densities(scene, lambda frame: smoke.densities[frame].astype(np.float32), smoke, composed)
+    whole = completed(smoke.scene)
+    figures = score_densities(whole, lambda frame: smoke.densities[frame].astype(np.float32), smoke, composed)
     assert figures["transmittance_error"] < 1e-3
     assert figures["mass"] == pytest.approx(1)
     assert min(figures[f"psnr_{view}"] for view in (20, 45, 90)) > 50
-    dark = score_densities(scene, lambda frame: 0.5 * smoke.densities[frame].astype(np.float32), smoke, composed)
+    dark = score_densities(whole, lambda frame: 0.5 * smoke.densities[frame].astype(np.float32), smoke, composed)
     assert dark["mass"] == pytest.approx(0.5)
     assert dark["psnr_90"] < 40
 

@@ -6,9 +6,8 @@ import pytest
 from benchmarks.velocity.__main__ import ESTIMATORS, against_truth
 from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.pairs import Pair, pair_of_truth
-from smokelift.evaluation.truth import Truth
-from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine
+from tests.benchmarks.ball import truth
 
 SHAPE = (16, 16, 24)
 
@@ -26,16 +25,6 @@ def test_smoke_at_rest_has_the_error_of_the_motion_that_it_has_not():
 
 
 def test_a_baked_pair_has_its_motion_in_voxels_a_frame():
-    faces = Velocity.zero(SHAPE, 0.1).faces
-    faces[2][:] = 0.1 * 24
     smoke = built_in_pair(SHAPE, 0).before
-    truth = Truth(
-        densities=np.stack([smoke, np.roll(smoke, 1, axis=2)]).astype(np.float16),
-        faces=tuple(np.stack([face] * 2).astype(np.float16) for face in faces),
-        inflow_packed=np.zeros((2, int(np.prod(SHAPE)) // 8), np.uint8),
-        voxel_size=0.1,
-        fps=24.0,
-        closed=(),
-    )
-    pair = pair_of_truth(truth, 0)
+    pair = pair_of_truth(truth(np.stack([smoke, np.roll(smoke, 1, axis=2)]), 0.1, speed=0.1 * 24), 0)
     np.testing.assert_allclose(pair.motion[pair.counted].mean(0), (0, 0, 1), atol=1e-3)
