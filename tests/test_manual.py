@@ -17,19 +17,11 @@ import scene_reference
 import smokelift
 from smokelift.app.cli import command_parser
 from smokelift.scene import Scene, SceneError, scene_from_dict
-
-ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / "docs"
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+from tests.test_docs import DOCS, PAGES, ROOT, name
 
 MADE = re.compile(r"<!-- made by tools/(\w+)\.py -->")
 SAID = re.compile(r"“([^”]+)”")
 WORDS = re.compile(r"\w+")
-
-
-def name(path: Path) -> str:
-    """The path within the checkout."""
-    return str(path.relative_to(ROOT))
 
 
 def commands(page: Path, program: str) -> list[str]:
@@ -57,10 +49,20 @@ def parse(words: list[str]) -> None:
         pytest.fail(f"refused: {' '.join(words)}: {refused}")
 
 
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+TARGETS = set(re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)[0].split())
+BLENDERS = ast.walk(ast.parse((ROOT / "addon" / "result" / "command_line.py").read_text(encoding="utf-8")))
+OPTIONS = {node.value for node in BLENDERS if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_commands_of_a_page_are_taken(page: Path) -> None:
+    """By the engine, by make and by Blender."""
     for line in commands(page, "smokelift"):
         parse(shlex.split(line))
+    assert {line.split()[1] for line in commands(page, "make")} <= TARGETS
+    for line in commands(page, "blender"):
+        assert set(re.findall(r"--[a-z][a-z-]*", line.partition("smokelift reconstruct")[2])) <= OPTIONS
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
@@ -71,23 +73,6 @@ def test_commands_in_sentences_exist_with_their_options(page: Path) -> None:
         options = {option for action in known[command]._actions for option in action.option_strings}
         given = {re.split(r"[=|.,]", word.strip("[]"))[0] for word in words if word.lstrip("[").startswith("--")}
         assert given <= options, (command, given - options)
-
-
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_make_targets_of_a_page_exist(page: Path) -> None:
-    targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-    assert targets
-    given = {line.split()[1] for line in commands(page, "make")}
-    assert given <= set(targets[1].split())
-
-
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_options_given_to_blender_exist(page: Path) -> None:
-    tree = ast.parse((ROOT / "addon" / "result" / "command_line.py").read_text(encoding="utf-8"))
-    known = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
-    for line in commands(page, "blender"):
-        _, _, ours = line.partition("smokelift reconstruct")
-        assert set(re.findall(r"--[a-z][a-z-]*", ours)) <= known
 
 
 @pytest.mark.parametrize("page", ["python.md", "extending.md"])

@@ -10,6 +10,7 @@ import html
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -56,6 +57,7 @@ def messages(path: Path) -> list[str]:
     return list(found)
 
 
+@cache
 def all_messages() -> dict[str, list[str]]:
     """Return the messages of the engine and the add-on by topic, each once."""
     return {

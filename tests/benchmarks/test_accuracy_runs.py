@@ -8,20 +8,11 @@ import pytest
 from benchmarks.accuracy.ablations import EvenDepth, UnprojectedPrediction, WithoutHull, leave_out
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
-from smokelift.density import (
-    DensitySettings,
-    DetailedDepth,
-    GradientFit,
-    NothingCarried,
-    Observation,
-    RoundDepth,
-    ViewSet,
-)
+from smokelift.density import DetailedDepth, NothingCarried, Observation, RoundDepth, ViewSet
 from smokelift.pipeline import compose
 from smokelift.render import Optics
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 
-QUICK = GradientFit(DensitySettings(fit_iterations=1, descent_iterations=1))
 CAMERA = Camera.look_at((0, -5, 0), (0, 0, 0), fov_y_degrees=30, size=(16, 16))
 OPTICS = Optics(
     Domain((-1, -1, -1), (1, 1, 1), (12, 12, 12)), Medium(2.0), (DirectionalLight((0, 0, -1), (5, 5, 5)),), "single"

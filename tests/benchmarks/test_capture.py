@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.scenes import REAL_FRAMES, REAL_SIZE, KnownScene, captured_scene
+from benchmarks.accuracy.scenes import REAL_FRAMES, REAL_SIZE, captured_scene
 from benchmarks.accuracy.score import best_gain
 from smokelift import Camera, ClipSource, Scene
 from smokelift.output.images import write_image
@@ -35,12 +35,6 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     replace(scene, camera=aside).save(folder / "camera00.toml")
     replace(scene, camera=aside, clip=ClipSource(folder / "dim_####.png", fps=60.0)).save(folder / "camera05.toml")
     return folder
-
-
-@pytest.fixture(scope="module")
-def known(capture: Path) -> KnownScene:
-    """The capture as calibrated, one frame of it scored."""
-    return replace(captured_scene(capture), scored=REAL_FRAMES[:1])
 
 
 def test_every_camera_of_the_folder_is_scored_and_only_registered_ones_are_moved(capture: Path):

@@ -66,7 +66,7 @@ def test_a_core_that_needs_a_newer_system_is_refused(tmp_path, monkeypatch) -> N
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setattr(platform, "libc_ver", lambda: ("glibc", "2.43"))
     monkeypatch.setattr(platform, "machine", lambda: "x86_64")
-    with pytest.raises(engine_wheels.NotPortableError, match=r"cibuildwheel.*too-recent symbols"):
+    with pytest.raises(engine_wheels.NotPortableError, match="too-recent symbols"):
         engine_wheels.build(tmp_path / "bin", tmp_path / "compiled", tmp_path, None, certified=True)
     assert not list(tmp_path.glob("*.whl"))
 

@@ -137,7 +137,7 @@ NAMES = st.from_regex(r"[a-z_]{1,8}", fullmatch=True)
 TABLES = st.dictionaries(NAMES, VALUES, max_size=4)
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.dictionaries(NAMES, TABLES | st.lists(TABLES, min_size=1, max_size=3), max_size=4))
 def test_what_is_written_is_read_back(tables) -> None:
     assert tomllib.loads(toml_text(tables)) == tables
