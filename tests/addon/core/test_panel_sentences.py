@@ -48,31 +48,31 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
     assert {kind for kind, words in OWN.items() if "smokelift inspect" in words} <= set(SENTENCES)
 
 
+def finding(kind: str, **figures: float) -> dict[str, object]:
+    """What the engine says."""
+    return {"text": "As it is.", "kind": kind, "figures": figures}
+
+
 @pytest.mark.parametrize(
     ("message", "said"),
     [
         ({"text": "As it is."}, "As it is."),
-        ({"text": "As it is.", "kind": "black background", "figures": {}}, "As it is."),
-        (
-            {"text": "", "kind": "reconstructed", "figures": {"frames": 12, "seconds": 28.2, "psnr": 26.44}},
-            "fair (26.4 dB). 12 frames in 28 s.",
-        ),
-        (
-            {"text": "", "kind": "looped", "figures": {"frames": 1, "seconds": 9, "first": 1, "last": 2}},
-            "A loop of 1 frame, made in 9 s.",
-        ),
-        (
-            {"text": "", "kind": "cut", "figures": {"before": 4, "after": 5, "first": 0, "last": 9}},
-            "Choose Frames 1 to 5 or 6 to 10.",
-        ),
+        (finding("black background"), "As it is."),
+        (finding("reconstructed", frames=12, seconds=28.2, psnr=26.44), "fair (26.4 dB). 12 frames in 28 s."),
+        (finding("looped", frames=1, seconds=9, first=1, last=2), "A loop of 1 frame, made in 9 s."),
+        (finding("cut", before=4, after=5, first=0, last=9), "Choose Frames 1 to 5 or 6 to 10."),
     ],
 )
 def test_a_sentence(message, said) -> None:
     assert said in sentence(message)
 
 
+def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
+    assert "frame 109 on" in sentence(finding("dissolving smoke", frame=70, room=8.0), before=39)
+
+
 def test_a_match_before_a_background_that_may_hold_smoke_is_not_praised() -> None:
-    message = {"text": "", "kind": "reconstructed", "figures": {"frames": 12, "seconds": 28.2, "psnr": 35.6}}
+    message = finding("reconstructed", frames=12, seconds=28.2, psnr=35.6)
     said = sentence(message, doubts=["cut", "smoke in the background"])
     assert "35.6 dB" in said and "good" not in said
     assert "very good" in sentence(message, doubts=["cut"])
@@ -83,11 +83,6 @@ def test_times_and_matches_in_words() -> None:
     assert {seconds: spent(seconds) for seconds in times} == times
     matches = {41.0: "very good", 34.0: "very good", 33.9: "good", 9.0: "poor"}
     assert {psnr: match(psnr) for psnr in matches} == matches
-
-
-def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
-    message = {"text": "", "kind": "dissolving smoke", "figures": {"frame": 70, "room": 8.0}}
-    assert sentence(message, before=39).startswith("From frame 109 on")
 
 
 def test_what_a_cancelled_run_leaves_is_said() -> None:

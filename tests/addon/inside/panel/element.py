@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import bpy
 import pytest
@@ -88,11 +89,7 @@ def test_render_element_writes_all_frames_that_are_used(shot, asked, tmp_path) -
 
 
 def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
-    class Running:
-        def kill(self) -> None:
-            """Unregistering ends it."""
-
-    monkeypatch.setattr(side_job.writing_job, "job", Running())
+    monkeypatch.setattr(side_job.writing_job, "job", Mock())
     monkeypatch.setattr(side_job.writing_job, "operator", "smokelift.render_element")
     assert not bpy.ops.smokelift.extract.poll()
     assert bpy.ops.smokelift.stop_writing() == {"FINISHED"}

@@ -219,6 +219,7 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
         run.job.doubts = [("not all is smoke", "A person moves.")]
         places.append(buttons(drawn(shot)))
     assert len(set(places)) == 1
+    assert "[cancel]" in drawn(shot, bpy.types.SMOKELIFT_PT_view_direct)
     texts = said(shot)
     assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 4
     assert {"[track_clip]", "[show_take]"} <= set(texts)
@@ -227,12 +228,6 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
     texts = said(shot)
     assert texts.count("[cancel]") == 2
     assert not {"A person moves.", "[track_clip]", "[show_take]"} & set(texts)
-
-
-def test_a_run_that_is_made_has_its_cross_beside_it(shot, tmp_path) -> None:
-    volume.show(smoke(shot), made(tmp_path))
-    known_run(smoke(shot), Take(tmp_path / "take_0002"), "running")
-    assert "[cancel]" in drawn(shot, bpy.types.SMOKELIFT_PT_view_direct)
 
 
 @pytest.mark.parametrize("name", ["plate", "mask"])

@@ -68,11 +68,11 @@ def placed(collection, name, data=None, field="NONE", **values) -> bpy.types.Obj
     return obj
 
 
-def cube(scale=0.5, location=(0.0, 0.0, 1.5)) -> tuple[bpy.types.Mesh, dict]:
+def cube(collection, scale=0.5, location=(0.0, 0.0, 1.5), name="Crate") -> bpy.types.Object:
     mesh = bpy.data.meshes.new("Cube")
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
-    return mesh, {"location": location, "scale": (scale,) * 3}
+    return placed(collection, name, mesh, location=location, scale=(scale,) * 3)
 
 
 def words(options: list[str], name: str) -> list[list[float]]:
@@ -116,15 +116,13 @@ def test_frames_are_those_of_the_clip(shot, result) -> None:
 
 def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
     """With their modifiers, also mirrored ones; those outside and the smoke's box count for nothing."""
-    mesh, place = cube()
-    obj = placed(acting, "Crate", mesh, **place)
+    obj = cube(acting)
     acting.objects.link(result.smokelift.box)
     wanted = BoxObstacle((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
     (content,) = directing.engine_request(result)[2]
     np.testing.assert_array_equal(solid(content, tmp_path), wanted)
     obj.scale.x = -0.5
-    other, there = cube(0.25, (0.5, 0.0, 1.5))
-    small = placed(acting, "Small", other, **there)
+    small = cube(acting, 0.25, (0.5, 0.0, 1.5), "Small")
     both = wanted | BoxObstacle((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
     np.testing.assert_array_equal(solid(*directing.engine_request(result)[2], tmp_path), both)
     obj.hide_viewport = True
@@ -136,8 +134,7 @@ def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
 
 def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     """Are sampled in the frames of the scene that the new frames are shown in, as long as they move."""
-    mesh, place = cube(0.25)
-    obj = placed(acting, "Crate", mesh, **place)
+    obj = cube(acting, 0.25)
     result.smokelift.directing.frames = 5
     last = volume.scene_frame(result, FRAMES)
     for frame, x in ((last + 1, 0.0), (last + 3, 0.5)):
@@ -165,11 +162,9 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
 
 
 def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
-    mesh, place = cube()
-    obj = placed(acting, "Crate", mesh, **place)
-    fan = placed(
-        acting, "Fan", empty_display_size=0.5, location=(-0.8, 0.0, 0.6), rotation_euler=(0.0, math.pi / 2, 0.0)
-    )
+    obj = cube(acting)
+    turned = (0.0, math.pi / 2, 0.0)
+    fan = placed(acting, "Fan", empty_display_size=0.5, location=(-0.8, 0.0, 0.6), rotation_euler=turned)
     before, options = (part for part in directing.engine_request(result)[:0:-1])
     result.location, result.scale, result.rotation_euler = (3.0, 1.0, -2.0), (2.0, 2.0, 2.0), (0.0, 0.0, 1.2)
     bpy.context.view_layer.update()
