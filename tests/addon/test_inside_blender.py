@@ -15,17 +15,8 @@ from pathlib import Path
 import pytest
 
 INSIDE = Path(__file__).parent / "inside"
-LONG = (
-    "command_line.py",
-    "compositing.py",
-    "directing.py",
-    "export.py",
-    "projection.py",
-    "scene_file.py",
-    "volume.py",
-    "whole.py",
-)
-FILES = sorted(path for path in INSIDE.rglob("*.py") if path.name not in ("conftest.py", *LONG))
+LONG = ["command_line", "compositing", "directing", "export", "projection", "scene_file", "volume", "whole"]
+FILES = sorted(path for path in INSIDE.rglob("*.py") if path.stem not in ("conftest", *LONG))
 SECONDS = 600
 
 

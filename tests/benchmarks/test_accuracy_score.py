@@ -39,12 +39,8 @@ def known(tmp_path_factory) -> KnownScene:
     known = truth(np.stack([density(frame) for frame in range(FRAMES)]), VOXEL)
     cameras = {str(angle): orbit(SCENE.camera, DOMAIN, angle) for angle in (0, 20, 45, 90)}
     renderers = {view: scene_renderer(completed(SCENE), camera, BLACK) for view, camera in cameras.items()}
-    seen = {
-        (view, frame): renderer.image(known.density(frame))
-        for view, renderer in renderers.items()
-        for frame in range(FRAMES)
-    }
     span = range(FRAMES)
+    seen = {(view, k): renderer.image(known.density(k)) for view, renderer in renderers.items() for k in span}
     return KnownScene(
         "ball", path, span, span, cameras, lambda view, frame: seen[view, frame], lambda *_: seen["0", 0], known
     )

@@ -20,12 +20,8 @@ def points(count: int) -> np.ndarray:
 
 def test_the_velocity_has_no_divergence():
     velocity, x, h = Flow.random(np.random.default_rng(0), 96).velocity, points(500), np.float32(2e-3)
-    gradient = np.stack(
-        [
-            (velocity(x + h * axis) - velocity(x - h * axis)) / (2 * h)
-            for axis in np.eye(3, dtype=np.float32)[:, :, None]
-        ]
-    )
+    axes = np.eye(3, dtype=np.float32)[:, :, None]
+    gradient = np.stack([(velocity(x + h * axis) - velocity(x - h * axis)) / (2 * h) for axis in axes])
     divergence = np.trace(gradient)
     assert np.sqrt(np.mean(divergence**2)) < 2e-3 * np.sqrt(np.mean(np.sum(gradient**2, (0, 1))))
 

@@ -136,15 +136,12 @@ def test_a_scene_file_is_told_where_its_files_went(tmp_path) -> None:
         "background": {"image": str(tmp_path / "plate.png")},
     }
     take.write(tables, [])
-    files = {
-        ("clip", "path"): tmp_path / "clip.mp4",
-        ("clip", "mask"): tmp_path / "mask.png",
-        ("background", "image"): tmp_path / "other.png",
-    }
+    places = {("clip", "path"): "clip.mp4", ("clip", "mask"): "mask.png", ("background", "image"): "other.png"}
+    files = {key: tmp_path / name for key, name in places.items()}
     take.update_moved_files(files)
     assert tomllib.loads(take.scene_file.read_text()) == tables
-    for name in ("clip.mp4", "mask.png", "other.png"):
-        (tmp_path / name).write_text("found")
+    for file in files.values():
+        file.write_text("found")
     take.update_moved_files(files)
     tables["clip"] = {"path": str(tmp_path / "clip.mp4"), "mask": str(tmp_path / "mask.png")}
     assert tomllib.loads(take.scene_file.read_text()) == tables

@@ -44,12 +44,11 @@ class Layout:
 
 def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[str]:
     texts: list[str] = []
-    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
     context = SimpleNamespace(
         scene=scene,
         window=None,
         region=SimpleNamespace(width=WIDTH),
-        preferences=preferences,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
         tool_settings=SimpleNamespace(image_paint=SimpleNamespace(brush=brush)),
         window_manager=bpy.context.window_manager,
     )

@@ -48,11 +48,8 @@ def made(scene, tmp_path) -> bpy.types.Object:
 
 def exported(obj: bpy.types.Object, **settings: object) -> None:
     """What the engine writes, in this process, which takes less long."""
-    list(
-        export_sequence(
-            Sequence.open(volume.shown_take(obj).directory), export.folder_of(obj), ExportSettings(**settings)
-        )
-    )
+    sequence = Sequence.open(volume.shown_take(obj).directory)
+    list(export_sequence(sequence, export.folder_of(obj), ExportSettings(**settings)))
 
 
 def grids(data: bpy.types.Volume, frame: int) -> tuple[str, set[str]]:
