@@ -18,6 +18,7 @@ from addon.scene.lights import sun_irradiance
 from addon.scene.scene_file import shot_tables
 from addon.scene.smoke import activate
 from conftest import rendered, save_image
+from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb, read_image
 from smokelift.output.images import write_image
@@ -29,10 +30,6 @@ from tests.example_shot import EXAMPLE, add, smoke
 FIRST, LAST = 27, 30
 LONGEST = 40
 WANTED_DB = 25.0
-
-
-def psnr(found: np.ndarray, wanted: np.ndarray) -> float:
-    return float(-10 * np.log10(np.mean(np.square(found - wanted))))
 
 
 def filmed(number: int, width: int, height: int) -> np.ndarray:
@@ -100,7 +97,7 @@ def look_alike(scene: bpy.types.Scene, folder: Path) -> tuple[float, float]:
     wanted, plate = filmed(LAST, width, height), clean_plate(width, height)
     within = np.abs(wanted - plate).max(-1) > 0.05
     assert within.mean() > 0.05
-    return psnr(found, wanted), psnr(found[within], wanted[within])
+    return psnr(found, wanted), psnr(found, wanted, within)
 
 
 def test_a_shot_of_which_everything_is_given_is_made(shot, kept, tmp_path) -> None:
