@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-import av
 import numpy as np
-import OpenEXR
 import pytest
+from films import encode, write_exr
 
 from smokelift.footage.alpha import association
 from smokelift.footage.clip import Clip
@@ -36,28 +35,16 @@ def stored(held: str, n: int, gray: float, shade: float = 0.0, most: float = 0.9
 
 
 def written(folder: Path, kind: str, pictures: list[np.ndarray]) -> Path:
-    """Write a clip: numbered PNG, TIFF or DPX pictures, or ProRes 4444."""
+    """Write a clip: ProRes 4444, numbered PNG, TIFF of 16 or 8 bits, or DPX pictures."""
+    codes = [np.rint(picture * 65535).astype(np.uint16) for picture in pictures]
     if kind == "mov":
-        encode(folder / "a.mov", "prores_ks", "yuva444p10le", pictures)
-        return folder / "a.mov"
-    pixels = {"png": "rgba64be", "tif": "rgba64le", "dpx": "rgba", "tiff": "rgba"}[kind]
-    for n, picture in enumerate(pictures):
-        encode(folder / f"a{n}.{kind}", {"png": "png", "dpx": "dpx"}.get(kind, "tiff"), pixels, [picture])
+        return encode(folder / "a.mov", codes, "prores_ks", "yuva444p10le")
+    codec, pixels = {"png": ("png", "rgba64be"), "dpx": ("dpx", "rgba"), "tif": ("tiff", "rgba64le")}.get(
+        kind, ("tiff", "rgba")
+    )
+    for n, picture in enumerate(codes):
+        encode(folder / f"a{n}.{kind}", [picture], codec, pixels)
     return folder / f"a#.{kind}"
-
-
-def encode(path: Path, codec: str, pixels: str, pictures: list[np.ndarray]) -> None:
-    form = {} if codec == "prores_ks" else {"format": "image2", "options": {"update": "1"}}
-    with av.open(str(path), "w", **form) as out:
-        stream = out.add_stream(codec, rate=24)
-        stream.height, stream.width = pictures[0].shape[:2]
-        stream.pix_fmt = pixels
-        for n, picture in enumerate(pictures):
-            codes = np.rint(picture * 65535).astype(np.uint16)
-            frame = av.VideoFrame.from_ndarray(codes, "rgba64le").reformat(format=pixels)
-            frame.pts = n
-            out.mux(stream.encode(frame))
-        out.mux(stream.encode())
 
 
 @pytest.mark.parametrize("kind", ["png", "tif", "tiff", "dpx", "mov"])
@@ -95,9 +82,7 @@ def test_opaque_and_empty_pictures_are_straight() -> None:
 
 def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path: Path) -> None:
     for n in range(COUNT):
-        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        pixels = stored(IN_CODES, n, 0.715).astype(np.float32)
-        OpenEXR.File(header, {"RGBA": pixels}).write(str(tmp_path / f"a{n}.exr"))
+        write_exr(tmp_path / f"a{n}.exr", {"RGBA": stored(IN_CODES, n, 0.715).astype(np.float32)})
     with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
         assert clip.backdrop == 0
         np.testing.assert_allclose(clip.frame(2), stored(IN_CODES, 2, 0.715)[..., :3], rtol=1e-5)

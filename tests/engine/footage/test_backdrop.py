@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, plate_of, puff, wall
+from films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, film, pan, passing_wall, plate_of, puff, wall
 from scipy import ndimage
 
 from smokelift.footage.backdrop import Backdrop, find_backdrop
@@ -35,48 +36,46 @@ def fog(folder: Path, frames: tuple[int, int] | None = None, haze: float | None 
         for width in (6, 12, 24)
     )
     wide = (wide - wide.min()) / np.ptp(wide)
-    for n in range(count):
-        amount = 0.7 * np.clip(min(n, count - 1 - n) / 12, 0, 1) if haze is None else 0.7
-        billows = amount * wide[:, 2 * n : 2 * n + columns] + (haze or 0)
-        write_image(folder / f"fog_{n:02d}.png", srgb_to_linear(billows))
-    return Clip.open(folder / "fog_##.png", fps=24, frames=frames)
+    amount = (
+        np.clip(np.minimum(np.arange(count), np.arange(count)[::-1]) / 12, 0, 1) if haze is None else np.ones(count)
+    )
+    shown = (srgb_to_linear(0.7 * amount[n] * wide[:, 2 * n : 2 * n + columns] + (haze or 0)) for n in range(count))
+    return clip_of(folder, shown, frames=frames)
 
 
-@pytest.mark.parametrize("frames", [None, (24, 35)], ids=["whole", "middle"])
-def test_fog_that_fills_black_is_no_noise(tmp_path: Path, frames: tuple[int, int] | None) -> None:
-    """Most of its light is in the matte, also of a part of the file in which no pixel is ever black."""
-    with fog(tmp_path, frames) as clip:
+@pytest.mark.parametrize(
+    ("how", "source"),
+    [
+        ({}, "color"),
+        ({"frames": (24, 35)}, "color"),
+        ({"haze": 0.0}, "black for want of a picture"),
+        ({"haze": 0.15}, "black for want of a picture"),
+    ],
+    ids=["whole", "middle", "never leaves", "never leaves a haze"],
+)
+def test_fog_that_fills_black_is_no_noise(tmp_path: Path, how: dict[str, Any], source: str) -> None:
+    """Most of its light is in the matte, also where no pixel is ever clear."""
+    with fog(tmp_path, **how) as clip:
         found = find_backdrop(clip, None, None)
-        assert (found.source, found.plates.at(0).image.max()) == ("color", 0)
-        assert found.plates.noise.total.max() < 2 / 255
+        assert found.source == source
+        plate = found.plates.at(0)
+        if source == "color":
+            assert plate.image.max() == 0
+            assert plate.noise.total.max() < 2 / 255
         picture = clip.frame(len(clip) // 2)
-        share = matte(picture, found.plates.at(0)).share[..., None]
+        share = matte(picture, found.plates.at(len(clip) // 2)).share[..., None]
         assert (share * picture).sum() > 0.98 * picture.sum()
 
 
 def test_faint_fog_before_one_color_is_no_noise(tmp_path: Path) -> None:
     random = np.random.default_rng(2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    for n in range(COUNT):
-        faint = 6 * np.clip(np.sin(rows / 9 + n / 2) * np.sin(columns / 11 - n / 3), 0, 1) + random.normal(
-            0, 1, rows.shape
-        )
-        write_image(tmp_path / f"faint_{n:02d}.png", srgb_to_linear((60 + faint)[..., None].repeat(3, -1) / 255))
-    with Clip.open(tmp_path / "faint_##.png", fps=24) as clip:
+    fog = (6 * np.clip(np.sin(rows / 9 + n / 2) * np.sin(columns / 11 - n / 3), 0, 1) for n in range(COUNT))
+    faint = ((60 + each + random.normal(0, 1, rows.shape)) / 255 for each in fog)
+    with clip_of(tmp_path, (srgb_to_linear(each) for each in faint)) as clip:
         found = find_backdrop(clip, None, None)
     assert found.source == "color"
     assert found.plates.noise.lasting.max() * 255 < 1.3
-
-
-@pytest.mark.parametrize("haze", [0.0, 0.15])
-def test_fog_that_never_leaves_is_before_black(tmp_path: Path, haze: float) -> None:
-    """No pixel is ever clear, so no picture is behind it that a clip would show; all light is the fog's."""
-    with fog(tmp_path, haze=haze) as clip:
-        found = find_backdrop(clip, None, None)
-        assert found.source == "black for want of a picture"
-        picture = clip.frame(30)
-        share = matte(picture, found.plates.at(30)).share[..., None]
-        assert (share * picture).sum() > 0.98 * picture.sum()
 
 
 def test_a_trimmed_clip_has_the_background_of_its_file(tmp_path: Path) -> None:

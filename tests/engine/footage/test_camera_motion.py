@@ -1,11 +1,12 @@
 """How the camera of a clip moves, and what becomes of its frames."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from films import codes_apart
+from films import clip_of, codes_apart, grainy
 from scipy import ndimage
 
 from smokelift.footage.backdrop import find_backdrop
@@ -22,6 +23,7 @@ COUNT, SIZE, MARGIN = 12, (120, 160), 40
 STILL = (Similarity(),) * COUNT
 
 
+@cache
 def wall(contrast: float = 1.0) -> np.ndarray:
     """Return a wall (rows, columns) in sRGB values, wider than the picture by a margin."""
     random = np.random.default_rng(0)
@@ -111,33 +113,25 @@ def test_a_slow_zoom_with_little_texture_is_measured() -> None:
     assert isinstance(found(pictures), CameraMotion)
 
 
-def test_a_camera_that_travels_is_no_similarity() -> None:
-    assert found(filmed(shifts(NONE, 20 * ALONG), parallax=1.0)) == "other"
+BRIEF = np.where(np.arange(COUNT) == 3, 8.0, 0.0)
 
 
-def test_what_is_seen_for_a_few_frames_only_cannot_be_registered() -> None:
-    assert found(filmed(shifts(NONE, 76 * ALONG), smoke=0.9)) == "other"
-
-
-@pytest.mark.parametrize(("smoke", "noise"), [(0.0, 1.0), (1.0, 1.0), (1.0, 12.0)])
-def test_a_still_camera_does_not_move(smoke: float, noise: float) -> None:
-    assert found(filmed(STILL, smoke=smoke, noise=noise)) is None
-
-
-def test_a_knock_is_no_camera_that_moves() -> None:
-    assert found(filmed(shifts(NONE, np.where(np.arange(COUNT) == 3, 8.0, 0.0)), smoke=0.9)) is None
-
-
-def test_a_camera_that_hardly_moves_does_not() -> None:
-    assert found(filmed(shifts(NONE, 0.6 * ALONG))) is None
-
-
-def test_smoke_before_one_color_is_no_camera() -> None:
-    assert found(filmed(shifts(*SHAKE), smoke=1.0, contrast=0.0)) is None
-
-
-def test_one_frame_tells_nothing() -> None:
-    assert found(filmed(STILL[:1])) is None
+@pytest.mark.parametrize(
+    ("motions", "how", "expected"),
+    [
+        (shifts(NONE, 20 * ALONG), {"parallax": 1.0}, "other"),  # a camera that travels
+        (shifts(NONE, 76 * ALONG), {"smoke": 0.9}, "other"),  # what is seen for a few frames only
+        (STILL, {}, None),
+        (STILL, {"smoke": 1.0}, None),
+        (STILL, {"smoke": 1.0, "noise": 12.0}, None),
+        (shifts(NONE, BRIEF), {"smoke": 0.9}, None),  # a knock
+        (shifts(NONE, 0.6 * ALONG), {}, None),  # a camera that hardly moves
+        (shifts(*SHAKE), {"smoke": 1.0, "contrast": 0.0}, None),  # smoke before one color
+        (STILL[:1], {}, None),
+    ],
+)
+def test_what_is_no_similarity(motions: tuple[Similarity, ...], how: dict[str, float], expected: str | None) -> None:
+    assert found(filmed(motions, **how)) == expected
 
 
 def ink(count: int) -> np.ndarray:
@@ -161,43 +155,36 @@ def test_slow_ink_with_fine_texture_on_black_is_no_camera() -> None:
     assert found(ink(16)) is None
 
 
-def clip_of(folder: Path, pictures: np.ndarray, frames: tuple[int, int] | None = None) -> Clip:
-    for n, picture in enumerate(pictures):
-        write_image(folder / f"frame_{n:02d}.png", picture)
-    return Clip.open(folder / "frame_##.png", fps=24, frames=frames)
-
-
-def rising(count: int) -> Callable[[int], np.ndarray]:
-    """Return the opacity of a puff that rises through the picture."""
+def puffing(motions: tuple[Similarity, ...]) -> Iterator[np.ndarray]:
+    """Yield frames of a puff that rises before the wall, linear."""
     rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
-
-    def opacity(n: int) -> np.ndarray:
-        away = np.hypot(rows - SIZE[0] * (1.2 - 1.4 * n / count), columns - SIZE[1] / 2)
-        return np.clip(1.5 - away / 14, 0, 0.8)
-
-    return opacity
+    for n, motion in enumerate(motions):
+        away = np.hypot(rows - SIZE[0] * (1.2 - 1.4 * n / len(motions)), columns - SIZE[1] / 2)
+        opacity = np.clip(1.5 - away / 14, 0, 0.8)
+        yield srgb_to_linear(seen_at(wall(), motion) * (1 - opacity) + 0.9 * opacity)[..., None].repeat(3, -1)
 
 
-def puffing(motions: tuple[Similarity, ...]) -> np.ndarray:
-    """Return frames of a puff before the wall, linear."""
-    opacity = rising(len(motions))
-    pictures = [seen_at(wall(), motion) * (1 - opacity(n)) + 0.9 * opacity(n) for n, motion in enumerate(motions)]
-    codes = np.stack(pictures)[..., None] + np.random.default_rng(4).normal(0, 1 / 255, (len(pictures), *SIZE, 3))
-    return np.asarray(srgb_to_linear(np.clip(codes, 0, 1)), np.float32)
+def clip_of_puff(folder: Path, motions: tuple[Similarity, ...]) -> Clip:
+    return clip_of(folder, grainy(puffing(motions), 1.0, seed=4))
 
 
-@pytest.mark.parametrize("frames", [None, (44, 55)], ids=["whole", "after"])
-def test_a_camera_that_moves_after_it_stood_is_registered(tmp_path: Path, frames: tuple[int, int] | None) -> None:
+def plate_picture(folder: Path) -> Background:
+    """The wall as a camera that has not moved sees it."""
+    write_image(folder / "plate.exr", srgb_to_linear(seen_at(wall(), Similarity()))[..., None].repeat(3, -1))
+    return Background(image=folder / "plate.exr")
+
+
+def test_a_camera_that_moves_after_it_stood_is_registered(tmp_path: Path) -> None:
     """Also if the frames in use are of one place: the plate is that of all of the file."""
-    way = np.clip((np.arange(60) - 36) / 8, 0, 1)
+    way, inner = np.clip((np.arange(40) - 24) / 8, 0, 1), np.s_[10:-10, 10:-10]
     motions = shifts(2 * way, 6 * way)
-    with clip_of(tmp_path, puffing(motions), frames) as clip:
+    whole = clip_of_puff(tmp_path, motions)
+    for clip in (whole, whole.part(29, 38)):
         backdrop = find_backdrop(clip, None, None)
         assert backdrop.motion is not None
         assert backdrop.motion.reference is not None
         plate = backdrop.plates.at(0)
         truth = srgb_to_linear(seen_at(wall(), motions[backdrop.motion.reference]))[..., None].repeat(3, -1)
-        inner = np.s_[10:-10, 10:-10]
         assert np.percentile(codes_apart(plate.image, truth)[inner], 95) < 12
         last = len(clip) - 1
         shown, seen = backdrop.clip.frame(last), clip.registered(lambda *_: motions[-1]).seen(0, *clip.size)
@@ -207,16 +194,14 @@ def test_a_camera_that_moves_after_it_stood_is_registered(tmp_path: Path, frames
 
 
 def test_a_clip_that_stands_still_stays_as_it_is(tmp_path: Path) -> None:
-    with clip_of(tmp_path, puffing(STILL * 2)) as clip:
+    with clip_of_puff(tmp_path, STILL * 2) as clip:
         backdrop = find_backdrop(clip, None, None)
         assert (backdrop.motion, backdrop.clip) == (None, clip)
 
 
 def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path: Path) -> None:
-    motions = (Similarity(shift=(4 - 3j) / max(SIZE)),) * COUNT
-    write_image(tmp_path / "plate.exr", srgb_to_linear(seen_at(wall(), Similarity()))[..., None].repeat(3, -1))
-    with clip_of(tmp_path, puffing(motions)) as clip:
-        backdrop = find_backdrop(clip, None, Background(image=tmp_path / "plate.exr"))
+    with clip_of_puff(tmp_path, shifts(NONE - 3, NONE + 4)) as clip:
+        backdrop = find_backdrop(clip, None, plate_picture(tmp_path))
         assert backdrop.motion is not None
         assert backdrop.motion.reference is None
         assert backdrop.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
@@ -226,17 +211,13 @@ def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path: Path)
 
 
 def test_a_plate_of_another_place_is_refused(tmp_path: Path) -> None:
-    motions = shifts(NONE, np.full(COUNT, 30.0))
-    write_image(tmp_path / "plate.exr", srgb_to_linear(seen_at(wall(), Similarity()))[..., None].repeat(3, -1))
-    with (
-        clip_of(tmp_path, puffing(motions)) as clip,
-        pytest.raises(ValueError, match="does not lie on the clip"),
-    ):
-        find_backdrop(clip, None, Background(image=tmp_path / "plate.exr"))
+    clip = clip_of_puff(tmp_path, shifts(NONE, NONE + 30))
+    with clip, pytest.raises(ValueError, match="does not lie on the clip"):
+        find_backdrop(clip, None, plate_picture(tmp_path))
 
 
 def test_frames_of_the_clip_are_a_plate_that_the_others_are_registered_to(tmp_path: Path) -> None:
-    with clip_of(tmp_path, puffing(shifts(*SHAKE))) as clip:
+    with clip_of_puff(tmp_path, shifts(*SHAKE)) as clip:
         backdrop = find_backdrop(clip, None, Background(frame=(0,)))
         assert backdrop.motion is not None
         assert isinstance(backdrop.plates, Plate)

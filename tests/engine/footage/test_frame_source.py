@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
+from films import encode
 from PIL import Image
 
 from smokelift.footage.backdrop import find_backdrop
@@ -16,19 +16,11 @@ from smokelift.scene import Background
 QUICKTIME = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 
 
-def film(path: Path, **tags: str) -> Path:
-    with av.open(str(path), "w", options={"movflags": "use_metadata_tags"}) as out:
-        out.metadata.update(tags)
-        stream = out.add_stream("libx264", rate=24)
-        stream.width, stream.height, stream.pix_fmt = 32, 16, "yuv420p"
-        out.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((16, 32, 3), np.uint8))))
-        out.mux(stream.encode())
-    return path
-
-
 @pytest.mark.parametrize(("said", "lens"), [("26", 26.0), ("13.5", 13.5), ("0", None), ("nan", None), ("wide", None)])
 def test_quicktime_tags(tmp_path: Path, said: str, lens: float | None) -> None:
-    assert Clip.open(film(tmp_path / "a.mov", **{QUICKTIME: said})).lens == lens
+    how = {"muxer": {"movflags": "use_metadata_tags"}, "metadata": {QUICKTIME: said}}
+    path = encode(tmp_path / "a.mov", np.zeros((1, 16, 32, 3), np.uint8), **how)
+    assert Clip.open(path).lens == lens
 
 
 @pytest.mark.parametrize("said", [28, 0, None])
@@ -71,54 +63,53 @@ def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path)
             assert found.source == "alpha"
 
 
-@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40)])
-def test_averages_of_codes_are_those_of_the_linear_picture_to_the_last_bit(size: tuple[int, int]) -> None:
-    random = np.random.default_rng(0)
-    for dtype in (np.uint8, np.uint16):
-        top = np.iinfo(dtype).max
-        picture = StoredPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
-        for part in (np.s_[:], np.s_[3:41, 5:60]):
-            some = picture.cut(lambda pixels, part=part: pixels[part])
-            assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
+# pictures in codes, to the last bit those of the linear picture
+
+
+@pytest.fixture(params=[np.uint8, np.uint16])
+def picture(request: pytest.FixtureRequest) -> StoredPicture:
+    top = np.iinfo(request.param).max
+    codes = np.random.default_rng(0).integers(0, top, (48, 64, 3), request.param, endpoint=True)
+    return StoredPicture(codes, code_values(top))
+
+
+SIZES = pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40), (80, 60)])
+
+
+@SIZES
+def test_averages(picture: StoredPicture, size: tuple[int, int]) -> None:
+    for part in (np.s_[:], np.s_[3:41, 5:60]):
+        some = picture.cut(lambda pixels, part=part: pixels[part])
+        assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
     with pytest.raises(ValueError, match="at least one pixel"):
         picture.averaged(4, 0)
 
 
-@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 60)])
+@SIZES
 @pytest.mark.parametrize("first", [0, 1])
-def test_averages_of_a_chequerboard_are_those_of_its_pixels_to_the_last_bit(size: tuple[int, int], first: int) -> None:
+def test_averages_of_a_chequerboard(picture: StoredPicture, size: tuple[int, int], first: int) -> None:
+    linear, (rows, columns) = picture.linear(), np.indices((48, 64))
+    for color in (0, 1):
+        board = ((rows + columns) % 2 == (first + color) % 2).astype(np.float32)
+        weight = np.maximum(area_average(board, *size), np.float32(1e-6))
+        expected = area_average(linear * board[..., None], *size) / weight[..., None]
+        for image in (picture, StoredPicture(linear)):
+            assert np.array_equal(image.chequered(*size, first)[color], expected)
+
+
+def test_weighted_sums(picture: StoredPicture) -> None:
+    edges = np.array([0, 3, 3, 48], np.int32), np.array([0, 1, 18, 30, 64], np.int32)
     random = np.random.default_rng(0)
-    rows, columns = np.indices((48, 64))
-    for dtype in (np.uint8, np.uint16):
-        top = np.iinfo(dtype).max
-        picture = StoredPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
-        linear = picture.linear()
-        for color in (0, 1):
-            share = ((rows + columns) % 2 == (first + color) % 2).astype(np.float32)
-            weight = np.maximum(area_average(share, *size), np.float32(1e-6))
-            expected = area_average(linear * share[..., None], *size) / weight[..., None]
-            for image in (picture, StoredPicture(linear)):
-                assert np.array_equal(image.chequered(*size, first)[color], expected)
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_codes_are_added_as_the_linear_picture_to_the_last_bit(dtype: type) -> None:
-    random, top = np.random.default_rng(0), np.iinfo(dtype).max
-    picture = StoredPicture(random.integers(0, top, (20, 36, 3), dtype, endpoint=True), code_values(top))
-    edges = np.array([0, 3, 3, 20], np.int32), np.array([0, 1, 18, 30, 36], np.int32)
-    weights, sums = random.random((3, 4, 3), np.float32), random.random((20, 36, 3), np.float32)
+    weights, sums = random.random((3, 4, 3), np.float32), random.random((48, 64, 3), np.float32)
     lines, columns = (np.diff(each) for each in edges)
     expected = sums + picture.linear() * np.repeat(np.repeat(weights, lines, axis=0), columns, axis=1)
-    others = sums.copy()
-    picture.add_weighted(weights, edges, sums)
-    StoredPicture(picture.linear()).add_weighted(weights, edges, others)
-    assert np.array_equal(sums, expected)
-    assert np.array_equal(others, expected)
+    for image in (picture, StoredPicture(picture.linear())):
+        found = sums.copy()
+        image.add_weighted(weights, edges, found)
+        assert np.array_equal(found, expected)
 
 
-def test_both_kinds_are_read_alike() -> None:
-    coded = StoredPicture(np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8), code_values(255))
-    linear = StoredPicture(coded.linear())
-    assert coded.size == linear.size == (8, 6)
-    for picture in (coded, linear):
-        assert np.array_equal(picture.through(linear_to_srgb), linear_to_srgb(coded.linear()))
+def test_functions_of_values(picture: StoredPicture) -> None:
+    for image in (picture, StoredPicture(picture.linear())):
+        assert image.size == (64, 48)
+        assert np.array_equal(image.through(linear_to_srgb), linear_to_srgb(picture.linear()))

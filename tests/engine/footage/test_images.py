@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import av
 import numpy as np
 import OpenEXR
 import pytest
+from films import encode, write_exr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -49,17 +49,6 @@ def test_png_of_8_bits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "b.png")), codes)
 
 
-def test_png_of_16_bits_keeps_them(tmp_path: Path) -> None:
-    codes = np.random.default_rng(2).integers(0, 65536, (4, 6, 3), np.uint16)
-    frame = av.VideoFrame.from_ndarray(codes, format="rgb48le").reformat(format="rgb48be")
-    with av.open(str(tmp_path / "a.png"), "w", format="image2", options={"update": "1"}) as out:
-        stream = out.add_stream("png", rate=1)
-        stream.width, stream.height, stream.pix_fmt = 6, 4, "rgb48be"
-        out.mux(stream.encode(frame))
-        out.mux(stream.encode())
-    np.testing.assert_allclose(read_image(tmp_path / "a.png", "linear"), codes / 65535, atol=1e-6)
-
-
 def test_gray_palette_and_transparent_png(tmp_path: Path) -> None:
     Image.fromarray(np.full((2, 3), 128, np.uint8)).save(tmp_path / "gray.png")
     np.testing.assert_allclose(read_image(tmp_path / "gray.png"), np.full((2, 3, 3), 0.2158605), rtol=1e-5)
@@ -71,65 +60,41 @@ def test_gray_palette_and_transparent_png(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_image(tmp_path / "half.png"), np.full((2, 3, 3), 0.2), rtol=1e-6)
 
 
-def test_jpeg_is_turned_upright(tmp_path: Path) -> None:
-    codes = np.zeros((16, 32, 3), np.uint8)
-    codes[:, 16:] = 200
-    exif = Image.Exif()
-    exif[0x0112] = 6  # to be shown turned by 90 degrees clockwise
-    Image.fromarray(codes).save(tmp_path / "a.jpg", exif=exif, quality=95)
-    image = read_image(tmp_path / "a.jpg", "linear")
-    assert image.shape == (32, 16, 3)
-    assert image[:14].max() < 0.05
-    assert image[18:].min() > 0.7
-
-
 @pytest.mark.parametrize("half", [True, False])
 def test_exr_comes_back(tmp_path: Path, half: bool) -> None:
     image = 30.0 * colors() - 1.0
     write_image(tmp_path / "a.exr", image, half=half)
     read = read_image(tmp_path / "a.exr")
     assert read.dtype == np.float32
-    if half:
-        np.testing.assert_allclose(read, image, rtol=1e-3, atol=1e-3)
-    else:
-        np.testing.assert_array_equal(read, image)
+    np.testing.assert_allclose(read, image, rtol=1e-3 * half, atol=1e-3 * half)
     assert [file.name for file in tmp_path.iterdir()] == ["a.exr"]
-
-
-def exr(path: Path, channels: dict[str, np.ndarray], **header: object) -> Path:
-    base = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File({**base, **header}, channels).write(str(path))
-    return path
 
 
 def test_exr_channels_and_tiles(tmp_path: Path) -> None:
     rgb = colors(40, 50)
-    gray = rgb[..., 0].copy()
-    np.testing.assert_array_equal(read_image(exr(tmp_path / "y.exr", {"Y": gray})), np.repeat(gray[..., None], 3, 2))
-    np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"A": gray})), np.repeat(gray[..., None], 3, 2))
-    alpha = np.full((40, 50), 0.25, np.float32)
-    premultiplied = np.dstack([rgb * 0.25, alpha])
-    np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"RGBA": premultiplied})), premultiplied[..., :3])
+    gray = np.ascontiguousarray(rgb[..., 0])
     tiles = OpenEXR.TileDescription()
     tiles.xSize = tiles.ySize = 16
-    tiled = exr(tmp_path / "tiled.exr", {"RGB": rgb}, type=OpenEXR.tiledimage, tiles=tiles)
-    np.testing.assert_array_equal(read_image(tiled), rgb)
-    layers = {f"{layer}.{c}": rgb[..., i] * k for k, layer in enumerate(("A.Mist", "View.Combined"))
-              for i, c in enumerate("RGB")}  # fmt: skip
-    layers = {name: np.ascontiguousarray(pixels) for name, pixels in layers.items()}
-    np.testing.assert_array_equal(read_image(exr(tmp_path / "layers.exr", layers)), rgb)
+    for channels, header, shown in (
+        ({"Y": gray}, {}, gray[..., None].repeat(3, 2)),
+        ({"A": gray}, {}, gray[..., None].repeat(3, 2)),
+        ({"RGBA": np.dstack([rgb / 4, np.full_like(gray, 0.25)])}, {}, rgb / 4),
+        ({"RGB": rgb}, {"type": OpenEXR.tiledimage, "tiles": tiles}, rgb),
+    ):
+        np.testing.assert_array_equal(read_image(write_exr(tmp_path / "a.exr", channels, **header)), shown)
     for names in (("N.X", "N.Y"), ("Z",), ("View.Z",), ("A", "Z")):
-        with pytest.raises(PictureKindError, match=rf"x\.exr: holds neither RGB nor Y channels, but {names[0]}"):
-            read_image(exr(tmp_path / "x.exr", dict.fromkeys(names, gray)))
+        with pytest.raises(PictureKindError, match=rf"neither RGB nor Y channels, but {names[0]}"):
+            read_image(write_exr(tmp_path / "x.exr", dict.fromkeys(names, gray)))
 
 
 @pytest.mark.parametrize(
     "parts",
     [
-        [("depth", "Z"), ("color", "RGB")],
+        [("depth", "Z"), ("color", "R G B")],
         [("normal", "X Y Z"), ("beauty", "R G B A")],
         [("albedo", "R G B"), ("Beauty", "R G B")],
         [("", "albedo.R albedo.G albedo.B beauty.R beauty.G beauty.B beauty.A Z")],
+        [("", "A.Mist.R A.Mist.G A.Mist.B View.Combined.R View.Combined.G View.Combined.B")],
         [("", "a.R a.G a.B R G B")],
         [("depth", "Z"), ("left", "N.X N.Y light.Y")],
     ],
@@ -137,43 +102,28 @@ def test_exr_channels_and_tiles(tmp_path: Path) -> None:
 def test_the_picture_of_an_exr_is_found_among_parts_and_layers(tmp_path: Path, parts: list[tuple[str, str]]) -> None:
     """The part or layer that is the picture has the value 0.5, every other one 0.1."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    wanted = ("color", "beauty", "Beauty", "beauty.", "light.", "")
+    wanted = ("color", "beauty", "Beauty", "light", "View.Combined", "")
 
-    def is_wanted(part: str, channel: str) -> bool:
-        layer = channel.rpartition(".")[0]
-        return (f"{layer}." if layer else part) in wanted and not channel.endswith("Z")
+    def value(part: str, channel: str) -> float:
+        layer = channel.rpartition(".")[0] or part
+        return 0.5 if layer in wanted and not channel.endswith("Z") else 0.1
 
     written = [
         OpenEXR.Part(
-            dict(header),
-            {
-                name: np.full((4, 6), 0.5 if is_wanted(part, name) else 0.1, np.float32)
-                for name in (names.split() if names != "RGB" else "RGB")
-            },
-            part,
+            dict(header), {name: np.full((4, 6), value(part, name), np.float32) for name in names.split()}, part
         )
         for part, names in parts
     ]
     OpenEXR.File(written).write(str(tmp_path / "a.exr"))
     image, alpha = read_layer(tmp_path / "a.exr")
     np.testing.assert_allclose(image, 0.5)
-    assert (alpha is not None) == ("A" in parts[-1][1].replace(".", " ").split())
-
-
-def by_ffmpeg(path: Path, codec: str, pixels: str, codes: np.ndarray) -> Path:
-    given = "rgba64le" if codes.shape[-1] == 4 else "rgb48le"
-    with av.open(str(path), "w", format="image2", options={"update": "1"}) as out:
-        stream = out.add_stream(codec, rate=1)
-        stream.height, stream.width = codes.shape[:2]
-        stream.pix_fmt = pixels
-        out.mux(stream.encode(av.VideoFrame.from_ndarray(codes, given).reformat(format=pixels)))
-        out.mux(stream.encode())
-    return path
+    assert (alpha is not None) == ("A" in parts[-1][1].replace("A.Mist", "").replace(".", " ").split())
 
 
 @pytest.mark.parametrize(
     ("name", "codec", "pixels", "bits"),
     [
+        ("a.png", "png", "rgb48be", 16),
         ("a.tif", "tiff", "rgb48le", 16),
         ("a.tiff", "tiff", "rgba64le", 16),
         ("a.TIF", "tiff", "rgb24", 8),
@@ -184,10 +134,10 @@ def by_ffmpeg(path: Path, codec: str, pixels: str, codes: np.ndarray) -> Path:
         ("a.dpx", "dpx", "rgb24", 8),
     ],
 )
-def test_tiff_and_dpx_keep_their_bits(tmp_path: Path, name: str, codec: str, pixels: str, bits: int) -> None:
+def test_pictures_keep_their_bits(tmp_path: Path, name: str, codec: str, pixels: str, bits: int) -> None:
     alpha = "a" in pixels.removeprefix("gbrp").removeprefix("rgb")
     codes = np.random.default_rng(2).integers(0, 65536, (6, 8, 3 + alpha), np.uint16)
-    path = by_ffmpeg(tmp_path / name, codec, pixels, codes)
+    path = encode(tmp_path / name, [codes], codec, pixels)
     image, opacity = read_layer(path, "linear", "premultiplied in linear light")
     np.testing.assert_allclose(image, codes[..., :3] / 65535, atol=1.5 / (2**bits - 1))
     assert (opacity is not None) == alpha
@@ -206,15 +156,15 @@ def test_tiff_of_other_kinds(tmp_path: Path, mode: str, compression: str | None)
 
 
 def test_log_dpx_and_floating_tiff_are_named(tmp_path: Path) -> None:
-    path = by_ffmpeg(tmp_path / "a.dpx", "dpx", "gbrp10le", np.zeros((6, 8, 3), np.uint16))
+    path = encode(tmp_path / "a.dpx", [np.zeros((6, 8, 3), np.uint16)], "dpx", "gbrp10le")
     content = bytearray(path.read_bytes())
     for code in (1, 3):
         content[801] = code
         path.write_bytes(content)
-        with pytest.raises(PictureKindError, match=r"a\.dpx: holds the densities of film or .*; save it as \.exr"):
+        with pytest.raises(PictureKindError, match=r"save it as \.exr"):
             read_image(path)
     Image.fromarray(np.zeros((6, 8), np.float32)).save(tmp_path / "a.tif")
-    with pytest.raises(PictureKindError, match=r"a\.tif: is neither gray nor RGB in whole numbers.*; save it as \.exr"):
+    with pytest.raises(PictureKindError, match=r"save it as \.exr"):
         read_image(tmp_path / "a.tif")
 
 
@@ -222,7 +172,7 @@ def test_exr_gives_the_display_window(tmp_path: Path) -> None:
     rgb = colors(4, 6)
     window = (np.array([-1, 2], np.int32), np.array([4, 5], np.int32))
     display = (np.array([0, 0], np.int32), np.array([7, 3], np.int32))
-    path = exr(tmp_path / "a.exr", {"RGB": rgb}, dataWindow=window, displayWindow=display)
+    path = write_exr(tmp_path / "a.exr", {"RGB": rgb}, dataWindow=window, displayWindow=display)
     wanted = np.zeros((4, 8, 3), np.float32)
     wanted[2:, :5] = rgb[:2, 1:]
     np.testing.assert_array_equal(read_image(path), wanted)
@@ -239,7 +189,7 @@ def test_radiance_hdr(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.hdr", "a.tif", "a.dpx"])
 def test_damaged_and_missing_pictures_are_named(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ImageError, match=f"{name}: no such file"):
+    with pytest.raises(ImageError, match="no such file"):
         read_image(tmp_path / name)
     (tmp_path / name).write_bytes(b"not a picture at all")
     with pytest.raises(ImageError, match=f"{name}: cannot be read"):
@@ -275,19 +225,16 @@ def test_alpha_is_premultiplied_in_exr_and_straight_in_png(tmp_path: Path) -> No
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 40), st.integers(1, 40))
-def test_resizing_keeps_flat_pictures_flat(rows: int, columns: int, height: int, width: int) -> None:
+@given(*[st.integers(1, 40)] * 4)
+def test_resizing_keeps_flat_pictures_flat_and_shrinking_keeps_the_mean(
+    rows: int, columns: int, height: int, width: int
+) -> None:
     small = area_average(np.full((rows, columns, 3), 0.7), width, height)
     assert small.shape == (height, width, 3)
     np.testing.assert_allclose(small, 0.7, rtol=1e-5)
-
-
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(st.integers(1, 40), st.data())
-def test_shrinking_keeps_the_mean(rows: int, data: st.DataObject) -> None:
-    height = data.draw(st.integers(1, rows))
-    image = np.random.default_rng(rows).random((rows, 3)).astype(np.float32)
-    assert area_average(image, 3, height).mean() == pytest.approx(image.mean(), rel=1e-5)
+    image = np.random.default_rng(rows).random((rows, columns), np.float32)
+    shrunk = area_average(image, min(width, columns), min(height, rows))
+    assert shrunk.mean() == pytest.approx(image.mean(), rel=1e-5)
 
 
 def test_area_averages_are_exact() -> None:

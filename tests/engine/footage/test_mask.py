@@ -49,16 +49,14 @@ def mask(tmp_path: Path) -> Path:
     return painted(tmp_path / "mask.png", np.where(np.arange(WIDTH) < SIDE, 255, 0) * np.ones((HEIGHT, 1)))
 
 
-def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path: Path) -> None:
-    file = painted(tmp_path / "mask.png", [[0, 120, 140, 255]])
-    seen = Mask(file, range(1), (80, 20)).seen(0, 8, 2)
-    np.testing.assert_array_equal(seen, [[False] * 4 + [True] * 4] * 2)
-
-
-def test_what_is_transparent_is_black(tmp_path: Path) -> None:
-    white, clear = (255, 255, 255, 255), (255, 255, 255, 0)
-    file = painted(tmp_path / "mask.png", np.array([[white, clear]]))
-    np.testing.assert_array_equal(Mask(file, range(1), (20, 10)).seen(0, 2, 1), [[True, False]])
+@pytest.mark.parametrize(
+    ("values", "shown"),
+    [([[0, 120, 140, 255]], [0, 0, 1, 1]), ([[(255, 255, 255, 255)] * 2 + [(255, 255, 255, 0)] * 2], [1, 1, 0, 0])],
+    ids=["gray", "transparent"],
+)
+def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path: Path, values: list, shown: list) -> None:
+    seen = Mask(painted(tmp_path / "mask.png", np.array(values)), range(1), (80, 20)).seen(0, 8, 2)
+    np.testing.assert_array_equal(seen, [np.repeat(np.array(shown, bool), 2)] * 2)
 
 
 @pytest.mark.parametrize("kind", ["pictures", "video"])
@@ -86,7 +84,7 @@ def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path: Path) 
         painted(tmp_path / f"mask_{n}.png", np.full((HEIGHT, WIDTH), 255))
     with Clip.open(clip, frames=(2, 7), mask=tmp_path / "mask_#.png") as part:
         assert len(part.whole()) == 8
-    with pytest.raises(ClipError, match=r"mask_#\.png: has masks for 8 of the frames 0 to 23 that are needed"):
+    with pytest.raises(ClipError, match=r"mask_#\.png: .* 8 of the frames 0 to 23"):
         Clip.open(clip, mask=tmp_path / "mask_#.png")
 
 
@@ -97,10 +95,10 @@ LINE = np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1))
     ("values", "said"),
     [
         ({}, r"mask\.png: no such file"),
-        ({"mask.png": np.zeros((4, 4))}, r"mask\.png: this mask leaves too little of the picture white"),
-        ({"mask.png": LINE}, r"mask\.png: this mask leaves too little of the picture white"),
+        ({"mask.png": np.zeros((4, 4))}, r"mask\.png: .* too little"),
+        ({"mask.png": LINE}, r"mask\.png: .* too little"),
         ({"mask.png": None}, r"mask\.png: cannot be read"),
-        ({"mask.png": np.full((HEIGHT, 2 * WIDTH), 255)}, "another shape than the clip's"),
+        ({"mask.png": np.full((HEIGHT, 2 * WIDTH), 255)}, "another shape"),
         ({f"mask_{n:02d}.png": np.full((4, 4), 255) for n in range(COUNT) if n != 3}, r"mask_03.* is missing"),
     ],
 )
@@ -139,25 +137,20 @@ def test_background_and_noise_are_those_of_what_is_seen(tmp_path: Path, mask: Pa
         np.testing.assert_allclose(plate.noise.total, expected.noise.total, rtol=0.25)
 
 
-def test_a_cleared_clip_shows_its_background_as_it_is_exposed(tmp_path: Path, mask: Path) -> None:
+@pytest.mark.parametrize("frames", [None, (10, 12)])
+def test_a_cleared_clip_shows_its_background_as_it_is_exposed(
+    tmp_path: Path, mask: Path, frames: tuple[int, int] | None
+) -> None:
+    """Also beside the frames that are used, as the plate is found there, too."""
     file = filmed(tmp_path / "clip")
     plate = Plate(wall(0.3, 0.5).astype(np.float32) / 2, np.ones((HEIGHT, WIDTH), np.float32), None)
-    with Clip.open(file, mask=mask) as clip:
+    with Clip.open(file, mask=mask, frames=frames) as clip:
         shown = cleared(clip, plate)
-        assert codes_apart(shown.frame(0), 2 * plate.image)[:, SIDE:].max() < 3
-        np.testing.assert_array_equal(shown.frame(5)[:, :SIDE], clip.frame(5)[:, :SIDE])
+        for number in (0, COUNT - 1):
+            assert codes_apart(shown.whole().frame(number), 2 * plate.image)[:, SIDE:].max() < 3
+        np.testing.assert_array_equal(shown.frame(2)[:, :SIDE], clip.frame(2)[:, :SIDE])
     with Clip.open(file) as clip:
         assert cleared(clip, plate) is clip
-
-
-def test_a_cleared_clip_shows_the_frames_beside_it_as_well(tmp_path: Path, mask: Path) -> None:
-    """The plate is found in frames before and after those that are used."""
-    file = filmed(tmp_path / "clip")
-    plate = Plate(wall(0.3, 0.5).astype(np.float32), np.ones((HEIGHT, WIDTH), np.float32), None)
-    with Clip.open(file, mask=mask, frames=(10, 12)) as clip:
-        whole = cleared(clip, plate).whole()
-        for number in (0, COUNT - 1):
-            assert codes_apart(whole.frame(number), plate.image)[:, SIDE:].max() < 3
 
 
 def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path) -> None:

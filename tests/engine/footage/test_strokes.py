@@ -146,22 +146,25 @@ def test_an_alpha_channel_leaves_nothing_to_strokes(tmp_path: Path) -> None:
     assert (found.source, found.strokes) == ("alpha", None)
 
 
-def refusal(clip: Clip, file: Path) -> str:
-    with pytest.raises((ClipError, ImageError)) as caught:
+@pytest.mark.parametrize(
+    ("color", "rows", "width", "said"),
+    [
+        (None, 0, 1, "no such file"),
+        (GREEN, 0, 1, "nothing is painted"),
+        ((255, 255, 255, 255), 20, 1, "no stroke is green"),
+        (GREEN, 20, 2, f"{2 * WIDTH} x {HEIGHT} pixels, another shape"),
+        (GREEN, HEIGHT, 1, "nothing that is not smoke"),
+    ],
+)
+def test_strokes_that_say_nothing_are_refused(
+    tmp_path: Path, color: tuple[int, ...] | None, rows: int, width: int, said: str
+) -> None:
+    clip, file = film(tmp_path, GRADIENT, puff, 1.0), tmp_path / "strokes.png"
+    if color is not None:
+        with Image.open(strokes(tmp_path, (rows > ROWS, color))) as picture:
+            picture.resize((WIDTH * width, HEIGHT)).save(file)
+    with pytest.raises((ClipError, ImageError), match=said):
         find_backdrop(clip, None, Background(strokes=file))
-    return str(caught.value)
-
-
-def test_strokes_that_say_nothing_are_refused(tmp_path: Path) -> None:
-    clip = film(tmp_path, GRADIENT, puff, 1.0)
-    assert "no such file" in refusal(clip, tmp_path / "no.png")
-    assert "nothing is painted" in refusal(clip, strokes(tmp_path))
-    white = strokes(tmp_path, (ROWS < 20, (255, 255, 255, 255)))
-    assert "no stroke is green" in refusal(clip, white)
-    with Image.open(white) as picture:
-        picture.resize((WIDTH * 2, HEIGHT)).save(white)
-    assert f"{2 * WIDTH} x {HEIGHT} pixels, another shape" in refusal(clip, white)
-    assert "leave nothing that is not smoke" in refusal(clip, strokes(tmp_path, (ROWS >= 0, GREEN)))
 
 
 def test_strokes_need_a_plate_that_stays(tmp_path: Path) -> None:

@@ -11,15 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import coded, film, puff, wall
+from films import coded, encode, film, puff, wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
-from smokelift.footage.video import lacks_index, median_quantizer
-from smokelift.output.images import write_video
+from smokelift.footage.video import median_quantizer
 
-FRAMES = [np.full((16, 32, 3), value, np.float32) for value in (0.1, 0.3, 0.5)]
+FRAMES = np.zeros((3, 16, 32, 3), np.uint8)
 
 
 @pytest.fixture
@@ -32,33 +31,26 @@ def server() -> Iterator[socket.socket]:
             listening.accept()
 
 
-def test_a_folder_named_like_a_server_is_a_folder(tmp_path: Path, server: socket.socket, monkeypatch) -> None:
+@pytest.mark.parametrize(
+    "name", ["http:/127.0.0.1:{}/a.mp4", "pipe:0.mp4", "concat:a|b.mp4", "a%03d.mp4", "-i.mp4", "crypto:x.mp4"]
+)
+def test_any_name_is_that_of_a_file(tmp_path: Path, server: socket.socket, monkeypatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
-    name = Path(f"http:/127.0.0.1:{server.getsockname()[1]}/clip.mp4")
-    name.parent.mkdir(parents=True)
-    write_video(name, FRAMES, 24)
-    with Clip.open(name) as clip:
+    path = Path(name.format(server.getsockname()[1]))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    encode(path, FRAMES)
+    with Clip.open(path) as clip:
         assert len(clip) == 3
 
 
-@pytest.mark.parametrize("kind", ["m3u8", "ffconcat"])
-def test_nothing_is_fetched_from_what_a_file_refers_to(tmp_path: Path, server: socket.socket, kind: str) -> None:
-    address = f"http://127.0.0.1:{server.getsockname()[1]}/clip.ts"
-    text = {
-        "m3u8": f"#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{address}\n#EXT-X-ENDLIST\n",
-        "ffconcat": f"ffconcat version 1.0\nfile {address}\n",
-    }[kind]
-    (tmp_path / f"list.{kind}").write_text(text)
+@pytest.mark.parametrize(
+    "text", ["#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{}\n#EXT-X-ENDLIST\n", "ffconcat version 1.0\nfile {}\n"]
+)
+def test_nothing_is_fetched_from_what_a_file_refers_to(tmp_path: Path, server: socket.socket, text: str) -> None:
+    path = tmp_path / ("list.m3u8" if text.startswith("#") else "list.ffconcat")
+    path.write_text(text.format(f"http://127.0.0.1:{server.getsockname()[1]}/clip.ts"))
     with pytest.raises(ClipError):
-        Clip.open(tmp_path / f"list.{kind}")
-
-
-@pytest.mark.parametrize("name", ["pipe:0.mp4", "concat:a|b.mp4", "a%03d.mp4", "-i.mp4", "crypto:x.mp4"])
-def test_any_name_is_that_of_a_file(tmp_path: Path, monkeypatch, name: str) -> None:
-    monkeypatch.chdir(tmp_path)
-    write_video(Path(name), FRAMES, 24)
-    with Clip.open(name) as clip:
-        assert len(clip) == 3
+        Clip.open(path)
 
 
 def png(width: int, height: int, depth: int) -> bytes:
@@ -82,7 +74,7 @@ def test_a_16_bit_png_with_a_pattern_for_a_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", [(100_000, 100_000), (30_000, 30_000), (2**31 - 1, 1)])
 def test_a_picture_that_says_it_is_huge_is_not_believed(tmp_path: Path, depth: int, size: tuple[int, int]) -> None:
     (tmp_path / "plate.png").write_bytes(png(*size, depth))
-    with pytest.raises(ImageError, match=r"plate\.png: cannot be read: "):
+    with pytest.raises(ImageError, match="cannot be read"):
         read_image(tmp_path / "plate.png")
 
 
@@ -93,32 +85,15 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path, name: str) -> None:
         Clip.open(tmp_path / name)
 
 
-@pytest.mark.parametrize("left", [0.2, 0.6])
-def test_a_recording_that_was_cut_short_is_told_from_what_is_no_video(tmp_path: Path, left: float) -> None:
-    clip = tmp_path / "clip.mp4"
-    write_video(clip, FRAMES, 24)
-    assert not lacks_index(clip)
-    content = clip.read_bytes()
-    clip.write_bytes(content[: int(left * len(content))])
-    with pytest.raises(ClipError, match=r"clip\.mp4: breaks off before its index is complete"):
-        Clip.open(clip)
-
-
-@pytest.mark.parametrize("content", [b"x", bytes(16) * 9, b"\0\0\0\x08free" * 3])
-def test_what_has_no_boxes_lacks_no_index(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "clip.mp4").write_bytes(content)
-    assert not lacks_index(tmp_path / "clip.mp4")
-
-
 @pytest.mark.parametrize("quantizer", [10, 30, 48])
 def test_the_quantizer_is_that_of_the_encoder(tmp_path: Path, quantizer: int) -> None:
-    path = coded(tmp_path / "clip.mp4", wall(0.2, 0.5), puff, 0.6, quantizer)
+    path = coded(tmp_path / "clip.mp4", wall(0.2, 0.5), 0.6, qp=str(quantizer))
     assert median_quantizer(path) == pytest.approx(quantizer, abs=3)
 
 
 @pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mpeg4"), ("a.mkv", "ffv1"), ("a.webm", "libvpx-vp9")])
 def test_other_codecs_tell_nothing(tmp_path: Path, name: str, codec: str) -> None:
-    assert median_quantizer(coded(tmp_path / name, wall(0.2, 0.5), puff, 0.6, codec=codec)) is None
+    assert median_quantizer(coded(tmp_path / name, wall(0.2, 0.5), 0.6, codec)) is None
 
 
 def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path: Path) -> None:

@@ -4,51 +4,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import codes_apart
+from films import Filmed, codes_apart
 
-from smokelift.checks import Finding
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import StoredPicture
-from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.plate import Plate
 
 COUNT = 16
 SIZE = (80, 1280)
 
 
-class Filmed:
-    """Frames in memory as a video's."""
-
-    warning: str | None = None
-    lens: float | None = None
-    backdrop: float | None = None
-    fps = 24.0
-    files: tuple[Path, ...] = ()
-    notes: tuple[Finding, ...] = ()
-
-    def __init__(self, codes: np.ndarray) -> None:
-        self.codes, self.count = codes, len(codes)
-
-    def read(self, n: int) -> StoredPicture:
-        return StoredPicture(self.codes[n], code_values(255))
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        return ()
-
-    def close(self) -> None:
-        pass
-
-
-def film(
-    behind: np.ndarray, gains: np.ndarray | None = None, column: bool = False, noise: float = 1.0, size=SIZE
-) -> Clip:
+def film(behind: np.ndarray, gains: np.ndarray | None = None, column: bool = False, noise: float = 1.0) -> Clip:
     """A bright puff that goes by before a background, perhaps beside a column of smoke that stays; noise in codes."""
     random = np.random.default_rng(1)
-    rows, columns = np.mgrid[: size[0], : size[1]].astype(np.float32)
-    codes = np.empty((COUNT, *size, 3), np.uint8)
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
+    codes = np.empty((COUNT, *SIZE, 3), np.uint8)
     for n in range(COUNT):
-        away = np.hypot(rows - size[0] / 2, columns - 75 * n)
+        away = np.hypot(rows - SIZE[0] / 2, columns - 75 * n)
         alpha = 0.7 * np.clip(1.5 - away / 45, 0, 1) * (1 + 0.2 * np.sin(0.9 * n + rows / 12))
         if column:
             alpha = np.maximum(alpha, np.where(np.abs(columns - 640) < 40, random.uniform(0.3, 0.9), 0))
@@ -56,15 +29,15 @@ def film(
         light = light * (1 if gains is None else gains[n])
         encoded = linear_to_srgb(light) * 255 + np.float32(noise) * random.standard_normal(light.shape, np.float32)
         codes[n] = np.clip(encoded + 0.5, 0, 255)
-    return Clip(Path("film"), Filmed(codes), 24.0, None)
+    return Clip(Path("film"), Filmed(codes))
 
 
-def wall(size: tuple[int, int] = SIZE) -> np.ndarray:
+def wall() -> np.ndarray:
     """Tiles with joints and a grain of single pixels, linear."""
     random = np.random.default_rng(0)
-    rows, columns = np.mgrid[: size[0], : size[1]]
-    tiles = np.kron(random.uniform(0.3, 0.5, (size[0] // 20, -(-size[1] // 20), 3)), np.ones((20, 20, 1)))
-    encoded = tiles[:, : size[1]] + random.normal(0, 0.02, (*size, 1))
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
+    tiles = np.kron(random.uniform(0.3, 0.5, (SIZE[0] // 20, -(-SIZE[1] // 20), 3)), np.ones((20, 20, 1)))
+    encoded = tiles[:, : SIZE[1]] + random.normal(0, 0.02, (*SIZE, 1))
     encoded[(rows % 20 < 2) | (columns % 20 < 2)] += 0.1
     return srgb_to_linear(np.clip(encoded, 0, 1))
 
