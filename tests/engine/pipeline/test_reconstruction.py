@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smokelift.density import GradientFit, NothingCarried
+from smokelift import render
+from smokelift.density import GradientFit, NothingCarried, ViewSet
 from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Reconstruction, compose, reconstruct
-from smokelift.scene import completed
+from smokelift.scene import Background, completed
 from smokelift.setup.prepare import prepare_shot
 
 
@@ -67,3 +69,25 @@ def test_a_run_is_not_resumed_with_other_parts(plume, draft, tmp_path) -> None:
         assert other.write(tmp_path, npz=True, resume=True).complete
         with pytest.raises(SequenceError, match=r"cannot be resumed: settings.*temporal_prior.*NothingCarried"):
             Reconstruction(shot, usual).write(tmp_path, npz=True, resume=True)
+
+
+def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, draft, tmp_path) -> None:
+    """Also before a picture, where the fit is to the extracted element, which stands before one color."""
+    wall = np.kron(np.random.default_rng(0).uniform(0.05, 0.3, (28, 20, 3)), np.ones((2, 2, 1)))
+    write_image(tmp_path / "wall.exr", wall)
+    before_wall = replace(plume.scene, background=Background(image=tmp_path / "wall.exr"))
+    scene = plume.write(tmp_path / "clip", plume.densities[:2], before_wall)
+    frames: list[Frame] = []
+    with Clip.open(scene.clip) as clip:
+        run = reconstruct(clip, scene, draft)
+        sequence = run.write(tmp_path / "out", npz=True, on_frame=frames.append)
+        for frame in frames:
+            (view,) = ViewSet.of(run.shot.observe(frame.number - 1), run.shot.optics).views
+            assert view.image.shape[-1] == 4
+            again = sequence.render(frame.number, camera=view.camera)
+            color = Background(color=tuple(map(float, view.background[0, 0, :3])))
+            over_color = render(frame.density, replace(sequence.scene, background=color), camera=view.camera)
+            error = np.square(over_color - view.image[..., :3], dtype=np.float64)[view.counted].mean()
+            assert -10 * np.log10(error) == pytest.approx(frame.figures["psnr_working"], abs=0.1)
+            shown = render(sequence.density(frame.number), sequence.scene, camera=view.camera)
+            np.testing.assert_array_equal(shown, again)

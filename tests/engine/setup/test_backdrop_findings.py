@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from smokelift.checks import Finding
 from smokelift.footage.backdrop import Backdrop, find_backdrop
@@ -17,7 +18,7 @@ from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_findings import backdrop_findings, doubts, first_findings
 from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
-from tests.engine.footage.films import coded, film, puff, wall
+from tests.engine.footage.films import clip_of, coded, film, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True
@@ -43,10 +44,7 @@ def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) ->
 @pytest.fixture
 def gray(tmp_path):
     """A clip of four frames of a gray wall, and its background."""
-    picture = np.full((24, 32, 3), 0.2, np.float32)
-    for n in range(4):
-        write_image(tmp_path / f"wall_{n}.png", picture)
-    with Clip.open(tmp_path / "wall_#.png") as clip:
+    with clip_of(tmp_path, [np.full((24, 32, 3), 0.2, np.float32)] * 4) as clip:
         plate = Plate(clip.frame(0), np.ones((24, 32), np.float32), lasting_noise(1 / 255))
         yield Backdrop("picture", clip, plate, frames=4)
 
@@ -59,11 +57,7 @@ def puff_at(row: int) -> np.ndarray:
 
 def before(floor: float, folder) -> Clip:
     """A clip of a puff that rises before black, above a floor of a brightness."""
-    for n in range(12):
-        smoke = puff_at(60 - 4 * n)
-        smoke[66:] = floor
-        write_image(folder / f"frame_{n:02d}.png", smoke)
-    return Clip.open(folder / "frame_##.png", fps=24)
+    return clip_of(folder, (np.where(np.arange(72)[:, None] < 66, puff_at(60 - 4 * n), floor) for n in range(12)))
 
 
 @pytest.mark.parametrize(("unknown_rows", "said"), [(0, False), (20, False), (60, True)])
@@ -74,14 +68,17 @@ def test_smoke_that_may_be_in_the_plate_is_said(gray, unknown_rows, said) -> Non
     assert found == [Finding("smoke in the background", {"fraction": 0.75}, doubt=True)] * said
 
 
+def flickering(n: int) -> np.ndarray:
+    """The opacity of smoke that flickers in its place."""
+    return np.where(ACROSS < 6, np.random.default_rng(n).uniform(0.4, 0.9), 0) * np.ones((72, 1))
+
+
 def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
     """Smoke that flickers in its place, with a puff that rises beside it, and none of them in one frame."""
-    for n in range(12):
-        smoke = np.where(np.roll(ACROSS, 12) < 6, RANDOM.uniform(0.4, 0.9), np.roll(puff(2 * n + 1), -16, axis=1))
-        write_image(tmp_path / f"frame_{n:02d}.png", before_tiles(smoke * (n != 5)))
+    smoke = (np.maximum(np.roll(flickering(n), 12, axis=1), np.roll(puff(2 * n + 1), -16, axis=1)) for n in range(12))
+    whole = clip_of(tmp_path, (before_tiles(each * (n != 5)) for n, each in enumerate(smoke)))
     for first, said in ((2, [5]), (6, [])):
-        with Clip.open(tmp_path / "frame_##.png", fps=24, frames=(first, 11)) as clip:
-            found = first_findings(first_estimate(clip, None, None), given=False)
+        found = first_findings(first_estimate(whole.part(first, 11), None, None), given=False)
         assert [each.figures["frame"] for each in found if each.kind == "clearest frame"] == said
 
 
@@ -96,10 +93,8 @@ def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
-    for n in range(12):
-        smoke = np.where(ACROSS < 6, RANDOM.uniform(0.4, 0.9), 0)
-        write_image(tmp_path / f"frame_{n:02d}.png", before_tiles(smoke))
-    (found,) = backdrop_findings(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
+    clip = clip_of(tmp_path, (before_tiles(flickering(n)) for n in range(12)))
+    (found,) = backdrop_findings(find_backdrop(clip, None, None))
     assert found.kind == "background partly seen"
 
 
@@ -107,7 +102,7 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
 def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantizer, said) -> None:
     """Where the codec's smoke that stands still may be in the background, which is not so before black."""
     for plate, doubted in ((wall(0.2, 0.5), said), (np.zeros((72, 56, 3)), False)):
-        path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantizer)
+        path = coded(tmp_path / f"{doubted}.mp4", plate, 0.8, qp=str(quantizer))
         with Clip.open(path) as clip:
             assert kinds(find_backdrop(clip, None, None)) == ["strong compression"] * doubted
             assert not kinds(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
@@ -119,21 +114,17 @@ def test_what_never_changes_before_one_color_is_said(tmp_path) -> None:
 
 
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
-    for n in range(14):
-        smoke = puff_at(60 - 4 * n)
-        write_image(tmp_path / f"frame_{n:02d}.png", before_tiles(smoke, TILES if n < 7 else 0.5 - TILES))
-    with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
-        (doubt,) = doubts(find_backdrop(clip, None, None), SEEN, given=False)
+    shown = (before_tiles(puff_at(60 - 4 * n), TILES if n < 7 else 0.5 - TILES) for n in range(14))
+    whole = clip_of(tmp_path, shown)
+    (doubt,) = doubts(find_backdrop(whole.part(2, 12), None, None), SEEN, given=False)
     assert doubt == Finding("cut", {"before": 6, "after": 7, "first": 2, "last": 12}, doubt=True)
-    with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
-        assert kinds(find_backdrop(clip, None, None)) == []
+    assert kinds(find_backdrop(whole.part(7, 13), None, None)) == []
 
 
 @pytest.mark.parametrize("color", [0.0, 0.2], ids=["black", "gray"])
 def test_one_frame_before_one_color_shows_its_background(tmp_path, color) -> None:
     smoke = puff_at(50)[..., None]
-    write_image(tmp_path / "photograph.png", np.full((72, 56, 3), color) * (1 - smoke) + 0.6 * smoke)
-    with Clip.open(tmp_path / "photograph.png") as clip:
+    with clip_of(tmp_path, [np.full((72, 56, 3), color) * (1 - smoke) + 0.6 * smoke]) as clip:
         found = find_backdrop(clip, None, None)
         given = find_backdrop(clip, None, Background(color=(color,) * 3))
         masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
@@ -144,9 +135,7 @@ def test_one_frame_before_one_color_shows_its_background(tmp_path, color) -> Non
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
 def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) -> None:
-    for n in range(count):
-        write_image(tmp_path / f"frame_{n}.png", before_tiles(puff_at(60 - 8 * n)))
-    with Clip.open(tmp_path / "frame_#.png") as clip:
+    with clip_of(tmp_path, (before_tiles(puff_at(60 - 8 * n)) for n in range(count))) as clip:
         assert ("background of few frames" in kinds(find_backdrop(clip, None, None))) == doubted
 
 
@@ -179,11 +168,10 @@ def test_black_that_no_part_of_the_picture_shows_is_assumed_and_not_found(tmp_pa
     shown = slice(16, -16) if bars else slice(None)
     random = np.random.default_rng(0)
     wide = 0.3 + 0.1 * blurred(random.normal(0, 1, (72, 400)).astype(np.float32), 4) / 0.07
-    for n in range(24):
-        picture = np.zeros((72, 56))
+    pictures = np.zeros((24, 72, 56))
+    for n, picture in enumerate(pictures):
         picture[shown] = np.clip(wide[:, 12 * n :][:, :56], 0.02, 0.95)[shown]
-        write_image(tmp_path / f"fog_{n:02d}.png", picture[..., None].repeat(3, -1))
-    with Clip.open(tmp_path / "fog_##.png", fps=24) as clip:
+    with clip_of(tmp_path, pictures) as clip:
         said = [remark.kind for remark in first_findings(first_estimate(clip, None, None), given=False)]
     assert said == ["background assumed", "bars" if bars else "background never seen"]
 
@@ -210,3 +198,27 @@ def test_how_many_frames_were_examined_is_said(gray) -> None:
         Finding("no smoke examined", {"frames": 4}, doubt=True),
         Finding("no smoke before an estimated background", doubt=True),
     ]
+
+
+@pytest.mark.parametrize("parallax", [0.0, 2.0])
+def test_a_clip_from_the_hand_is_registered_and_one_of_a_camera_that_travels_is_refused(tmp_path, parallax) -> None:
+    """A puff before a textured wall and a camera that shakes; with parallax the wall slides by more below."""
+    random = np.random.default_rng(0)
+    texture = blurred(random.standard_normal((140, 180)).astype(np.float32), 1.5)
+    rows, columns = np.mgrid[:140, :180]
+    pictures = []
+    for n, (down, right) in enumerate(random.integers(-4, 5, (8, 2)) + 8):
+        at = [rows, columns + parallax * (n - 4) * (rows / 70 - 1)]
+        slid = ndimage.map_coordinates(0.3 + 0.1 * texture / texture.std(), at, mode="mirror")
+        smoke = 0.8 * np.exp(-((rows - 95 + 6 * n) ** 2 + (columns - 90) ** 2) / 200)
+        seen = (slid * (1 - smoke) + 0.9 * smoke)[down : down + 120, right : right + 160]
+        pictures.append(np.clip(seen, 0, 1)[..., None].repeat(3, -1))
+    clip = clip_of(tmp_path, pictures)
+    if parallax:
+        with pytest.raises(ValueError, match="Stabilize the clip"):
+            find_backdrop(clip, None, None)
+    else:
+        (said,) = [found for found in backdrop_findings(find_backdrop(clip, None, None)) if "regis" in found.kind]
+        assert said.kind == "frames registered"
+        assert 3 < said.figures["pixels"] < 12
+        assert 0 <= said.figures["frame"] < 8

@@ -78,30 +78,26 @@ def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
     """A scene whose further view is wrong in one way."""
     (view,) = scene.views
     camera, clip = view.camera, view.clip
-    match what:
-        case "short":
-            return replace(scene, views=(replace(view, clip=replace(clip, frames=(4, 5))),))
-        case "rate":
-            return replace(scene, views=(replace(view, clip=replace(clip, fps=25.0)),))
-        case "shape":
-            return replace(scene, views=(replace(view, camera=replace(camera, size=(56, 40))),))
-        case "moving":
-            return replace(scene, views=(replace(view, camera=replace(camera, matrices=(camera.matrix,) * 5)),))
-        case "missing":
-            return replace(scene, views=(replace(view, clip=ClipSource(folder / "none.mp4")),))
-        case "box":
-            return replace(scene, domain=None, camera=None)
-    raise AssertionError(what)
+    if what == "box":
+        return replace(scene, domain=None, camera=None)
+    changes = {
+        "short": {"clip": replace(clip, frames=(4, 5))},
+        "rate": {"clip": replace(clip, fps=25.0)},
+        "shape": {"camera": replace(camera, size=(56, 40))},
+        "moving": {"camera": replace(camera, matrices=(camera.matrix,) * 5)},
+        "missing": {"clip": ClipSource(folder / "none.mp4")},
+    }
+    return replace(scene, views=(replace(view, **changes[what]),))
 
 
 @pytest.mark.parametrize(
     ("what", "sentence"),
     [
-        ("short", r"has frames 0 to 5, but 4 to 8 are those of the input's moments; use fewer frames"),
-        ("rate", r"has 25 frames a second, the input 24; all views need the same"),
-        ("shape", r"56 x 40, the clip's 40 x 56 \(frame_####.png\)"),
-        ("moving", r"no camera may move"),
-        ("missing", r"none.mp4: no such file"),
+        ("short", "has frames 0 to 5, but 4 to 8"),
+        ("rate", "25 frames a second, the input 24"),
+        ("shape", "56 x 40, the clip's 40 x 56"),
+        ("moving", "no camera may move"),
+        ("missing", "none.mp4: no such file"),
         ("box", "need the input's camera and the box"),
     ],
 )

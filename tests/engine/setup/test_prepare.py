@@ -1,11 +1,9 @@
 """Shots: what is given stays, what is missing is estimated with a note each, contradictions are refused."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from smokelift.checks import UNDETERMINED, Finding
@@ -211,33 +209,6 @@ def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, given) -> Non
         scene = replace(scene, lights=(), medium=None)
     shot = shot_of(scene if given else bare(scene), draft)
     assert np.isfinite(shot.scene.lights[0].irradiance).all()
-
-
-def moving_clip(folder: Path, parallax: float) -> Scene:
-    """A puff before a textured wall and a camera that shakes; with parallax the wall slides by more below."""
-    random = np.random.default_rng(0)
-    wall = ndimage.gaussian_filter(random.standard_normal((140, 180)), 1.5)
-    wall = 0.3 + 0.1 * wall / wall.std()
-    rows, columns = np.mgrid[:140, :180]
-    offsets = random.integers(-4, 5, (8, 2)) + 8
-    for n, (down, right) in enumerate(offsets):
-        slid = ndimage.map_coordinates(wall, [rows, columns + parallax * (n - 4) * (rows / 70 - 1)], mode="mirror")
-        smoke = 0.8 * np.exp(-((rows - 95 + 6 * n) ** 2 + (columns - 90) ** 2) / 200)
-        seen = (slid * (1 - smoke) + 0.9 * smoke)[down : down + 120, right : right + 160]
-        write_image(folder / f"shaken_{n}.png", np.repeat(np.clip(seen, 0, 1)[..., None], 3, 2).astype(np.float32))
-    return Scene(clip=ClipSource(folder / "shaken_#.png", fps=24), scattering="absorption")
-
-
-def test_a_camera_that_travels_before_texture_is_refused(draft, tmp_path) -> None:
-    with pytest.raises(ValueError, match=r"^The camera moves, .* Stabilize the clip .* clean plate .* as background"):
-        shot_of(moving_clip(tmp_path, parallax=2.0), draft)
-
-
-def test_a_clip_from_the_hand_is_registered_and_that_is_said(draft, tmp_path) -> None:
-    (said,) = [remark for remark in shot_of(moving_clip(tmp_path, 0.0), draft).findings if "registered" in remark.kind]
-    assert said.kind == "frames registered"
-    assert 3 < said.figures["pixels"] < 12
-    assert 0 <= said.figures["frame"] < 8
 
 
 def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
