@@ -21,7 +21,7 @@ from tests.engine.readers import READERS, Reader
 TRIES = settings(
     max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-FAST = settings(TRIES, max_examples=150)
+MORE = settings(TRIES, max_examples=90)
 
 NUMBERS = st.one_of(
     st.integers(), st.floats(), st.sampled_from([0, -1, 2**31, 10**400, 1e-45, 1e38, 1e300, -0.0, 10**9, 1e-9])
@@ -109,34 +109,30 @@ def test_any_bytes_end_well(reader: Reader, tmp_path: Path, content: bytes) -> N
     ends_well(reader, path)
 
 
-def written(name: str, folder: Path) -> Path:
-    READERS[name].write(folder / READERS[name].name)
-    return folder / READERS[name].name
-
-
-@FAST
+@MORE
 @given(data=st.data())
-def test_changed_tables_of_a_scene_end_well(tmp_path: Path, data: st.DataObject) -> None:
-    path = written("scene", tmp_path)
-    tables = data.draw(changed_values(tomllib.loads(path.read_text())))
-    path.write_text(tomli_w.dumps(tables))
-    ends_well(READERS["scene"], path)
+@pytest.mark.parametrize("reader", ["scene"], indirect=True)
+def test_changed_tables_of_a_scene_end_well(reader: Reader, sound: Path, tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / reader.name
+    path.write_text(tomli_w.dumps(data.draw(changed_values(tomllib.loads(sound.read_text())))))
+    ends_well(reader, path)
 
 
-@FAST
+@MORE
 @given(data=st.data())
-def test_changed_values_of_an_index_end_well(tmp_path: Path, data: st.DataObject) -> None:
-    path = written("index", tmp_path)
-    path.write_text(json.dumps(data.draw(changed_values(json.loads(path.read_text())))))
-    ends_well(READERS["index"], path)
+@pytest.mark.parametrize("reader", ["index"], indirect=True)
+def test_changed_values_of_an_index_end_well(reader: Reader, sound: Path, tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / reader.name
+    path.write_text(json.dumps(data.draw(changed_values(json.loads(sound.read_text())))))
+    ends_well(reader, path)
 
 
-@pytest.mark.parametrize("name", ["state", "twin", "truth"])
-@TRIES
+@pytest.mark.parametrize("reader", ["state", "twin", "truth"], indirect=True)
+@settings(TRIES, max_examples=40)
 @given(data=st.data())
-def test_other_arrays_end_well(tmp_path: Path, name: str, data: st.DataObject) -> None:
-    path = written(name, tmp_path)
-    with np.load(path) as file:
+def test_other_arrays_end_well(reader: Reader, sound: Path, tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / reader.name
+    with np.load(sound) as file:
         arrays = dict(file)
     changed = data.draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2))
     for each in changed:
@@ -146,7 +142,7 @@ def test_other_arrays_end_well(tmp_path: Path, name: str, data: st.DataObject) -
     if data.draw(st.integers(0, 5)) == 0:
         del arrays[changed[0]]
     np.savez(path, **arrays)
-    ends_well(READERS[name], path)
+    ends_well(reader, path)
 
 
 @TRIES
