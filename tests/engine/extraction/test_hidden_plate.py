@@ -61,12 +61,15 @@ def off(plate: Plate, behind: Picture) -> float:
 
 
 def test_smoke_that_drifts_shows_what_is_behind_it() -> None:
+    """What is known stays."""
     behind = wall()
     plate = continued(behind)
     better = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 1.5), plate, SOURCE)
     assert off(better, behind) < 0.5 * off(plate, behind)
     assert (better.confidence >= plate.confidence - 1e-6).all()
     assert better.confidence[plate.confidence < 0.5].mean() > 0.6
+    known = plate.confidence == 1
+    assert np.array_equal(better.image[known], plate.image[known])
 
 
 def test_what_no_mixture_with_the_continuation_explains_is_the_plate() -> None:
@@ -96,14 +99,6 @@ def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
     assert off(same, behind) < 1.1 * off(plate, behind)
     middle = np.hypot(X - 96, Y - 80) < 16
     assert same.confidence[middle].max() < 0.5
-
-
-def test_what_is_known_stays() -> None:
-    behind = wall()
-    plate = continued(behind)
-    better = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 1.5), plate, SOURCE)
-    known = plate.confidence == 1
-    assert np.array_equal(better.image[known], plate.image[known])
 
 
 @pytest.mark.parametrize("change", [{"confidence": np.ones((ROWS, COLUMNS), "f4")}, {"errors": np.zeros((3, 3), "f4")}])

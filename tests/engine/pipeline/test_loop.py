@@ -3,6 +3,7 @@
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,11 @@ from smokelift.velocity import CoarseToFine, DensityPair
 from tests.engine.setup.shots import burning
 
 
-def frames_of(scene: Scene, settings: Settings, method: Method | None = None) -> list[Frame]:
+def frames_of(scene: Scene, settings: Settings, method: Method | None = None, count: int | None = None) -> list[Frame]:
+    """The frames of a run, or the first of them."""
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
-        return list(reconstruct(clip, scene, settings, method=method))
+        return list(islice(reconstruct(clip, scene, settings, method=method), count))
 
 
 def frames_written(scene: Scene, settings: Settings, out: Path, resume: bool = False) -> list[Frame]:
@@ -79,8 +81,9 @@ def along_the_path(tracked, draft) -> list[Frame]:
 
 def test_density_is_carried_from_the_third_frame_on(run, plume, draft) -> None:
     """It is most of the start, since detail is made up once, and a frame says how much it took over."""
-    for alone, carried in zip(frames_of(plume.scene, replace(draft, transport=0.0)), run[0], strict=True):
-        assert np.array_equal(alone.density, carried.density) == (alone.number <= 2)
+    alone = frames_of(plume.scene, replace(draft, transport=0.0), count=3)
+    for one, carried in zip(alone, run[0][:3], strict=True):
+        assert np.array_equal(one.density, carried.density) == (one.number <= 2)
     taken = [Sequence.open(run[1]).figures(frame.number)["transport"] for frame in run[0]]
     assert taken[:2] == [{}, {}]
     assert all(0.5 < figures["share"] < 1 for figures in taken[2:])
@@ -146,7 +149,7 @@ def test_what_a_mask_hides_is_no_smoke(run, plume, draft, tmp_path) -> None:
     write_image(tmp_path / "mask.png", mask)
     beside = project_voxels(scene.camera, scene.domain).shown((mask == 0).all(-1))
     masked = replace(scene, clip=replace(scene.clip, mask=tmp_path / "mask.png"))
-    for frame, wanted in zip(frames_of(masked, draft), alone, strict=True):
+    for frame, wanted in zip(frames_of(masked, draft, count=3), alone[:3], strict=True):
         assert frame.density[beside].max() <= 1e-3 * frame.density.max()
         assert frame.density.sum() == pytest.approx(wanted.density.sum(), rel=0.02)
         assert frame.figures["psnr"] == pytest.approx(wanted.figures["psnr"], abs=0.5)
@@ -169,32 +172,30 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, cou
         np.testing.assert_array_equal(other, value, err_msg=name)
 
 
-@pytest.mark.parametrize(
-    ("replaced", "file"),
-    [
-        ("clip", "clip/frame_0004.png"),
-        ("background", "plate.png"),
-        ("mask", "mask.png"),
-        ("strokes", "strokes.png"),
-    ],
-)
-def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path, replaced, file) -> None:
-    scene = plume.write(tmp_path / "clip", plume.densities)
-    write_image(tmp_path / "plate.png", np.zeros((56, 40, 3)))
-    write_image(tmp_path / "mask.png", np.ones((56, 40, 3)))
+def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path) -> None:
+    scene = plume.write(tmp_path / "clip", plume.densities[:4])
     behind = np.zeros((56, 40, 3))
+    write_image(tmp_path / "plate.png", behind)
+    write_image(tmp_path / "mask.png", np.ones((56, 40, 3)))
     behind[:4, :4, 2] = 1
     write_image(tmp_path / "strokes.png", behind)
     clip = replace(scene.clip, mask=tmp_path / "mask.png")
     background = Background(image=tmp_path / "plate.png", strokes=tmp_path / "strokes.png")
     scene = replace(scene, clip=clip, background=background)
     cut_off(scene, draft, tmp_path / "out", 2)
-    changed = tmp_path / file
-    picture = read_image(changed)
-    picture[0, 0] = 0.01
-    write_image(changed, picture)
-    with pytest.raises(SequenceError, match=rf"begun differently .* sources\.{replaced}\."):
-        frames_written(scene, draft, tmp_path / "out", resume=True)
+    for replaced, name in (
+        ("clip", "clip/frame_0003.png"),
+        ("background", "plate.png"),
+        ("mask", "mask.png"),
+        ("strokes", "strokes.png"),
+    ):
+        file = tmp_path / name
+        before, picture = file.read_bytes(), read_image(file)
+        picture[0, 0] = 0.01
+        write_image(file, picture)
+        with pytest.raises(SequenceError, match=rf"begun differently .* sources\.{replaced}\."):
+            frames_written(scene, draft, tmp_path / "out", resume=True)
+        file.write_bytes(before)
     assert Sequence.open(tmp_path / "out").frames == (1, 2)
 
 
@@ -202,16 +203,16 @@ def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> No
     """What was estimated is kept with the sequence: the run goes on, and the directory can be moved."""
     heights = np.linspace(-0.3, 1.9, 8)
     filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
-    scene = Scene(clip=filmed.clip)
+    scene = Scene(clip=filmed.clip).with_frames(3, 5)
     settings = replace(draft, resolution=(16, 16, 24))
     whole = frames_written(scene, settings, tmp_path / "whole")
-    cut_off(scene, settings, tmp_path / "out", 3)
-    assert [f.number for f in frames_written(scene, settings, tmp_path / "out", resume=True)] == [4, 5, 6, 7, 8]
+    cut_off(scene, settings, tmp_path / "out", 1)
+    assert [frame.number for frame in frames_written(scene, settings, tmp_path / "out", resume=True)] == [2, 3]
     (tmp_path / "out").rename(tmp_path / "moved")
     sequence = Sequence.open(tmp_path / "moved")
     for frame in whole:
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
-    assert render(sequence.density(4), sequence.scene).shape == (56, 40, 3)
+    assert render(sequence.density(2), sequence.scene).shape == (56, 40, 3)
 
 
 def test_frames_that_are_the_background_are_kept_as_its_picture(plume, draft, tmp_path) -> None:
@@ -237,7 +238,7 @@ def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
 
 def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_path) -> None:
     """From the front alone the blob stands in the middle of the box; with the side where it stood, in every frame."""
-    voxel = two_views.domain.voxel_size
+    two_views, voxel = two_views.with_frames(0, 2), two_views.domain.voxel_size
     truth = [centroid(np.roll(density, 5, axis=1), two_views) for density in plume.densities]
     alone = frames_of(replace(two_views, views=()).with_frames(0, 1), draft)
     both = frames_written(two_views, draft, tmp_path / "out")
@@ -248,14 +249,14 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     assert sequence.scene == completed(two_views)
     for number in sequence.frames:
         assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
-    cut_off(two_views, draft, tmp_path / "again", 3)
+    cut_off(two_views, draft, tmp_path / "again", 2)
     with pytest.raises(SequenceError, match="was begun differently"):
         frames_written(replace(two_views, views=()), draft, tmp_path / "again", resume=True)
     rest = frames_written(two_views, draft, tmp_path / "again", resume=True)
     np.testing.assert_array_equal(rest[-1].density, both[-1].density)
 
 
-def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
+def test_the_papers_loop_takes_all(plume) -> None:
     paper = Settings.preset("draft", "paper")
     starts, density_fit = [], FixedRateDescent(iterations=1)
 
@@ -264,9 +265,9 @@ def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
             starts.append(initial)
             return density_fit.fit(views, depth, initial)
 
-    scene = plume.write(tmp_path / "clip", plume.densities[:4])
-    frames = frames_of(scene, paper, method=replace(compose(paper), density_fit=Watched()))
-    assert [start is None for start in starts] == [True, True, False, False]
+    method = replace(compose(paper), density_fit=Watched())
+    frames = frames_of(plume.scene, paper, method, count=3)
+    assert [start is None for start in starts] == [True, True, False]
     assert all(frame.figures["transport"] == {} for frame in frames)
 
 
@@ -315,10 +316,11 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
 
 def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
     columns, rows = (3 * side for side in tracked.camera.size)
-    tracked = replace(tracked, camera=tracked.camera.resized(columns, rows))
+    camera = replace(tracked.camera.resized(columns, rows), matrices=tracked.camera.matrices[:3])
+    tracked = replace(tracked, camera=camera)
     blocks = np.random.default_rng(0).uniform(0.05, 0.2, (rows // 8, columns // 8 + 4, 3)).astype(np.float32)
     wide = np.kron(blocks, np.ones((8, 8, 1), np.float32))
-    for n, density in enumerate(plume.densities):
+    for n, density in enumerate(plume.densities[:3]):
         plate = np.ascontiguousarray(wide[:rows, 3 * n : 3 * n + columns])
         write_image(tmp_path / f"plate_{n}.exr", plate)
         renderer = scene_renderer(completed(tracked), tracked.camera.at(n), plate)
@@ -339,7 +341,7 @@ def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
     assert Sequence.open(out).complete
 
 
-@pytest.mark.parametrize("detail", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("detail", [0.0, 1.0])
 def test_frames_without_smoke_are_empty(plume, draft, tmp_path, detail) -> None:
     draft, nothing = replace(draft, detail=detail), np.zeros_like(plume.densities[0])
     clip = [nothing, nothing, plume.densities[0], nothing, nothing, plume.densities[1], plume.densities[2]]
@@ -380,7 +382,7 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     method = Method(Idle(), default.depth_prior, default.velocity_estimator, Stubborn())
     with threadpool_limits(2, user_api="blas"):
         before = blas_threads()
-        frames = frames_of(plume.scene, draft, method=method)
+        frames = frames_of(plume.scene, draft, method, count=3)
         assert blas_threads() == before
     assert all(number == {1} for number in threads)
     assert frames[1].figures["transport"] == {}
@@ -400,12 +402,12 @@ def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
             return super().predict(velocity, dt)
 
     with Clip.open(plume.scene.clip) as clip:
-        shot = prepare_shot(clip, plume.scene, draft)
+        shot = prepare_shot(clip.part(0, 3), plume.scene.with_frames(0, 3), draft)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
         run = Reconstruction(shot, method)
         run.write(tmp_path / "out", npz=True, on_frame=lambda frame: given.append(weakref.ref(frame)))
-    assert len(given) == 5
-    assert alive == [0, 0, 0]
+    assert len(given) == 4
+    assert alive == [0, 0]
 
 
 def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
