@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from av.video.reformatter import Interpolation
 
-from smokelift.checks import Finding
 from smokelift.checks.array_types import Doubles
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import StoredPicture
+from smokelift.footage.frame_source import FrameSource, StoredPicture
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 
 FPS = 24.0
@@ -22,15 +21,8 @@ EXACT = int(Interpolation.BICUBIC) | int(Interpolation.ACCURATE_RND) | int(Inter
 """How FFmpeg converts colors without a shift: by default red, green and blue end up 1 to 2 codes of 8 bit too dark."""
 
 
-class Frames:
-    """Frames in memory; a `smokelift.footage.frame_source.FrameSource`."""
-
-    warning: Finding | None = None
-    lens: float | None = None
-    backdrop: float | None = None
-    fps = FPS
-    files: tuple[Path, ...] = ()
-    notes: tuple[Finding, ...] = ()
+class Frames(FrameSource):
+    """Frames in memory."""
 
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)
@@ -39,17 +31,10 @@ class Frames:
         """Return a frame, linear."""
         return StoredPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """None."""
-        return ()
-
-    def close(self) -> None:
-        """Nothing is open."""
-
 
 def filmed(encoded: Picture) -> Clip:
     """Return the clip of sRGB pictures at eight bits."""
-    return Clip(Path("clip"), Frames(eight_bits(encoded)), FPS, None)
+    return Clip(Path("clip"), Frames(eight_bits(encoded)), FPS)
 
 
 def eight_bits(encoded: Picture) -> npt.NDArray[np.uint8]:

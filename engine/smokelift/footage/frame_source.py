@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ import scipy.sparse
 
 import smokelift._core as _core
 from smokelift.checks import Finding
-from smokelift.footage.images import Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
+from smokelift.footage.images import Layer, Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
 """Frames a second if neither the file nor the user gives a rate: that of film."""
@@ -29,9 +29,6 @@ OPAQUE = 0.999
 """Alpha from which on a pixel is opaque: less than a step of 8 bits below 1."""
 
 Edges = npt.NDArray[np.int32]
-Layer = tuple[Picture, Picture | None]
-"""A linear picture (rows, columns, 3) over black, and its alpha (rows, columns), None if it is opaque."""
-
 Sample = TypeVar("Sample")
 Value = TypeVar("Value", np.float32, np.uint16)
 
@@ -118,8 +115,8 @@ class StoredPicture:
             _core.add_weighted(self.values, self.table, weights, *edges, sums)
 
 
-class FrameSource(Protocol):
-    """The frames of one file or sequence, counted from 0 over the whole of it.
+class FrameSource:
+    """The frames of one file or sequence, counted from 0 over the whole of it; a subclass for each kind.
 
     Attributes
     ----------
@@ -138,28 +135,33 @@ class FrameSource(Protocol):
     """
 
     count: int
-    fps: float
-    warning: Finding | None
-    files: tuple[Path, ...]
-    lens: float | None
-    backdrop: float | None
+    fps = DEFAULT_FPS
+    warning: Finding | None = None
+    files: tuple[Path, ...] = ()
+    lens: float | None = None
+    backdrop: float | None = None
 
     @property
     def notes(self) -> tuple[Finding, ...]:
-        """How the pictures are read, where that is unusual."""
-        ...
+        """How the pictures are read, as far as they have been, where that is unusual."""
+        return ()
 
     def read(self, n: int) -> StoredPicture:
-        """Return a frame; raise `DamagedFrameError` if it cannot be decoded."""
-        ...
+        """Return a frame; raise `DamagedFrameError` if it cannot be decoded, ClipError if it differs in size."""
+        raise NotImplementedError
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """Return the frames from one to another, both included, that raise `DamagedFrameError`."""
-        ...
+        damaged = []
+        for n in range(first, last + 1):
+            try:
+                self.read(n)
+            except DamagedFrameError:
+                damaged.append(n)
+        return tuple(damaged)
 
     def close(self) -> None:
-        """Close the file."""
-        ...
+        """Close the file, if one is held open."""
 
 
 def focal_length(value: object) -> float | None:

@@ -15,7 +15,7 @@ from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
     DamagedFrameError,
-    Layer,
+    FrameSource,
     StoredPicture,
     backdrop_of,
     focal_length,
@@ -25,6 +25,7 @@ from smokelift.footage.frame_source import (
 from smokelift.footage.images import (
     READABLE,
     ImageError,
+    Layer,
     PictureKindError,
     Transfer,
     area_average,
@@ -41,8 +42,8 @@ _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
 """How a shell or another program writes the number of a picture."""
 
 
-class ImageSequence:
-    """Numbered pictures on disk, or a single one, as `numbered_pictures` finds them; a `FrameSource`.
+class ImageSequence(FrameSource):
+    """Numbered pictures on disk, or a single one, as `numbered_pictures` finds them.
 
     ``transfer`` is that of `Clip.open`. There is a warning if the user gives no ``fps``.
     """
@@ -51,8 +52,6 @@ class ImageSequence:
         self.files = numbered_pictures(path)
         self._transfer = transfer
         self.count = len(self.files)
-        self.fps = DEFAULT_FPS
-        self.warning = None
         if fps is None and self.count > 1:
             self.warning = Finding("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
         self.lens = _focal_length(self.files[0])
@@ -63,14 +62,12 @@ class ImageSequence:
 
     @property
     def notes(self) -> tuple[Finding, ...]:
-        """How colors are held beside alpha, and that the pictures are reduced, if they are."""
         held = association_notes(self._held)
         if self._size is None or self._size == (small := readable_size(*self._size)):
             return held
         return (*held, Finding("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
-        """Return a picture; raise ClipError if it is damaged or its size is not the first one's."""
         image = shown_before(self._layer(n), self.backdrop)
         height, width = image.shape[:2]
         self._size = self._size or (width, height)
@@ -79,19 +76,6 @@ class ImageSequence:
                 f"{self.files[n]}: is {width} x {height} pixels, the first picture {self._size[0]} x {self._size[1]}"
             )
         return StoredPicture(area_average(image, *readable_size(width, height)))
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return the pictures from one to another that are missing or cannot be read."""
-        damaged = []
-        for n in range(first, last + 1):
-            try:
-                self.read(n)
-            except DamagedFrameError:
-                damaged.append(n)
-        return tuple(damaged)
-
-    def close(self) -> None:
-        """Do nothing: no file is held open."""
 
     def _layer(self, n: int) -> Layer:
         return _readable(lambda file: read_layer(file, self._transfer, self._held), self.files[n])

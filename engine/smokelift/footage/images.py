@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -41,6 +41,8 @@ from smokelift.footage.color import Encoding, hlg_to_linear, pq_to_linear
 from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
+Layer = tuple[Picture, Picture | None]
+"""A linear picture (rows, columns, 3) over black, and its alpha (rows, columns), None if it is opaque."""
 Transfer = Literal["srgb", "linear"]
 Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
@@ -127,36 +129,32 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return encoded
 
 
-def _as_it_is(linear: npt.ArrayLike) -> Picture:
-    return np.array(linear, np.float32)
-
-
 _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
-    "linear": _as_it_is,
+    "linear": partial(np.asarray, dtype=np.float32),
     "srgb": srgb_to_linear,
     "hlg": hlg_to_linear,
     "pq": pq_to_linear,
 }
 
 
-def decode_integers(
-    codes: Codes, encoding: Encoding | None = None, white: float = 1.0, held: Association = "straight"
-) -> Picture:
-    """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black.
+def decode(codes: Codes, encoding: Encoding | None = None, white: float = 1.0, held: Association = "straight") -> Layer:
+    """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black, and their alpha.
 
-    The encoding is sRGB by default. ``white`` is the share of the largest code that means white, and opaque. ``held``
-    says how colors are held beside alpha.
+    The encoding is sRGB by default. ``white`` is the fraction of the largest code that means white, and opaque.
+    ``held`` says how colors are held beside alpha.
     """
-    alpha = decode_alpha(codes, white)
-    if alpha is not None and held == "premultiplied in code values":
-        opacity = alpha[..., None]
-        over_black = codes[..., :3] / np.float32(np.iinfo(codes.dtype).max * white)
+    linear = code_values(np.iinfo(codes.dtype).max, encoding, white)
+    if codes.shape[-1] < 4:
+        return look_up(linear, codes), None
+    encoded = encoded_values(codes, white)
+    alpha = np.minimum(encoded[..., 3], np.float32(1.0))
+    opacity = alpha[..., None]
+    if held == "premultiplied in code values":
+        over_black = encoded[..., :3]
         own = np.minimum(np.divide(over_black, opacity, out=np.zeros_like(over_black), where=opacity > 0), 1)
-        return decoder(encoding)(own) * opacity
-    linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
-    if alpha is not None and held == "straight":
-        linear *= alpha[..., None]
-    return linear
+        return decoder(encoding)(own) * opacity, alpha
+    picture = look_up(linear, codes[..., :3])
+    return picture * opacity if held == "straight" else picture, alpha
 
 
 def decoder(encoding: Encoding | None) -> Callable[[npt.ArrayLike], Picture]:
@@ -166,17 +164,10 @@ def decoder(encoding: Encoding | None) -> Callable[[npt.ArrayLike], Picture]:
 
 @lru_cache
 def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) -> Picture:
-    """Return the linear values of the codes 0 to ``top``, read-only; see `decode_integers`."""
+    """Return the linear values of the codes 0 to ``top``, read-only; see `decode`."""
     values = decoder(encoding)(np.arange(top + 1, dtype=np.float32) / np.float32(top * white))
     values.flags.writeable = False
     return values
-
-
-def decode_alpha(codes: Codes, white: float = 1.0) -> Picture | None:
-    """Return the alpha, from 0 to 1, of integer pixels [row, column, rgb or rgba]; None if they have none."""
-    if codes.shape[-1] < 4:
-        return None
-    return np.minimum(codes[..., 3] / np.float32(np.iinfo(codes.dtype).max * white), np.float32(1.0))
 
 
 def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
@@ -189,16 +180,14 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
     return read_layer(path, transfer)[0]
 
 
-def read_layer(
-    path: str | Path, transfer: Transfer | None = None, held: Association = "straight"
-) -> tuple[Picture, Picture | None]:
+def read_layer(path: str | Path, transfer: Transfer | None = None, held: Association = "straight") -> Layer:
     """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one.
 
     ``held`` says how integer pixels hold their colors beside alpha.
     """
     stored = _read(Path(path))
     if not isinstance(stored, tuple):
-        return decode_integers(stored, transfer, held=held), decode_alpha(stored)
+        return decode(stored, transfer, held=held)
     values, alpha = stored
     return srgb_to_linear(values) if transfer == "srgb" else values, alpha
 
@@ -210,11 +199,11 @@ def read_encoded(path: Path) -> Picture | None:
 
 
 def encoded_values(codes: Codes, white: float = 1.0) -> Picture:
-    """Return integer pixels as the values that they encode, with 1 as white; ``white`` as of `decode_integers`."""
+    """Return integer pixels as the values that they encode, with 1 as white; ``white`` as of `decode`."""
     return np.asarray(codes / np.float32(np.iinfo(codes.dtype).max * white))
 
 
-def _read(path: Path) -> Codes | tuple[Picture, Picture | None]:
+def _read(path: Path) -> Codes | Layer:
     """The integer pixels of a file; the linear ones, and alpha, of an EXR or HDR."""
     suffix = path.suffix.lower()
     if suffix not in READABLE:
@@ -345,7 +334,7 @@ def _silent() -> Iterator[None]:
         os.close(kept)
 
 
-def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
+def _read_exr(path: Path) -> Layer:
     with _silent():
         headers = OpenEXR.File(str(path), header_only=True).parts
     for part in headers:

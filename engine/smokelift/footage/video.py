@@ -25,7 +25,6 @@ import numpy as np
 import numpy.typing as npt
 from av.filter import Graph
 from av.sidedata.sidedata import Type as SideData
-from av.video.plane import VideoPlane
 from av.video.reformatter import ColorRange, Interpolation
 from av.video.stream import VideoStream
 
@@ -36,7 +35,7 @@ from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
     DamagedFrameError,
-    Layer,
+    FrameSource,
     StoredPicture,
     backdrop_of,
     focal_length,
@@ -44,10 +43,10 @@ from smokelift.footage.frame_source import (
     sound_samples,
 )
 from smokelift.footage.images import (
+    Layer,
     Transfer,
     code_values,
-    decode_alpha,
-    decode_integers,
+    decode,
     decoder,
     encoded_values,
     open_container,
@@ -68,8 +67,8 @@ QUANTIZED_FRAMES = 21
 """Frames at a file's start whose quantizers are read: their median needs no more."""
 
 
-class Video:
-    """One video stream with an index of its frames' times; a `FrameSource`.
+class Video(FrameSource):
+    """One video stream with an index of its frames' times.
 
     ``_times`` are the frames' presentation times in the stream's time base, in order; ``_keys`` are those where
     decoding can start; ``_shown`` maps a frame of the clip to an index into ``_times``. A container without such times
@@ -79,9 +78,8 @@ class Video:
 
     def __init__(self, path: Path, transfer: Transfer | None) -> None:
         self._path = path
-        self.files: tuple[Path, ...] = (path,)
+        self.files = (path,)
         self._transfer = transfer
-        self.warning: Finding | None = None
         if not path.exists():
             raise ClipError(f"{path}: no such file")
         if path.is_dir():
@@ -110,11 +108,9 @@ class Video:
 
     @property
     def notes(self) -> tuple[Finding, ...]:
-        """How the pictures are read, as far as they have been, where that is unusual."""
         return (*self._format, Finding("interlaced clip")) if self._interlaced else self._format
 
     def read(self, n: int) -> StoredPicture:
-        """Return a frame; raise `DamagedFrameError` if it cannot be decoded."""
         frame = self._decode(self._shown[n])
         if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
             return StoredPicture(shown_before(self._layer(frame), self.backdrop))
@@ -123,7 +119,6 @@ class Video:
         return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return the frames from one to another, both included, that cannot be decoded."""
         if not self._keys:
             return ()  # only frames that decode were counted
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
@@ -139,7 +134,6 @@ class Video:
         return damaged
 
     def close(self) -> None:
-        """Close the file."""
         self._container.close()
 
     def _start(self) -> None:
@@ -348,11 +342,9 @@ class Video:
 
     def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
         """RGB, and alpha if there is any, in codes, not yet turned upright."""
-        wide = max(component.bits for component in frame.format.components) > 8
-        alpha = _has_alpha(frame)
+        wide, alpha = max(component.bits for component in frame.format.components) > 8, _has_alpha(frame)
         # FFmpeg writes planes three times as fast as pixels, with the same codes
-        planes = not (wide or alpha or frame.format.is_rgb)
-        layout = {False: ("rgb24", "rgba"), True: ("rgb48le", "rgba64le")}[wide][alpha]
+        layout = ("rgb24" if frame.format.is_rgb else "gbrp", "rgba", "rgb48le", "rgba64le")[2 * wide + alpha]
         width, height = self._stream.width, self._stream.height
         if (frame.width, frame.height) != (width, height):
             raise ClipError(
@@ -364,18 +356,12 @@ class Video:
             self._interlaced, shown = True, self._of_one_moment(frame)
         way = _SHRINKING if size[0] < width else _GROWING
         # in this thread: after a fork of a process that has read a video, the converter waits forever for its own
-        converted = shown.reformat(*size, "gbrp" if planes else layout, interpolation=way, threads=1)
-        if planes:
-            green, blue, red = (_lines(plane) for plane in converted.planes)
-            return np.stack((red, green, blue), axis=-1)
-        codes: npt.NDArray[Any] = converted.to_ndarray()
+        codes: npt.NDArray[Any] = shown.reformat(*size, layout, interpolation=way, threads=1).to_ndarray()
         return codes
 
     def _layer(self, frame: av.VideoFrame) -> Layer:
-        codes, white = self._codes(frame), _white(frame)
-        linear = _upright(decode_integers(codes, self._encoding(), white, self._held), frame)
-        alpha = decode_alpha(codes, white)
-        picture = to_bt709(linear, self._stream.codec_context.color_primaries)
+        linear, alpha = decode(self._codes(frame), self._encoding(), _white(frame), self._held)
+        picture = to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
         return picture, None if alpha is None else _upright(alpha, frame)
 
     def _of_one_moment(self, frame: av.VideoFrame) -> av.VideoFrame:
@@ -392,12 +378,6 @@ class Video:
 
 def _has_alpha(frame: av.VideoFrame) -> bool:
     return any(component.is_alpha for component in frame.format.components)
-
-
-def _lines(plane: VideoPlane) -> npt.NDArray[np.uint8]:
-    """The codes (rows, columns) of one channel of 8 bits."""
-    codes = np.frombuffer(memoryview(plane), np.uint8)
-    return codes.reshape(plane.height, plane.line_size)[:, : plane.width]
 
 
 def _white(frame: av.VideoFrame) -> float:

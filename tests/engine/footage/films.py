@@ -9,7 +9,6 @@ import av
 import numpy as np
 import OpenEXR
 
-from smokelift.checks import Finding
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, StoredPicture
@@ -86,11 +85,6 @@ def coded(path: Path, plate: np.ndarray, color: float, codec: str = "libx264", *
 class Filmed(FrameSource):
     """Frames of 8 bit codes in memory, as a video's; ``read_frames`` are the numbers of those that were read."""
 
-    warning = lens = backdrop = None
-    fps = 24.0
-    files: tuple[Path, ...] = ()
-    notes: tuple[Finding, ...] = ()
-
     def __init__(self, codes: np.ndarray) -> None:
         self.codes, self.count = codes, len(codes)
         self.read_frames: list[int] = []
@@ -98,9 +92,6 @@ class Filmed(FrameSource):
     def read(self, n: int) -> StoredPicture:
         self.read_frames.append(n)
         return StoredPicture(self.codes[n], code_values(255))
-
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        return ()
 
 
 PIXELS = {(1, 3): "rgb24", (1, 4): "rgba", (2, 3): "rgb48le", (2, 4): "rgba64le"}
