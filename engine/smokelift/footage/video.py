@@ -16,7 +16,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Iterator
 from fractions import Fraction
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -204,19 +204,19 @@ class Video(FrameSource):
                     keys.append(packet.pts)
         except av.FFmpegError:
             broken = True
-        broken = broken or seen < self._promised()
+        broken = broken or seen < self._stream.frames or self._goes_on_after(sorted(times))
         self._keys = sorted(keys)
         self._rewind()
         return sorted(times) if keys else list(range(len(times))), broken
 
-    def _promised(self) -> int:
-        """Return how many frames the file says it holds, 0 if it says nothing."""
+    def _goes_on_after(self, times: list[int]) -> bool:
+        """Whether a file that gives no count of frames, as Matroska, is longer than its frames by more than two."""
         stream, length = self._stream, self._container.duration
-        if stream.frames or stream.duration is not None or length is None or stream.average_rate is None:
-            return stream.frames
-        # Matroska gives no count, only the length of the whole, to a frame; sound may last longer
-        alone = len(self._container.streams) == 1
-        return int(length * stream.average_rate / av.time_base) - 1 if alone else 0
+        base, rate, silent = stream.time_base, stream.average_rate, len(self._container.streams) == 1
+        if not (times and base and rate and length and silent) or stream.frames or stream.duration is not None:
+            return False  # sound may last longer than the pictures
+        frame = max(1 / rate, base * max((b - a for a, b in pairwise(times)), default=0))
+        return Fraction(length, av.time_base) > times[-1] * base + 3 * frame
 
     def _counted(self) -> list[int]:
         """Return the frames' numbers as times for a container without times; decode all to count them."""

@@ -242,7 +242,10 @@ READ: dict[str, Callable[[Path], Kind]] = {
     "pixels 4:3, turned": partial(anamorphic, shape=Fraction(4, 3), degrees=90),
     "interlaced H.264": interlaced,
     "varying rate, Matroska": varying,
-    "first frame at 5 s": kind("a.mp4", "libx264", "yuv444p", times=[1200 + t for t in EVEN], options={"bf": "0"}),
+    **{
+        f"first frame at 5 s, {name}": kind(name, "libx264", "yuv444p", times=[1200 + t for t in EVEN])
+        for name in ("a.mp4", "a.mkv")
+    },
     "B-frames, open groups": kind(
         "a.mp4", "libx264", "yuv444p", times=EVEN, options={"bf": "3", "g": "4", "x264opts": "open-gop=1"}
     ),
