@@ -2,9 +2,11 @@
 
 import json
 import tomllib
+import zipfile
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,11 +14,139 @@ import tomli_w
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
+from PIL import Image
 
+from smokelift.evaluation.truth import Truth, TruthError
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.output.files import checksum
-from tests.engine.readers import READERS, Reader
+from smokelift.footage.images import ImageError, read_image
+from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
+from smokelift.output.files import INDEX, checksum
+from smokelift.output.images import write_image
+from smokelift.output.index import Index, SequenceError
+from smokelift.output.resume import ResumeState
+from smokelift.output.sequence import Sequence
+from smokelift.render.environment import environment_lights
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Inlet,
+    Medium,
+    Scene,
+    SceneError,
+    View,
+    scene_to_dict,
+)
+from smokelift.transport import face_shapes
+from tests.engine.footage.films import encode
+
+SHAPE = (3, 2, 4)
+"""Voxels of the grids in sound files."""
+
+_CAMERA = Camera.look_at((0.3, -4, 0.2), (0.3, 0.2, 0.2), fov_y_degrees=27, size=(6, 8))
+_SCENE = Scene(
+    clip=ClipSource(Path("clip.mp4"), 24.0, (0, 4)),
+    camera=_CAMERA,
+    domain=Domain((0, 0, 0), (0.6, 0.4, 0.8), SHAPE),
+    closed=("z-",),
+    inlets=(Inlet((0.1, 0.1, 0.1), 0.2),),
+    medium=Medium(extinction=8.0),
+    scattering="single",
+    lights=(DirectionalLight((0.3, 0.5, -0.8), (12.0, 11.0, 10.0)),),
+    background=Background(color=(0, 0, 0)),
+    views=(View(_CAMERA, ClipSource(Path("side_####.png"))),),
+)
+
+
+class Reader(NamedTuple):
+    """The name of a file, what writes a sound one and what reads it, and the one error that reading may raise."""
+
+    name: str
+    write: Callable[[Path], object]
+    read: Callable[[Path], object]
+    error: type[Exception]
+
+
+VOLUME = np.linspace(0, 1, 24, dtype=np.float32).reshape(SHAPE)
+X, Y, Z = FACES = tuple(np.full(shape, 0.25, np.float32) for shape in face_shapes(SHAPE))
+PICTURE = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
+TWIN = {"density": VOLUME, **dict(zip(VELOCITY, FACES, strict=True))}
+
+
+def _write_index(path: Path) -> None:
+    index = Index(
+        scene_to_dict(_SCENE, path.parent), {"density": {"scattering": "single"}}, frames={"1": {"psnr": 40.0}}
+    )
+    index.write(path.parent)
+
+
+def _read_member(path: Path) -> object:
+    """Read it as an archive holds it, whose own checksum would hide what is damaged."""
+    archive = path.with_suffix(".npz")
+    with zipfile.ZipFile(archive, "w") as file:
+        file.write(path, path.name)
+    return read_arrays(archive, {"density": SHAPE})
+
+
+def _write_truth(path: Path) -> None:
+    moments = {name: array[None] for name, array in TWIN.items()}
+    whole = {"closed": np.array(["z-"]), "voxel_size": np.array(0.2), "fps": np.array(24.0)}
+    write_arrays(path, {**moments, "inflow_packed": np.zeros((1, 3), np.uint8), **whole})
+
+
+def _write_by_pillow(path: Path) -> None:
+    Image.fromarray((255 * PICTURE).astype(np.uint8)).save(path)
+
+
+def _write_exr_or_png(path: Path) -> None:
+    write_image(path, PICTURE)
+
+
+def _write_hdr(path: Path) -> None:
+    head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 5 +X 7\n"
+    path.write_bytes(head + bytes(range(1, 1 + 4 * 5 * 7)))
+
+
+READERS = {
+    "scene": Reader("scene.toml", _SCENE.save, Scene.load, SceneError),
+    "index": Reader(INDEX, _write_index, lambda path: Sequence.open(path.parent), SequenceError),
+    "state": Reader(
+        "resume.npz",
+        lambda path: ResumeState(1, VOLUME, (X, Y, Z), {"smooth": VOLUME}).write(path),
+        lambda path: ResumeState.read(path, lambda _: SHAPE),
+        OSError,
+    ),
+    "twin": Reader(
+        "smoke_0001.npz",
+        lambda path: write_arrays(path, TWIN),
+        lambda path: read_arrays(path, {name: array.shape for name, array in TWIN.items()}),
+        OSError,
+    ),
+    "array": Reader("density.npy", lambda path: np.save(path, VOLUME), _read_member, OSError),
+    "truth": Reader("truth.npz", _write_truth, Truth.load, TruthError),
+    "EXR": Reader("plate.exr", _write_exr_or_png, read_image, ImageError),
+    "PNG": Reader("plate.png", _write_exr_or_png, read_image, ImageError),
+    "JPEG": Reader("plate.jpg", _write_by_pillow, read_image, ImageError),
+    "TIFF": Reader("plate.tif", _write_by_pillow, read_image, ImageError),
+    "DPX": Reader(
+        "plate.dpx",
+        lambda path: encode(path, [(65535 * PICTURE).astype(np.uint16)], "dpx", "gbrp10le"),
+        read_image,
+        ImageError,
+    ),
+    "HDR": Reader("plate.hdr", _write_hdr, read_image, ImageError),
+    "environment": Reader(
+        "sky.exr",
+        _write_exr_or_png,
+        lambda path: environment_lights(EnvironmentLight(path), 4),
+        ImageError,
+    ),
+}
+"""Readers by a word for what they read."""
 
 TRIES = settings(
     max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
