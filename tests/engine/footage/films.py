@@ -13,6 +13,7 @@ from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, StoredPicture
 from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 
@@ -52,11 +53,11 @@ def grainy(pictures: Iterable[np.ndarray], noise: float, seed: int = 1) -> Itera
         yield srgb_to_linear(np.clip(codes, 0.0, 1.0))
 
 
-def clip_of(folder: Path, pictures: Iterable[np.ndarray], **how: Any) -> Clip:
+def clip_of(folder: Path, pictures: Iterable[np.ndarray], suffix: str = ".png", **how: Any) -> Clip:
     """Write linear pictures, and open them as `Clip.open` does, by default with 24 frames a second."""
     for n, picture in enumerate(pictures):
-        write_image(folder / f"frame_{n:03d}.png", picture)
-    return Clip.open(folder / "frame_###.png", **{"fps": 24, **how})
+        write_image(folder / f"frame_{n:03d}{suffix}", picture)
+    return Clip.open(folder / f"frame_###{suffix}", **{"fps": 24, **how})
 
 
 def film(
@@ -184,3 +185,8 @@ def plate_of(clip: Clip) -> Plate:
     found = find_backdrop(clip, None, None).plates
     assert isinstance(found, Plate)
     return found
+
+
+def clear_plate(image: np.ndarray, codes: float = 1.0) -> Plate:
+    """Return a background that is known everywhere, before which noise has a deviation in 8 bit codes."""
+    return Plate(np.asarray(image, np.float32), np.ones(image.shape[:2], np.float32), lasting_noise(codes / 255))

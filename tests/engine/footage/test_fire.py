@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from films import clip_of
 
-from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_color, firelight, hot_pixels, without_fire
 from smokelift.footage.plate import known_plate
-from smokelift.output.images import write_image
 
 ROWS, COLUMNS = 48, 64
 FLAME, SMOKE = (1.0, 0.45, 0.08), 0.06
@@ -95,9 +93,7 @@ def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> Non
 
 def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
     """Where it is and nowhere else, in its own color; the smoke that is continued is thinner than that in the fire."""
-    for number in range(3):
-        write_image(tmp_path / f"fire_{number:02d}.exr", picture(number))
-    with Clip.open(tmp_path / "fire_##.exr") as clip:
+    with clip_of(tmp_path, map(picture, range(3)), ".exr") as clip:
         light = firelight(clip, without_fire(clip, known_plate(np.zeros(3), clip)))
         assert fire_color(clip, light) == pytest.approx(FLAME, abs=0.04)
         added = light.frame(1)

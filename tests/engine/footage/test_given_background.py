@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, pan, passing_wall
+from films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, pan, passing_wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
@@ -42,13 +42,12 @@ def test_a_color_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
 def test_frames_of_the_clip_are_its_plate_as_they_were_filmed(tmp_path: Path) -> None:
     """Also where a mask hides a part of them, and outside the frames in use; those that do not exist are refused."""
     filmed = np.random.default_rng(0).uniform(0.1, 0.9, (4, 24, 32, 3)).astype(np.float32)
-    for number, picture in enumerate(filmed):
-        write_image(tmp_path / f"frame_{number}.exr", picture)
+    clip_of(tmp_path, filmed, ".exr").close()
     seen = np.zeros((24, 32), np.float32)
     seen[:, :20] = 1
     write_image(tmp_path / "mask.png", seen)
     for mask in (None, tmp_path / "mask.png"):
-        with Clip.open(tmp_path / "frame_#.exr", frames=(1, 2), mask=mask) as clip:
+        with Clip.open(tmp_path / "frame_###.exr", frames=(1, 2), mask=mask) as clip:
             plates = given_plates(Background(frame=(0, 3)), None, clip)
             assert isinstance(plates, Plate)
             np.testing.assert_allclose(plates.image, filmed[[0, 3]].mean(0), atol=1e-3)

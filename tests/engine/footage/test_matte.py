@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import HEIGHT, WIDTH, film, overlap, wall
+from films import HEIGHT, WIDTH, clear_plate, film, overlap, wall
 from scipy import ndimage
 
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
-from smokelift.footage.plate import Plate, known_plate, without_noise_light
+from smokelift.footage.plate import known_plate, without_noise_light
 
 
 def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
@@ -51,8 +51,7 @@ def test_a_faint_rim_counts_as_far_as_it_is_certain(noise: float) -> None:
     light = np.where(columns < 40, 25 * noise, 6 * noise * np.clip((100 - columns) / 60, 0, 1))
     light[:, 200:220] = 3 * noise
     values = np.random.default_rng(0).normal(40 + light, noise)[..., None].repeat(3, -1)
-    behind = np.full((120, 260, 3), srgb_to_linear(np.float32(40 / 255)), np.float32)
-    plate = Plate(behind, np.ones((120, 260), np.float32), lasting_noise(noise / 255))
+    plate = clear_plate(np.full((120, 260, 3), srgb_to_linear(40 / 255)), noise)
     found = matte(srgb_to_linear((values / 255).astype(np.float32)), plate)
     share = found.share.mean(0)
     assert (found.share[found.mask] == 1).all()
@@ -67,7 +66,7 @@ def test_noise_is_hardly_ever_smoke() -> None:
     random = np.random.default_rng(0)
     alarms = 0
     for size in ((40, 60), (120, 260)):
-        plate = Plate(np.full((*size, 3), 0.2, np.float32), np.ones(size, np.float32), lasting_noise(2 / 255))
+        plate = clear_plate(np.full((*size, 3), 0.2), 2)
         encoded = linear_to_srgb(plate.image)
         for _ in range(50):
             # as neighbors share it
@@ -78,7 +77,7 @@ def test_noise_is_hardly_ever_smoke() -> None:
 
 
 def test_a_speck_has_to_be_stronger_than_a_veil() -> None:
-    plate = Plate(np.full((120, 160, 3), 0.2, np.float32), np.ones((120, 160), np.float32), lasting_noise(1 / 255))
+    plate = clear_plate(np.full((120, 160, 3), 0.2))
     for side, codes, found in ((40, 3, True), (6, 3, False), (6, 30, True)):
         encoded = linear_to_srgb(plate.image)
         encoded[50 : 50 + side, 50 : 50 + side] += np.float32(codes / 255)

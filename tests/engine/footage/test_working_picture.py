@@ -12,15 +12,7 @@ CENTER = np.array([0, 0, 0.8])
 PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
 ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
 TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
-both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
-all_three = pytest.mark.parametrize(
-    "camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED], ids=["perspective", "orthographic", "tilted"]
-)
-
-
-def points(count: int = 50) -> np.ndarray:
-    """World points inside the domain."""
-    return np.random.default_rng(1).uniform(DOMAIN.min, DOMAIN.max, (count, 3))
+both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
 
 
 @both
@@ -33,11 +25,12 @@ def test_a_working_pixel_is_a_voxel_wide_at_the_center(camera: Camera) -> None:
         assert np.linalg.norm(moved - origin) == pytest.approx(1.0, rel=0.05)
 
 
-@all_three
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED])
 def test_points_fall_to_the_same_place_of_both_pictures(camera: Camera) -> None:
     work = working_picture(camera, DOMAIN)
-    full, depth = project_points(camera, points())
-    small, small_depth = project_points(work.camera, points())
+    points = np.random.default_rng(1).uniform(DOMAIN.min, DOMAIN.max, (50, 3))
+    full, depth = project_points(camera, points)
+    small, small_depth = project_points(work.camera, points)
     shrink = np.array(work.camera.size) / (work.width, work.height)
     np.testing.assert_allclose(small, (full - (work.left, work.top)) * shrink, atol=1e-9)
     np.testing.assert_allclose(small_depth, depth)

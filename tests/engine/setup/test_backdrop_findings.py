@@ -11,14 +11,12 @@ from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import blurred
 from smokelift.footage.matte import matte
-from smokelift.footage.noise import lasting_noise
-from smokelift.footage.plate import Plate
 from smokelift.footage.strokes import Strokes
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_findings import backdrop_findings, doubts, first_findings
 from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
-from tests.engine.footage.films import clip_of, coded, film, puff, wall
+from tests.engine.footage.films import clear_plate, clip_of, coded, film, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True
@@ -45,8 +43,7 @@ def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) ->
 def gray(tmp_path):
     """A clip of four frames of a gray wall, and its background."""
     with clip_of(tmp_path, [np.full((24, 32, 3), 0.2, np.float32)] * 4) as clip:
-        plate = Plate(clip.frame(0), np.ones((24, 32), np.float32), lasting_noise(1 / 255))
-        yield Backdrop("picture", clip, plate, frames=4)
+        yield Backdrop("picture", clip, clear_plate(clip.frame(0)), frames=4)
 
 
 def puff_at(row: int) -> np.ndarray:

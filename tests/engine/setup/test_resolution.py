@@ -9,13 +9,11 @@ from scipy import ndimage
 
 from smokelift.checks import Finding
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import EIGHT_BIT_NOISE, EIGHT_BIT_STEP, lasting_noise
-from smokelift.footage.plate import Plate
-from smokelift.output.images import write_image
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
+from tests.engine.footage.films import clear_plate, clip_of
 from tests.engine.setup.shots import shot_of
 
 SIZE = (192, 256)
@@ -38,12 +36,10 @@ def filmed(plume, tmp_path) -> Callable[..., Scene]:
     def film(blur: float, grain: float = 1.2) -> Scene:
         folder = tmp_path / f"{blur}-{grain}"
         folder.mkdir()
-        picture = ndimage.gaussian_filter(textured(grain), blur)
-        for number in range(2):
-            write_image(folder / f"frame_{number}.png", picture)
+        clip_of(folder, [ndimage.gaussian_filter(textured(grain), blur)] * 2).close()
         return replace(
             plume.scene,
-            clip=ClipSource(folder / "frame_#.png", fps=24.0),
+            clip=ClipSource(folder / "frame_###.png", fps=24.0),
             camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=27, size=SIZE),
             domain=Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48)),
         )
@@ -76,13 +72,8 @@ def test_noise_is_no_detail() -> None:
     noise = np.random.default_rng(2).normal(0, 3 / 255, gray.shape)
     clean = gray + ndimage.gaussian_filter(textured(1.2), 8.0)[..., None]
     noisy = srgb_to_linear((linear_to_srgb(clean) + noise).astype(np.float32))
-    clear = np.ones((256, 192), np.float32)
-    lost = [
-        smoke_detail([(picture, Plate(gray, clear, lasting_noise(deviation)))], 256).lost(64)
-        for picture, deviation in ((clean, EIGHT_BIT_STEP), (noisy, np.float32(3 / 255)))
-    ]
-    assert lost[0] < 0.01
-    assert lost[1] < 0.03
+    assert smoke_detail([(clean, clear_plate(gray))], 256).lost(64) < 0.01
+    assert smoke_detail([(noisy, clear_plate(gray, 3))], 256).lost(64) < 0.03
 
 
 def test_a_given_resolution_wins(filmed) -> None:
@@ -135,8 +126,8 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     """A wave of six pixels is there with voxels of three and not with four; what there is not is not lost."""
     columns = np.indices((192, 192))[1]
     wave = (0.3 + 0.1 * np.cos(2 * np.pi * (columns + 0.5) / 6)).astype(np.float32)
-    plate = Plate(np.zeros((192, 192, 3), np.float32), np.ones((192, 192), np.float32), EIGHT_BIT_NOISE)
-    detail = smoke_detail([(np.repeat(wave[..., None], 3, -1), plate)], 192)
+    picture = np.repeat(wave[..., None], 3, -1)
+    detail = smoke_detail([(picture, clear_plate(0 * picture))], 192)
     assert detail.lost(192 // 3 + 4) < 0.05
     assert detail.lost(192 // 4) > 0.1
     assert detail.lost(192) == detail.lost(192 // 4, 192 // 4) == 0
