@@ -111,13 +111,9 @@ class Clip:
         """
         try:
             given = path if isinstance(path, ClipSource) else ClipSource(file_path(path, "path"))
-            given = ClipSource(
-                given.path,
-                fps=given.fps if fps is None else fps,
-                frames=given.frames if frames is None else frames,
-                transfer=given.transfer if transfer is None else transfer,
-                mask=given.mask if mask is None else file_path(mask, "mask"),
-            )
+            file = None if mask is None else file_path(mask, "mask")
+            changes: dict[str, Any] = {"fps": fps, "frames": frames, "transfer": transfer, "mask": file}
+            given = replace(given, **{name: value for name, value in changes.items() if value is not None})
         except SceneError as error:
             raise ClipError(str(error) if error.key == "path" else f"{path}: {error}") from error
         source: FrameSource

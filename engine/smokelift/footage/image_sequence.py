@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 from PIL import Image
 
@@ -24,18 +22,18 @@ from smokelift.footage.frame_source import (
 )
 from smokelift.footage.images import (
     READABLE,
+    Codes,
     ImageError,
     Layer,
     PictureKindError,
     Transfer,
     area_average,
     decoder,
-    read_encoded,
-    read_layer,
+    encoded_values,
+    linear_layer,
+    read_stored,
     readable_size,
 )
-
-Value = TypeVar("Value")
 
 _EXIF, _FOCAL_LENGTH_IN_35MM_FILM = 0x8769, 0xA405
 _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
@@ -56,8 +54,9 @@ class ImageSequence(FrameSource):
             self.warning = Finding("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
         self.lens = _focal_length(self.files[0])
         self._size: tuple[int, int] | None = None
-        encoded = sound_samples(self.count, lambda n: _readable(read_encoded, self.files[n]))
-        self._held = association((each for each in encoded if each is not None), decoder(transfer))
+        samples = sound_samples(self.count, self._stored)
+        codes = (stored for stored in samples if not isinstance(stored, tuple) and stored.shape[-1] == 4)
+        self._held = association(map(encoded_values, codes), decoder(transfer))
         self.backdrop = backdrop_of(sound_samples(self.count, self._layer))
 
     @property
@@ -77,18 +76,16 @@ class ImageSequence(FrameSource):
             )
         return StoredPicture(area_average(image, *readable_size(width, height)))
 
+    def _stored(self, n: int) -> Codes | Layer:
+        try:
+            return read_stored(self.files[n])
+        except PictureKindError as error:
+            raise ClipError(str(error)) from error
+        except ImageError as error:
+            raise DamagedFrameError(str(error)) from error
+
     def _layer(self, n: int) -> Layer:
-        return _readable(lambda file: read_layer(file, self._transfer, self._held), self.files[n])
-
-
-def _readable(read: Callable[[Path], Value], file: Path) -> Value:
-    """What is read of a picture; DamagedFrameError if that fails, ClipError if its kind is not read."""
-    try:
-        return read(file)
-    except PictureKindError as error:
-        raise ClipError(str(error)) from error
-    except ImageError as error:
-        raise DamagedFrameError(str(error)) from error
+        return linear_layer(self._stored(n), self._transfer, self._held)
 
 
 def is_pattern(path: Path) -> bool:

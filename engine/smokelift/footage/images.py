@@ -185,17 +185,15 @@ def read_layer(path: str | Path, transfer: Transfer | None = None, held: Associa
 
     ``held`` says how integer pixels hold their colors beside alpha.
     """
-    stored = _read(Path(path))
+    return linear_layer(read_stored(Path(path)), transfer, held)
+
+
+def linear_layer(stored: Codes | Layer, transfer: Transfer | None, held: Association) -> Layer:
+    """Return what `read_stored` has read as `read_layer` does."""
     if not isinstance(stored, tuple):
         return decode(stored, transfer, held=held)
     values, alpha = stored
     return srgb_to_linear(values) if transfer == "srgb" else values, alpha
-
-
-def read_encoded(path: Path) -> Picture | None:
-    """Return the encoded values (height, width, rgba), with 1 as white, of a file with integer pixels and alpha."""
-    stored = _read(path)
-    return None if isinstance(stored, tuple) or stored.shape[-1] < 4 else encoded_values(stored)
 
 
 def encoded_values(codes: Codes, white: float = 1.0) -> Picture:
@@ -203,8 +201,8 @@ def encoded_values(codes: Codes, white: float = 1.0) -> Picture:
     return np.asarray(codes / np.float32(np.iinfo(codes.dtype).max * white))
 
 
-def _read(path: Path) -> Codes | Layer:
-    """The integer pixels of a file; the linear ones, and alpha, of an EXR or HDR."""
+def read_stored(path: Path) -> Codes | Layer:
+    """Read the integer pixels of a file; the linear ones, and alpha, of an EXR or HDR. Errors are `read_image`'s."""
     suffix = path.suffix.lower()
     if suffix not in READABLE:
         raise PictureKindError(f"{path}: is none of {', '.join(READABLE)}; save it as one of these")
