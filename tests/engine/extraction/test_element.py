@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smokelift.extraction import Element, extract_element, usual_source
+from smokelift.extraction import Element, extract_element
 from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise
 from smokelift.footage.plate import Plate, noise_at
@@ -301,32 +301,3 @@ def test_no_brightness_makes_nan(picture: float, plate: float) -> None:
         assert all(np.isfinite(each).all() for each in fields_of(found))
         for each in (found.transmittance, found.weight):
             assert 0 <= each.min() <= each.max() <= 1
-
-
-# the source
-
-
-@pytest.mark.parametrize("brightness", [0.3, 1.0, 4.0])
-@pytest.mark.parametrize("plate", PLATES.values(), ids=PLATES.keys())
-def test_the_source_is_found_from_the_pictures(brightness: float, plate: Picture) -> None:
-    """Within 20 %, of dim smoke as of smoke that is brighter than its plate; its color within 7 %, by a sky's hue."""
-    clear = TRANSMITTANCE[..., None]
-    picture = filmed((1 - clear) * RADIANCE * brightness + clear * plate)
-    found = usual_source([(picture, plate_of(plate)), (picture[::-1], plate_of(plate[::-1]))], (48, 36))
-    np.testing.assert_allclose(found / found.mean(), SOURCE / SOURCE.mean(), rtol=0.07)
-    assert found.mean() == pytest.approx(SOURCE.mean() * brightness, rel=0.2)
-
-
-def test_smoke_counts_by_its_weight_in_the_source() -> None:
-    """A clip's clear frames say nothing of the light."""
-    plate = PLATES["wall"]
-    smoky, empty = (filmed(clear_picture(plate)), plate_of(plate)), (filmed(plate), plate_of(plate))
-    alone = usual_source([smoky], (48, 36))
-    np.testing.assert_allclose(usual_source([smoky, empty, empty], (48, 36)), alone, rtol=0.05)
-
-
-def test_nothing_seen_has_a_source() -> None:
-    dark = plate_of(np.zeros((ROWS, COLUMNS, 3), np.float32))
-    found = usual_source([(dark.image, dark)], (24, 18))
-    assert np.isfinite(found).all()
-    assert (found > 0).all()

@@ -10,7 +10,7 @@ from smokelift.footage.images import Picture, area_average, blurred
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
 
-COLUMNS, ROWS, FRAMES = 192, 160, 8
+COLUMNS, ROWS, FRAMES = 192, 160, 5
 SOURCE = np.array([0.6, 0.58, 0.55], np.float32)
 X, Y = np.meshgrid(np.arange(COLUMNS), np.arange(ROWS))
 

@@ -1,11 +1,23 @@
 """The usual source radiance: what the smoke of a few pictures sends, over its opacity, in the color of its light."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from smokelift.extraction import tells_source, usual_source
+from smokelift.footage.images import Picture
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
+from tests.engine.extraction.test_element import (
+    PLATES,
+    RADIANCE,
+    SOURCE,
+    TRANSMITTANCE,
+    clear_picture,
+    filmed,
+    plate_of,
+)
 
 SIZE = (96, 80)
 """Columns and rows of the pictures."""
@@ -58,9 +70,11 @@ def test_errors_of_a_plate_are_not_taken_for_the_source() -> None:
     assert usual_source(pictures, (48, 40)) == pytest.approx(np.full(3, 0.6), rel=0.25)
 
 
-def test_without_smoke_the_source_can_be_divided_by() -> None:
-    wall = plate(0.04)
-    source = usual_source([(before(wall, (0.6, 0.6, 0.6), 0.0, 40), wall)], (48, 40))
+@pytest.mark.parametrize("light", [0.0, 1.0])
+def test_without_smoke_the_source_can_be_divided_by(light) -> None:
+    """Before a wall and before black, where nothing is seen."""
+    wall = replace(plate(0.04), image=light * plate(0.04).image)
+    source = usual_source([(before(wall, (0.6, 0.6, 0.6), 0.0, 40) if light else wall.image, wall)], (48, 40))
     assert np.isfinite(source).all() and (source > 0).all()
 
 
@@ -68,3 +82,22 @@ def test_a_smooth_plate_does_not_tell_the_source() -> None:
     sky = np.linspace((0.2, 0.3, 0.6), (0.4, 0.5, 0.7), SIZE[1]).astype("f4")
     assert not tells_source(np.repeat(sky[:, None], SIZE[0], axis=1))
     assert tells_source(plate(0.04).image)
+
+
+@pytest.mark.parametrize("brightness", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize("image", PLATES.values(), ids=PLATES.keys())
+def test_the_source_is_found_from_the_pictures(brightness: float, image: Picture) -> None:
+    """Within 20 %, of dim smoke as of smoke that is brighter than its plate; its color within 7 %, by a sky's hue."""
+    clear = TRANSMITTANCE[..., None]
+    picture = filmed((1 - clear) * RADIANCE * brightness + clear * image)
+    found = usual_source([(picture, plate_of(image)), (picture[::-1], plate_of(image[::-1]))], (48, 36))
+    np.testing.assert_allclose(found / found.mean(), SOURCE / SOURCE.mean(), rtol=0.07)
+    assert found.mean() == pytest.approx(SOURCE.mean() * brightness, rel=0.2)
+
+
+def test_smoke_counts_by_its_weight_in_the_source() -> None:
+    """A clip's clear frames say nothing of the light."""
+    image = PLATES["wall"]
+    smoky, empty = (filmed(clear_picture(image)), plate_of(image)), (filmed(image), plate_of(image))
+    alone = usual_source([smoky], (48, 36))
+    np.testing.assert_allclose(usual_source([smoky, empty, empty], (48, 36)), alone, rtol=0.05)

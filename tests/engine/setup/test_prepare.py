@@ -64,6 +64,12 @@ def estimated(passing, draft) -> Shot:
     return shot_of(bare(passing), draft)
 
 
+@pytest.fixture(scope="module")
+def given(plume, draft) -> Shot:
+    """The shot of a complete scene."""
+    return shot_of(plume.scene, draft)
+
+
 def test_the_focal_length_that_the_file_gives_is_taken(passing, draft) -> None:
     with Clip.open(passing.clip) as clip:
         clip.lens = 26.0
@@ -73,11 +79,12 @@ def test_the_focal_length_that_the_file_gives_is_taken(passing, draft) -> None:
     assert [remark.figures["lens"] for remark in shot.findings if "lens" in remark.figures] == [26]
 
 
-def test_a_complete_scene_stays_as_it_is(plume, draft) -> None:
-    shot = shot_of(plume.scene, draft)
-    assert [found.kind for found in shot.findings if found.value is None] == []
-    assert shot.scene == completed(plume.scene)
-    assert shot.optics.scattering == "single"
+def test_a_complete_scene_stays_as_it_is_and_its_settings_prepare_it_again(given, plume) -> None:
+    assert [found.kind for found in given.findings if found.value is None] == []
+    assert given.scene == completed(plume.scene)
+    assert given.optics.scattering == "single"
+    assert given.alone
+    assert shot_of(plume.scene, given.settings).settings == given.settings
 
 
 def test_all_that_a_clip_lacks_is_noted(estimated) -> None:
@@ -103,8 +110,14 @@ def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
     assert (high >= (columns.max(), rows.max())).all()
 
 
+@pytest.fixture(scope="module")
+def level(plume, draft) -> Shot:
+    """The shot of a camera that is assumed to look straight ahead."""
+    return shot_of(replace(plume.scene, camera=None, domain=None), draft)
+
+
 @pytest.mark.parametrize("tilt", [0, 17, -25])
-def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) -> None:
+def test_a_box_is_found_for_a_camera_that_is_given(plume, level, draft, tilt: float) -> None:
     """It stands upright before the camera, around what the picture shows, wherever the camera looks."""
     camera = plume.scene.camera
     turn = Rotation.from_euler("xz", [90 + tilt, 30], degrees=True).as_matrix()
@@ -112,7 +125,6 @@ def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) ->
     matrix[:3, :3], matrix[:3, 3] = turn, (3, 4, 5)
     given = replace(camera, matrix=as_matrix(matrix), cx=0.6 * camera.cx)
     shot = shot_of(replace(plume.scene, camera=given, domain=None), draft)
-    level = shot_of(replace(plume.scene, camera=None, domain=None), draft)
     assert shot.scene.camera == given.resized(*shot.clip.size)
     assert Finding("assumed scale", {"height": 2.0}, source="assumed") in shot.findings
     low, high = (np.array(corner) for corner in (shot.scene.domain.min, shot.scene.domain.max))
@@ -199,12 +211,10 @@ def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None
             shot_of(replace(tracked, clip=clip, background=background), draft)
 
 
-@pytest.mark.parametrize("given", [True, False])
-def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, given) -> None:
+@pytest.mark.parametrize("complete", [True, False])
+def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, complete) -> None:
     scene = plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 3)
-    if given:
-        scene = replace(scene, lights=(), medium=None)
-    shot = shot_of(scene if given else bare(scene), draft)
+    shot = shot_of(replace(scene, lights=(), medium=None) if complete else bare(scene), draft)
     assert np.isfinite(shot.scene.lights[0].irradiance).all()
 
 
@@ -219,12 +229,6 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     assert (coarsening, choice.value, choice.source) == (0, 0, "given")
 
 
-def test_a_prepared_shots_settings_prepare_it_again(plume, draft) -> None:
-    first = shot_of(plume.scene, draft)
-    assert first.alone
-    assert shot_of(plume.scene, first.settings).settings == first.settings
-
-
 @pytest.mark.parametrize(
     ("cue", "source"),
     [("box", "assumed"), ("floor contact", "measured"), ("inlets", "measured"), ("distance", "given")],
@@ -235,22 +239,21 @@ def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, source: str) -> None:
     assert (found.value == UNDETERMINED, found.source) == (cue == "box", source)
 
 
-def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
-    found = shot_of(plume.scene, draft)
-    assert found.place is not None and found.findings[-1] == found_place(found.place)
+def test_a_shot_knows_where_its_smoke_stands(given, plume, draft: Settings) -> None:
+    assert given.place is not None and given.findings[-1] == found_place(given.place)
     inlet = replace(plume.scene, inlets=(Inlet(plume.scene.domain.centre, 0.2),))
     marked = shot_of(inlet, draft)
     assert marked.place is not None and marked.place.cue == "inlets"
-    given = replace(draft, distance=middle(plume.scene) + 0.1)
-    known = shot_of(plume.scene, given)
+    measured = replace(draft, distance=middle(plume.scene) + 0.1)
+    known = shot_of(plume.scene, measured)
     assert known.place is not None and known.place.cue == "distance"
     assert known.place.depth == pytest.approx(0.1, abs=0.05)
     assert known.findings[-1].source == "given"
     blank = shot_of(plume.scene, Settings.preset(draft.quality, method="paper"))
     assert blank.place is None
     assert "axis depth" not in [choice.about for choice in blank.findings]
-    with pytest.raises(ValueError, match="The inlets say where the smoke stands; leave the distance out"):
-        shot_of(inlet, given)
+    with pytest.raises(ValueError, match="leave the distance out"):
+        shot_of(inlet, measured)
 
 
 def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings) -> None:
@@ -267,16 +270,16 @@ def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings)
         np.testing.assert_allclose(sizes[1], 2 * sizes[0], rtol=0.05)
 
 
-def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(plume, draft: Settings) -> None:
+def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(given, plume, draft: Settings) -> None:
     matrices = np.repeat(np.array(plume.scene.camera.matrix)[None], len(plume.densities), axis=0)
     turning, travelling = (
         replace(plume.scene, camera=replace(plume.scene.camera, matrices=tuple(map(as_matrix, poses))))
         for poses in (matrices, matrices + np.linspace(0, 0.1, len(matrices))[:, None, None] * PLACE_ALONG_X)
     )
-    still, found = (shot_of(scene, draft).place for scene in (plume.scene, turning))
+    still, found = given.place, shot_of(turning, draft).place
     assert still is not None and found is not None
     assert found.cue == still.cue
     assert found.depth == pytest.approx(still.depth, abs=0.1 * still.deviation)
     assert shot_of(travelling, draft).place is None
-    given = shot_of(travelling, replace(draft, distance=middle(plume.scene) + 0.1)).place
-    assert given is not None and given.depth == pytest.approx(0.1)
+    known = shot_of(travelling, replace(draft, distance=middle(plume.scene) + 0.1)).place
+    assert known is not None and known.depth == pytest.approx(0.1)
