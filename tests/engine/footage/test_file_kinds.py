@@ -55,20 +55,8 @@ def eight_bits(values: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A file, and what is known of it.
-
-    Attributes
-    ----------
-    path
-        The clip's.
-    shown : (frames, rows, columns, 3)
-        sRGB values as they have to be read.
-    slack
-        Mean difference that the encoding may leave, in steps of 8 bits.
-    said
-        The kinds of its findings.
-    fps
-        Frames a second.
+    """A file; the sRGB values (frames, rows, columns, 3) that it has to be read as, up to a mean difference in steps of
+    8 bits that the encoding may leave; the kinds of its findings, and its frames a second.
     """
 
     path: Path

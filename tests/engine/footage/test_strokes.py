@@ -146,25 +146,21 @@ def test_an_alpha_channel_leaves_nothing_to_strokes(tmp_path: Path) -> None:
     assert (found.source, found.strokes) == ("alpha", None)
 
 
-@pytest.mark.parametrize(
-    ("color", "rows", "width", "said"),
-    [
-        (None, 0, 1, "no such file"),
-        (GREEN, 0, 1, "nothing is painted"),
-        ((255, 255, 255, 255), 20, 1, "no stroke is green"),
-        (GREEN, 20, 2, f"{2 * WIDTH} x {HEIGHT} pixels, another shape"),
-        (GREEN, HEIGHT, 1, "nothing that is not smoke"),
-    ],
-)
-def test_strokes_that_say_nothing_are_refused(
-    tmp_path: Path, color: tuple[int, ...] | None, rows: int, width: int, said: str
-) -> None:
-    clip, file = film(tmp_path, GRADIENT, puff, 1.0), tmp_path / "strokes.png"
-    if color is not None:
-        with Image.open(strokes(tmp_path, (rows > ROWS, color))) as picture:
+def test_strokes_that_say_nothing_are_refused(tmp_path: Path) -> None:
+    clip, white = film(tmp_path, GRADIENT, puff, 1.0), (255, 255, 255, 255)
+    for lines, width, said in (
+        ((), 1, "nothing is painted"),
+        (((ROWS < 20, white),), 1, "no stroke is green"),
+        (((ROWS < 20, white),), 2, f"{2 * WIDTH} x {HEIGHT} pixels, another shape"),
+        (((ROWS >= 0, GREEN),), 1, "nothing that is not smoke"),
+    ):
+        file = strokes(tmp_path, *lines)
+        with Image.open(file) as picture:
             picture.resize((WIDTH * width, HEIGHT)).save(file)
-    with pytest.raises((ClipError, ImageError), match=said):
-        find_backdrop(clip, None, Background(strokes=file))
+        with pytest.raises(ClipError, match=said):
+            find_backdrop(clip, None, Background(strokes=file))
+    with pytest.raises(ImageError, match="no such file"):
+        find_backdrop(clip, None, Background(strokes=tmp_path / "no.png"))
 
 
 def test_strokes_need_a_plate_that_stays(tmp_path: Path) -> None:
