@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
-from smokelift.density.upright_plane import reach_along, view_frame
+from smokelift.density.upright_plane import reach_along, read_linearly, view_frame
 from smokelift.scene import Camera, Domain
 
 
@@ -59,11 +58,7 @@ class SmokeAxis:
 
     def read(self, values: Doubles, heights: Doubles, laterals: Doubles | float) -> Doubles:
         """Depths, spreads or widths (n, m) at some heights and lateral places."""
-        if not self.several:
-            return np.asarray(np.interp(heights, self.heights, values[:, 0]))
-        rows = np.interp(heights, self.heights, np.arange(len(self.heights)))
-        columns = np.interp(laterals, self.laterals, np.arange(len(self.laterals)))
-        return np.asarray(ndimage.map_coordinates(values, np.broadcast_arrays(rows, columns), order=1, mode="nearest"))
+        return read_linearly(values, self.heights, self.laterals, heights, laterals)
 
 
 def depth_at(distance: float, camera: Camera, domain: Domain) -> float:

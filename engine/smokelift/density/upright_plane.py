@@ -106,6 +106,22 @@ class PlanePicture:
         squares = (self.laterals - self.mean[:, None]) ** 2
         return np.asarray(np.sqrt((self.values * squares).sum(1) / np.maximum(self.total, TINY)))
 
+    def read(self, heights: NDArray[np.float64], laterals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at some heights and lateral places, linear between the pixels; the nearest beyond the ends."""
+        return read_linearly(self.values, self.heights, self.laterals, heights, laterals)
+
+
+def read_linearly(
+    values: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    columns: NDArray[np.float64],
+    heights: NDArray[np.float64],
+    laterals: NDArray[np.float64] | float,
+) -> NDArray[np.float64]:
+    """Values (n, m) at heights (n,) and laterals (m,), read linearly at others; the nearest beyond the ends."""
+    at = np.interp(heights, rows, np.arange(len(rows))), np.interp(laterals, columns, np.arange(len(columns)))
+    return np.asarray(ndimage.map_coordinates(values, np.broadcast_arrays(*at), order=1, mode="nearest"))
+
 
 def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
     """Put a picture (rows, columns) on the upright plane, ``per_voxel`` rows to a voxel and one column."""

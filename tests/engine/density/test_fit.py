@@ -147,7 +147,7 @@ def test_balls_fill_a_silhouette() -> None:
 
 
 def test_smoke_through_floor_and_ceiling_makes_no_spikes() -> None:
-    """A column as high as the box is not much denser at its ends, where rays cross few of its voxels."""
+    """A column of density 1 as high as the box is not much denser at its ends, where rays cross few of its voxels."""
     scene = Scene(
         camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113)),
         domain=Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48)),
@@ -157,7 +157,7 @@ def test_smoke_through_floor_and_ceiling_makes_no_spikes() -> None:
     x = (np.arange(32) + 0.5) / 16 - 1
     column = np.repeat(((x[:, None] ** 2 + x**2) < 0.06)[..., None], 48, 2).astype(np.float32)
     layers = reconstruct_density(render(column, scene), scene).density.max((0, 1))
-    assert layers.max() < 1.7 * np.median(layers)
+    assert layers.max() < 1.4
 
 
 # fit and descent

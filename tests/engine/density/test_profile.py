@@ -9,6 +9,7 @@ from smokelift.density.profile import DepthProfile
 from smokelift.scene import Camera, Domain
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
+BOX = Domain((-1.5, -1.5, 0), (1.5, 1.5, 3), (48, 48, 48))
 HEIGHTS = np.linspace(-1.2, 1.2, 20)
 
 
@@ -74,3 +75,23 @@ def test_smoke_stands_where_its_ray_is_inside_the_domain(depth: float) -> None:
     assert np.count_nonzero((share > 0) & (share < 0.6)) <= 4
     np.testing.assert_allclose(mean[3:-3], depth, atol=0.01)
     assert max(mean[0], mean[-1]) < depth - 0.2
+
+
+@pytest.mark.parametrize("turn", [0, 30, 45, 90, 120])
+def test_smoke_is_as_deep_as_it_is_wide_across_its_own_axis(turn: float) -> None:
+    """A bar of smoke is as deep as it is thick, however it lies in the picture and however long it is."""
+    matrix = Camera.look_at((0, -6, 1.5), (0, 0, 1.5), fov_y_degrees=35, size=(96, 96)).matrix
+    camera = Camera("orthographic", matrix, (96, 96), 32.0, 32.0, 48.0, 48.0)
+    rows, columns = np.indices((96, 96)) - 47.5
+    along, across = (
+        np.cos(np.radians(turn - each)) * columns - np.sin(np.radians(turn - each)) * rows for each in (0, 90)
+    )
+    depths = []
+    for width in (10, 20):
+        amount = ((np.abs(along) < 42) & (np.abs(across) < width / 2)).astype(np.float32)
+        everywhere = np.ones(BOX.resolution, np.bool_)
+        profile = DepthProfile(amount, camera, BOX, SmokeAxis.upright())
+        row = profile.at(project_voxels(camera, BOX).places(everywhere), everywhere).reshape(BOX.resolution)[24, :, 24]
+        depth = BOX.offsets(BOX.centre)[1].ravel()
+        depths.append(np.sqrt(row @ depth**2 / row.sum()))
+    np.testing.assert_allclose(depths, np.array([10, 20]) / 32 / np.sqrt(12), rtol=0.15)

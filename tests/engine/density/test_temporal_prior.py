@@ -114,4 +114,4 @@ def test_detail_is_born_where_nothing_is_carried(moment, detailed) -> None:
     assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
     np.testing.assert_allclose(little.density.sum(), detailed.prior[hull].sum(), rtol=0.02)
     some = detailed.start(moment.true, kept=0.6)
-    assert some.figures["share"] == pytest.approx(0.6 * detailed.start(moment.true).figures["share"], rel=0.02)
+    assert some.figures["share"] == pytest.approx(0.6 * detailed.start(moment.true).figures["share"], rel=0.03)
