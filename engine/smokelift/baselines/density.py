@@ -96,7 +96,7 @@ class FixedRateDescent:
         density, residuals, done = self._descend(renderers, pictures, start, depth.density)
         judged = replace(
             views,
-            views=tuple(replace(view, counted=every) for view, every in zip(views.views, everywhere, strict=True)),
+            views=tuple(replace(view, influenced=every) for view, every in zip(views.views, everywhere, strict=True)),
             hull=np.ones_like(views.hull),
         )
         return FittedDensity(without_traces(density, judged.where), judged.hull, fit_figures(judged, residuals, done))

@@ -45,8 +45,8 @@ BOX_COUNT = 2.0
 """Number of boxes that `BOX_DEVIATION` counts as. The box at hand counts as one more, by how far off its middle the
 smoke is across the picture (docs/experiments/density-axis.md)."""
 
-MIN_CONTACT_SHARE = 0.6
-"""Smallest share of the frames that show a floor contact where there is one."""
+MIN_CONTACT_FRAMES = 0.6
+"""Smallest fraction of the frames that show a floor contact where there is one."""
 
 CONTACT_TRUST = 0.7
 """Weight of the depth that a floor contact shows, at most: smoke that begins above the floor shows one as well."""
@@ -65,7 +65,7 @@ WIDENING = 0.15
 """Growth of a column's radius per meter of height: it takes in air (docs/experiments/density-axis.md)."""
 
 INERTIA = 0.5
-"""Weight of a column's place in the row below, in shares of its smoke: other smoke in a row may not be its own
+"""Weight of a column's place in the row below, in units of its smoke: other smoke in a row may not be its own
 (docs/experiments/density-axis.md)."""
 
 
@@ -185,7 +185,7 @@ def _floor_column(
     if camera.type != "perspective" or abs(height[2]) < 1 or distance <= 0 or above <= 0:
         return []
     found = [contact for picture in pictures if (contact := _floor_contact(picture, distance, above, camera, domain))]
-    if len(found) < MIN_CONTACT_SHARE * frames:
+    if len(found) < MIN_CONTACT_FRAMES * frames:
         return []
     contact, width, begins = np.median(found, 0)
     far = FAR_BEHIND * BOX_DEVIATION * reach_along(domain, along)
@@ -239,8 +239,8 @@ def _inlet_columns(
     for row, smoke in enumerate(mean.values if len(inlets) > 1 else ()):
         begun = mean.heights[row] >= begins
         for _ in range(3):
-            share = _likelihood(mean.laterals, now[begun, None], widths[begun, row, None])
-            part = smoke / max(smoke.sum(), 1e-30) * share / np.maximum(share.sum(0), 1e-30)
+            likelihood = _likelihood(mean.laterals, now[begun, None], widths[begun, row, None])
+            part = smoke / max(smoke.sum(), 1e-30) * likelihood / np.maximum(likelihood.sum(0), 1e-30)
             now[begun] = (INERTIA * now[begun] + part @ mean.laterals) / (INERTIA + part.sum(1))
         middles[:, row] = now
     drifts = middles - (places @ lateral)[:, None]
@@ -258,15 +258,15 @@ def _axis(columns: Sequence[_Column], known: Sequence[Doubles], mean: PlanePictu
         return SmokeAxis.by_height(mean.heights, known[0])
     # below all columns there is the lowest one
     heights = np.maximum(mean.heights, min(column.begins for column in columns))[:, None]
-    shares = np.array(
+    weights = np.array(
         [
             _likelihood(mean.laterals, column.middles[:, None], column.widths[:, None]) * (heights >= column.begins)
             for column in columns
         ]
     )
-    shares /= shares.sum(0)
+    weights /= weights.sum(0)
     depths, squares, widths = (
-        np.sum(shares * np.array(values)[..., None], 0)
+        np.sum(weights * np.array(values)[..., None], 0)
         for values in (known, np.square(known), [column.widths for column in columns])
     )
     return SmokeAxis(mean.heights, mean.laterals, depths, np.sqrt(np.maximum(squares - depths**2, 0)), widths)

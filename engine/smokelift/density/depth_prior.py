@@ -30,8 +30,8 @@ from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
 
 MIN_SHAPE = 0.05
-"""Smallest share of its peak that a profile has inside the hull of several views, as another view may see smoke there
-(docs/experiments/density-profile.md)."""
+"""Smallest fraction of its peak that a profile has inside the hull of several views, as another view may see smoke
+there (docs/experiments/density-profile.md)."""
 
 
 class Detail(Protocol):
@@ -62,7 +62,7 @@ class DepthEstimate:
     density : (nx, ny, nz) float32
         A plausible density that shows about what the pictures do; where a fit starts.
     inside : tuple of (rows, columns)
-        For each view, the share of every ray's smoke that lies inside the domain.
+        For each view, the fraction of every ray's smoke that lies inside the domain.
     views
         The pictures to fit, against the voxels where the prior expects smoke.
     detail
@@ -112,7 +112,7 @@ class RoundDepth:
                 views = replace(views, views=(self._in_its_shadows(view, views, scatter),))
         profiles = self._profiles(views, scatter)
         expected = replace(views, hull=_expected(views, profiles))
-        return DepthEstimate(_density(expected, profiles), tuple(p.share_inside() for p in profiles), expected)
+        return DepthEstimate(_density(expected, profiles), tuple(p.fraction_inside() for p in profiles), expected)
 
     def _in_its_shadows(self, view: ObservedView, views: ViewSet, scatter: Scatter | None) -> ObservedView:
         """The only view, with the optical depth that explains it in the shadows of the smoke that it shows."""

@@ -5,7 +5,7 @@ smoke in proportion to what is there, so what the start assumes of depth survive
 direction is that of the limited-memory BFGS method (Nocedal 1980), among the voxels that no bound holds (two-metric
 projection: Bertsekas 1982). What neighbors share counts more in it than what each wants for itself: thick smoke that
 is too dark is so over a whole lobe, and voxels that mend it one by one become spikes. No voxel changes by more than a
-share of itself. The step is shortened until the objective falls sufficiently (Armijo), so the objective never rises.
+fraction of itself. The step is shortened until the objective falls sufficiently (Armijo), so the objective never rises.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ FLOOR = 0.1
 The voxel may fill, but more slowly than others (docs/experiments/density-descent.md)."""
 
 SUFFICIENT = 1e-4
-"""Share of the linear prediction that a step has to gain (Armijo's constant)."""
+"""Fraction of the linear prediction that a step has to gain (Armijo's constant)."""
 
 MAX_CHANGE = 0.25
-"""Largest change of a voxel in one step, as a share of what it holds and the floor. Without it density spikes grow
+"""Largest change of a voxel in one step, as a fraction of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
 MAX_FIRST_STEP = 1e30
@@ -68,8 +68,8 @@ def descend(
 
     The result takes the start's place, which is zero outside the hull.
     It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
-    share of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to it.
-    ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects none.
+    fraction of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to
+    it. ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects none.
     """
     where = hull if expected is None else hull.above_zero(density, expected)
     current = where.take(density)

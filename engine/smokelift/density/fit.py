@@ -42,8 +42,8 @@ SINGLE_VOXELS = 1.0
 """Standard deviation (voxels) of the Gaussian that keeps of a change what lobes share
 (docs/experiments/density-descent.md)."""
 
-FAINT_SHARE = 1e-3
-"""Share of the largest density below which smoke is too faint for a ratio to say how it changes."""
+FAINT = 1e-3
+"""Fraction of the largest density below which smoke is too faint for a ratio to say how it changes."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class DensitySettings:
     descent_iterations
         Steps of descent at most.
     tolerance
-        Share of the objective that an iteration has to gain for another to follow.
+        Fraction of the objective that an iteration has to gain for another to follow.
     patience
         Steps of descent in a row without that gain which end it (density-descent.md).
     bound
@@ -91,7 +91,7 @@ class FittedDensity:
         ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``relative_error``, the
         root mean square of the input's differences over that of what changes there, with what its element leaves out
         as no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_share``, the hull's
-        share of the voxels.
+        fraction of the voxels.
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
     steady : (nx, ny, nz) float32, optional
@@ -268,7 +268,7 @@ def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_
     """The density before a descent with the descent's changes, but for those of single voxels, in its place."""
     box = box_around(hull, 1)
     below, changed = (_core.blur(each[box], SINGLE_VOXELS, BLUR_REACH) for each in (before, after))
-    faint = FAINT_SHARE * float(below.max())
+    faint = FAINT * float(below.max())
     changed += faint
     below += max(faint, MIN_DENSITY)
     changed /= below
@@ -280,14 +280,14 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
     """Figures of a fit (see `FittedDensity`) from its residuals (rows, columns, channels), at least one per view."""
     losses, decibels = [], {}
     for number, (view, residual) in enumerate(zip(views.views, residuals, strict=False)):
-        left = residual[view.counted][:, :3]
+        left = residual[view.influenced][:, :3]
         losses.append(float(np.sum(np.square(left, dtype=np.float64))))
         if left.size:
             name = f"psnr_view_{number}" if number else "psnr"
             decibels[name] = float(-10 * np.log10(max(losses[-1] / left.size, 1e-12)))
     front = views.views[0]
-    change = float(np.sum(np.square((front.image - front.background)[front.counted][:, :3], dtype=np.float64)))
-    left_out = float(np.sum(np.square(front.left_out[front.counted], dtype=np.float64)))
+    change = float(np.sum(np.square((front.image - front.background)[front.influenced][:, :3], dtype=np.float64)))
+    left_out = float(np.sum(np.square(front.left_out[front.influenced], dtype=np.float64)))
     return {
         "loss": sum(losses),
         **decibels,

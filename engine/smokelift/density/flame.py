@@ -25,10 +25,10 @@ ITERATIONS = 30
 """Largest number of iterations of the scaling."""
 
 EXACT = 0.01
-"""Difference from the picture, as a share of its sum, at which the scaling stops."""
+"""Difference from the picture, as a fraction of its sum, at which the scaling stops."""
 
-MIN_PROFILE_SHARE = 1e-3
-"""Share of a profile's peak below which nothing burns."""
+MIN_PROFILE = 1e-3
+"""Fraction of a profile's peak below which nothing burns."""
 
 SMOOTHING = 2.0
 """Standard deviation (voxels) of the average of the smoke's middle along its height."""
@@ -49,7 +49,7 @@ def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, 
     places = projection.places(hull)
     flame[hull] = places.read(light) * profile.at(places, hull)
     burning = flame > 0
-    burning[hull] &= profile.shape(places, hull) > MIN_PROFILE_SHARE
+    burning[hull] &= profile.shape(places, hull) > MIN_PROFILE
     pixels = ndimage.binary_dilation(light > 0, iterations=2)
     matrix = emission_matrix(density, camera, optics, pixels, burning)
     flame = np.where(burning, flame, np.float32(0))
@@ -85,7 +85,7 @@ def _middle(density: Volume, camera: Camera, domain: Domain) -> SmokeAxis:
         ndimage.gaussian_filter1d(np.bincount(level - lowest, weights), SMOOTHING)
         for weights in (amount, amount * (offset @ along))
     )
-    known = total > MIN_PROFILE_SHARE * total.max()
+    known = total > MIN_PROFILE * total.max()
     depths = moment[known] / total[known]
     heights = (np.flatnonzero(known) + lowest) * h
     return SmokeAxis.by_height(heights, depths)

@@ -101,7 +101,7 @@ def common_hull(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projec
 
 
 def agreement(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> float:
-    """Share of all pictures' smoke pixels behind which voxels lie that no picture rules out; 1 without any smoke.
+    """Fraction of all pictures' smoke pixels behind which voxels lie that no picture rules out; 1 without any smoke.
 
     It is about 1 for true views of the same smoke, and small for cameras that are not where they are said to be.
     """

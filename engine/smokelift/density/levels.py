@@ -39,7 +39,7 @@ their middles, have a variance of 11/12 of a finer voxel. So a blur there is 5 %
 class Level:
     """A pyramid level: a moment on one grid, whose voxels are each `coarseness` voxels of the finest grid wide.
 
-    `inside` has a picture (rows, columns) for each view: the share of every ray's smoke that lies inside the domain.
+    `inside` has a picture (rows, columns) for each view: the fraction of every ray's smoke that lies inside the domain.
     """
 
     views: ViewSet
@@ -54,7 +54,9 @@ class Level:
             return None
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))
         seen = tuple(view.coarser(optics) for view in views.views)
-        inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
+        inside = tuple(
+            area_average(fraction, *view.camera.size) for fraction, view in zip(self.inside, seen, strict=True)
+        )
         return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
     def terms(self) -> list[Term]:

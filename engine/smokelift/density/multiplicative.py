@@ -36,7 +36,7 @@ STEP_RANGE = (0.4, 2.5)
 """Largest change of a ray's smoke in one iteration."""
 
 RELAXATION = 0.9
-"""Share of a step that is made."""
+"""Fraction of a step that is made."""
 
 MAX_UNEVENNESS = 2.0
 """Largest factor by which the plausible smoke scales a step. With `RELAXATION`, less than twice the step that a ray
@@ -45,8 +45,8 @@ asks for is made, so that the iterations converge."""
 DAMPING = 0.4
 """Relative sensitivity at which the step is halved."""
 
-MIN_DENSITY_SHARE = 1e-6
-"""Share of the plausible smoke's largest density below which voxels count alike."""
+MIN_PLAUSIBLE = 1e-6
+"""Fraction of the plausible smoke's largest density below which voxels count alike."""
 
 MIN_SCALE = 1e-30
 """Lower bound of that density, so that empty smoke is no division by zero."""
@@ -67,7 +67,7 @@ def fit_multiplicative(
 
     In each iteration every term has a turn; where a pixel counts less, its steps are shorter. Voxels of the start
     (nx, ny, nz) at zero stay there, and it is zero outside ``where``. It stops when an iteration lowers the objective
-    by less than the share ``tolerance``. The steps lead towards the distribution of ``plausible`` (nx, ny, nz) along
+    by less than the fraction ``tolerance``. The steps lead towards the distribution of ``plausible`` (nx, ny, nz) along
     the rays; without it they are even.
     """
     smoke, enough = _Smoke(density, where, plausible), noise_floor(terms)
@@ -121,7 +121,7 @@ class _Smoke:
         self._plausible = None if plausible is None else where.take(plausible)
         self._faint = 0.0
         if self._plausible is not None:
-            self._faint = MIN_DENSITY_SHARE * float(self._plausible.max(initial=MIN_SCALE))
+            self._faint = MIN_PLAUSIBLE * float(self._plausible.max(initial=MIN_SCALE))
 
     def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
         """The volume (nx, ny, nz) with these values, times a factor; valid until the next call."""
@@ -129,7 +129,7 @@ class _Smoke:
         return self._volume
 
     def scaled(self, values: Array, term: Term, logarithm: NDArray[np.float32], out: Array) -> Array:
-        """Values scaled along a term's rays by a share (`RELAXATION`) of the logarithmic steps (rows, columns)."""
+        """Values scaled along a term's rays by a fraction (`RELAXATION`) of the logarithmic steps (rows, columns)."""
         rays = term.view.projection.map
         self._where.scale_along_rays(
             rays, values, self._plausible, logarithm, self._faint, MAX_UNEVENNESS, RELAXATION, out
@@ -168,7 +168,7 @@ def _sensitivity(smoke: _Smoke, values: Array, term: Term, image: Image, transmi
 
 def _log_scale(image: Image, transmittance: Image, sensitivity: NDArray[np.float32], term: Term) -> NDArray[np.float32]:
     """Logarithm (rows, columns) of each pixel's scale, damped and smoothed."""
-    background, share = term.view.background, np.sqrt(term.weight)
+    background, weight = term.view.background, np.sqrt(term.weight)
     clear = transmittance[..., None]
     solid = np.maximum(1 - clear, 1e-6)
     source = (image - clear * background) / solid
@@ -178,9 +178,9 @@ def _log_scale(image: Image, transmittance: Image, sensitivity: NDArray[np.float
     explained = _over_channels(term.view.image - source, contrast) / (power + 1e-20)
     wanted = np.clip(explained, 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
-    gain = share * sensitivity**2 / (sensitivity**2 + DAMPING**2)
+    gain = weight * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
-    trust = share * power / (power + floor)
+    trust = weight * power / (power + floor)
     # one pixel's blur keeps neighboring rays from fighting over the voxels that they share
     return np.asarray(
         ndimage.gaussian_filter(trust * step, 0.7) / (ndimage.gaussian_filter(trust, 0.7) + 1e-3), np.float32

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from smokelift.density.observation import ObservedView, ViewSet
 from smokelift.render import Image, Renderer, Volume
 
-MIN_SHARE = 0.3
-"""Lower bound of the share of a ray's smoke that is taken to lie inside the domain. With less, smoke that the prior
+MIN_INSIDE = 0.3
+"""Lower bound of the fraction of a ray's smoke that is taken to lie inside the domain. With less, smoke that the prior
 puts outside is missing in the picture; with more, density spikes grow at floor and ceiling
 (docs/experiments/density-profile.md)."""
 
@@ -55,12 +55,12 @@ class Term:
 def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
     """A term for every camera's picture.
 
-    Smoke outside the domain is not modelled. So a pixel counts by ``inside`` (one picture a view), the share of its
+    Smoke outside the domain is not modelled. So a pixel counts by ``inside`` (one picture a view), the fraction of its
     ray's smoke that lies inside: the few voxels that the ray crosses on its way out need not hold all that it shows.
     """
     return [
-        Term(view, renderer, view.counted * np.maximum(share, MIN_SHARE) ** 2)
-        for view, renderer, share in zip(views.views, views.renderers, inside, strict=True)
+        Term(view, renderer, view.influenced * np.maximum(fraction, MIN_INSIDE) ** 2)
+        for view, renderer, fraction in zip(views.views, views.renderers, inside, strict=True)
     ]
 
 

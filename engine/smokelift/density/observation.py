@@ -33,7 +33,7 @@ SHADED, PATCH = 4.0, 3
 (docs/experiments/thick-smoke.md)."""
 
 SHADED_DEPTH = 1.5
-"""Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
+"""Optical depth over ln(1 + r), r the fraction of the contrast that a pixel shows: right where that is about a half
 (docs/experiments/thick-smoke.md)."""
 
 MAX_DARK_RADIANCE = 0.1
@@ -150,19 +150,19 @@ class ObservedView:
     Attributes
     ----------
     image : (rows, columns, channels)
-        The observation's, faded to the background by `share`: so a faint rim ends where its light does, not at the
-        mask.
+        The observation's, faded to the background by `probability`: so a faint rim ends where its light does, not at
+        the mask.
     background : (rows, columns, channels)
         What the picture shows without smoke.
     noise : (rows, columns, channels)
         Standard deviation of the observation's noise.
-    share : (rows, columns)
+    probability : (rows, columns)
         Probability that a pixel shows smoke; what is left of the observation and of its noise.
     mask : (rows, columns) bool
-        Pixels that may show smoke: where `share` is not 0.
+        Pixels that may show smoke: where `probability` is not 0.
     optical_depth : (rows, columns)
         Of smoke without shadows that explains the picture; 0 outside the mask.
-    counted : (rows, columns) bool
+    influenced : (rows, columns) bool
         Pixels that the voxels behind the mask can change: a fit is judged by them.
     left_out : (rows, columns, 3)
         What an element leaves of the observation since it is neither smoke nor its plate; faded like the image.
@@ -173,11 +173,11 @@ class ObservedView:
     background: Image
     noise: Image
     left_out: Image
-    share: NDArray[np.float32]
+    probability: NDArray[np.float32]
     mask: NDArray[np.bool_]
     optical_depth: NDArray[np.float32]
     projection: Projection
-    counted: NDArray[np.bool_]
+    influenced: NDArray[np.bool_]
 
     @staticmethod
     def of(observation: Observation, optics: Optics) -> ObservedView:
@@ -185,24 +185,26 @@ class ObservedView:
         camera, plate = observation.camera, observation.plate
         if plate is BLACK:
             plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
-        share = matte(observation.image, plate).share
+        probability = matte(observation.image, plate).share
         if observation.element is None:
             image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
             left_out = np.zeros_like(image)
         else:
             image, background, noise = _over_one_color(observation.element, observation.image, plate)
             left_out = observation.image - observation.element.over(plate.image)
-            share = np.maximum(share, _faint_smoke(observation.element, share == 0))
-        image = background + share[..., None] * (image - background)
-        return _against_grid(camera, image, background, noise, share[..., None] * left_out, share, optics)
+            probability = np.maximum(probability, _faint_smoke(observation.element, probability == 0))
+        image = background + probability[..., None] * (image - background)
+        return _against_grid(camera, image, background, noise, probability[..., None] * left_out, probability, optics)
 
     def coarser(self, optics: Optics) -> ObservedView:
         """Set the observation against another grid, at one pixel per voxel if its own pixels are finer."""
         shrink = max(1.0, voxel_width(self.camera, optics.domain))
         columns, rows = (max(1, round(side / shrink)) for side in self.camera.size)
-        pictures = (self.image, self.background, self.noise, self.left_out, self.share)
-        image, background, noise, left_out, share = (area_average(each, columns, rows) for each in pictures)
-        return _against_grid(self.camera.resized(columns, rows), image, background, noise, left_out, share, optics)
+        pictures = (self.image, self.background, self.noise, self.left_out, self.probability)
+        image, background, noise, left_out, probability = (area_average(each, columns, rows) for each in pictures)
+        return _against_grid(
+            self.camera.resized(columns, rows), image, background, noise, left_out, probability, optics
+        )
 
     def before_darkness(self, source: NDArray[np.float64]) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
@@ -211,7 +213,7 @@ class ObservedView:
     @cached_property
     def noise_left(self) -> Image:
         """Standard deviation (rows, columns, channels) of the noise of `image`, faded like it."""
-        return self.share[..., None] * self.noise
+        return self.probability[..., None] * self.noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,15 +268,15 @@ def _against_grid(
     background: Image,
     noise: Image,
     left_out: Image,
-    share: NDArray[np.float32],
+    probability: NDArray[np.float32],
     optics: Optics,
 ) -> ObservedView:
     """A picture, faded to its background, against the grid of `optics.domain`."""
-    mask = share > 0
+    mask = probability > 0
     projection = project_voxels(camera, optics.domain)
     depth = apparent_optical_depth(image, background, noise, mask, optics)
-    counted = reached(mask, projection)
-    return ObservedView(camera, image, background, noise, left_out, share, mask, depth, projection, counted)
+    influenced = reached(mask, projection)
+    return ObservedView(camera, image, background, noise, left_out, probability, mask, depth, projection, influenced)
 
 
 def apparent_optical_depth(

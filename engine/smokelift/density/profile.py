@@ -39,22 +39,22 @@ SCALE = float(np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS)))
 """A in standard deviations."""
 
 PROFILE_CUT = 0.03
-"""Share of the profile's peak from which smoke is expected. The profile is 1.4 times as wide there as assumed, which is
-how far its width may be wrong (docs/experiments/every-view.md)."""
+"""Fraction of the profile's peak from which smoke is expected. The profile is 1.4 times as wide there as assumed, which
+is how far its width may be wrong (docs/experiments/every-view.md)."""
 
 ROOM = 0.5
 """Distance, in A, of a ray's middle from the ends of its way through the domain: about four fifths of the profile
 are inside then (docs/experiments/density-profile.md)."""
 
 SILHOUETTE = 0.05
-"""Share of the smoke's usual amount from which a pixel belongs to the silhouette
+"""Fraction of the smoke's usual amount from which a pixel belongs to the silhouette
 (docs/experiments/density-profile.md)."""
 
 THINNEST = 0.7
 """Half the thickness of a silhouette's thinnest parts, in pixels (docs/experiments/density-profile.md)."""
 
-DISTANCE_SHARE = 0.5
-"""Share of the distance between columns behind one another that lasts on the way up, as they draw together
+LASTING_DISTANCE = 0.5
+"""Fraction of the distance between columns behind one another that lasts on the way up, as they draw together
 (docs/experiments/density-axis.md)."""
 
 DIRECTIONS = 8
@@ -190,8 +190,8 @@ class DepthProfile:
         """The profile g at the marked voxels (n,), 1 in the middle."""
         return self._shape_and_width(places, voxels)[0]
 
-    def share_inside(self) -> NDArray[np.float32]:
-        """Share (rows, columns) of the profile that each pixel's ray meets inside the domain."""
+    def fraction_inside(self) -> NDArray[np.float32]:
+        """Fraction (rows, columns) of the profile that each pixel's ray meets inside the domain."""
         ends = [(end - self._middle) / self._width for end in (self._rays.near, self._rays.far)]
         low, high = (np.sign(end) * gammainc(1 / FLATNESS, np.abs(end) ** FLATNESS) for end in ends)
         return np.where(self._rays.missed, 0, (high - low) / 2).astype(np.float32)
@@ -224,6 +224,6 @@ def _deviation(
         across = axis.read(axis.widths, height, lateral)
     else:
         across = MIN_SPREAD_BIAS * smallest_spread(amount, camera, domain).read(height, lateral)
-    behind = DISTANCE_SHARE * axis.read(axis.spreads, height, lateral)
+    behind = LASTING_DISTANCE * axis.read(axis.spreads, height, lateral)
     spread = np.sqrt(across * ball_spread(amount, camera, domain) + behind**2)
     return np.asarray(np.maximum(spread, domain.voxel_size))

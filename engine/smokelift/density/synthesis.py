@@ -37,7 +37,7 @@ SMOOTH_ITERATIONS = 4
 """Multiplicative iterations for the smooth answer, whose amounts the sides' rows keep."""
 
 SMOOTH_TOLERANCE = 0.02
-"""Share of the objective that each has to gain for another to follow, as in the fit."""
+"""Fraction of the objective that each has to gain for another to follow, as in the fit."""
 
 LOW_PASS = 0.75
 """Standard deviation of a blur, in those of the smoke's width. Noisy and carried smoke, blurred, is the smooth answer,
@@ -60,8 +60,8 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 """Its multiples, less their whole parts, are spread evenly however many there are."""
 
 FRESH_STEP, CARRIED_STEP = 0.6, 0.5
-"""Shares of a step towards a picture that are made, for fresh smoke and for carried smoke: more of the second flickers
-(docs/experiments/every-view.md)."""
+"""Fractions of a step towards a picture that are made, for fresh smoke and for carried smoke: more of the second
+flickers (docs/experiments/every-view.md)."""
 
 GAIN = (np.pi / 2) ** 0.5
 """Root of one over the mean sine of all angles, so that a picture whose detail has no direction keeps its energy when
@@ -74,7 +74,7 @@ ROW_RANGE = (0.5, 2.0)
 """Largest factor that gives a row of a picture the smooth answer's amount."""
 
 OUTLINE = 0.02
-"""Share of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades. So it stays
+"""Fraction of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades. So it stays
 within the outline that the smooth answer has from there."""
 
 OUTLINE_BLUR = 3.0
@@ -205,17 +205,17 @@ class EveryView:
         table, hull = self.texture.turntable, self.level.views.hull
         box = list(box_around(hull, 0))
         box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
-        kept = tuple(box)
-        first, second = (span.start for span in kept if span != slice(None))
-        smooth = _Upright.of(table.upright(self.smooth[kept]))
+        part = tuple(box)
+        first, second = (span.start for span in part if span != slice(None))
+        smooth = _Upright.of(table.upright(self.smooth[part]))
         relaxation = self.strength * (FRESH_STEP if fresh else CARRIED_STEP)
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
-                turned = _Upright.of(table.upright(density[kept]))
+                turned = _Upright.of(table.upright(density[part]))
                 for _ in range(AZIMUTHS):
                     self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
-                np.copyto(changed[kept], table.lying(turned.values), where=hull[kept])
+                np.copyto(changed[part], table.lying(turned.values), where=hull[part])
                 density = take_turns(cameras, changed, 1, self.level.views.where)
         return density
 

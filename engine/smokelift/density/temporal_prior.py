@@ -5,8 +5,8 @@ shadows already. Smoke with made-up detail is a simulation that the clip guides:
 with the flow, and the smooth answer of the new picture says how much smoke is where. A velocity of its own, which
 nothing guides along the rays, makes more lobes there and worse jets (docs/experiments/wander.md).
 
-Of smoke without such detail a constant share is blended in. Of an error that no picture corrects, in thick smoke, in
-shadow or of the velocity, a frame takes over no more than that share, so none grows from frame to frame
+Of smoke without such detail a constant fraction is blended in. Of an error that no picture corrects, in thick smoke, in
+shadow or of the velocity, a frame takes over no more than that fraction, so none grows from frame to frame
 (docs/experiments/temporal-prior.md).
 """
 
@@ -26,6 +26,9 @@ from smokelift.render import Volume
 LARGEST_GAIN = 3.0
 """Bound of the factor that makes carried smoke denser. Where that is too little the prior's smoke is added: there smoke
 has entered, or has moved otherwise than was predicted."""
+
+RETENTION = 0.97
+"""Fraction of the detail that a frame takes over: the rest is renewed (docs/experiments/every-view.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +72,13 @@ class GuidedSimulation:
     With B the blur over lobes (`Detail.low_pass`), the smooth answer rho_s, the prior's density rho_p and the carried
     one rho_c:
 
-        start = kept rho_c b / B(rho_c) + (1 - kept b / B(rho_s)) rho_p,   b = min(B(rho_s), LARGEST_GAIN B(rho_c))
+        start = r rho_c b / B(rho_c) + (1 - r b / B(rho_s)) rho_p,   b = min(B(rho_s), LARGEST_GAIN B(rho_c))
 
-    Detail is born where nothing is carried, at inlets above all, and moves on from there. `kept` is the share of the
-    detail that a frame takes over: the rest is renewed (docs/experiments/every-view.md). Where the depth prior makes
-    nothing up, the start is (1 - share) rho_p + share rho_c.
+    Detail is born where nothing is carried, at inlets above all, and moves on from there; r is `RETENTION`.
+    Where the depth prior makes nothing up, the start is (1 - blend) rho_p + blend rho_c.
     """
 
-    share: float
-    kept: float = 0.97
+    blend: float
 
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume) -> Start:
         """The carried density with the smooth answer's low pass; see `TemporalPrior`.
@@ -86,10 +87,10 @@ class GuidedSimulation:
         """
         prior, detail, where = depth.density, depth.detail, views.where
         if detail is None or not where.count:
-            share = self.share if prior.any() and carried.any() else 0.0
-            return Start(np.float32(1 - share) * prior + np.float32(share) * carried, {"share": share})
+            blend = self.blend if prior.any() and carried.any() else 0.0
+            return Start(np.float32(1 - blend) * prior + np.float32(blend) * carried, {"share": blend})
         wanted, have = (detail.low_pass(values) for values in (detail.smooth, carried))
-        reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
+        reached = np.float32(RETENTION) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         taken_over = where.take(carried) * reached / np.maximum(have, TINY)
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * where.take(prior)
         total = float(started.sum(dtype=np.float64))

@@ -34,7 +34,7 @@ SIZE = 7
 """Pixels along a patch's side. With one scale for each factor of two, patches of neighboring scales overlap widely."""
 
 UNIT = 0.05
-"""tau0, in shares of the clip's 95th percentile of optical depth."""
+"""tau0, in units of the clip's 95th percentile of optical depth."""
 
 BASES = 8
 """Orthonormal bases of directions that take turns: more than a frame has rounds on one scale."""
@@ -44,16 +44,16 @@ KNOTS = 512
 
 MAX_PATCHES = 8192
 """Largest number of patches for the quantiles of a scale: the rank of each is then known to 0.6 % at most, the standard
-error of a share of one half."""
+error of a fraction of one half."""
 
 PASSES = 2
 """Times that a picture's patches are moved, each time along another basis."""
 
-MIN_DEPTH_SHARE = 0.01
-"""Share of a picture's largest optical depth below which a patch, or a row, shows no smoke."""
+MIN_DEPTH = 0.01
+"""Fraction of a picture's largest optical depth below which a patch, or a row, shows no smoke."""
 
 DENSE = 0.05
-"""Share of a picture's largest optical depth from which the spread of v is measured."""
+"""Fraction of a picture's largest optical depth from which the spread of v is measured."""
 
 MAX_LOG_DEPTH = 12.0
 """Bound of v: far beyond any picture, within what an exponential holds."""
@@ -71,7 +71,8 @@ VOXEL = 12**-0.5
 """Standard deviation (voxels) of smoke that fills one voxel: the smallest, even for a thread of single pixels."""
 
 BODY = 0.1
-"""Share of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not count."""
+"""Fraction of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not
+count."""
 
 NEIGHBORS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
 """Blurs of the octaves whose energy a band holds, over the band's own: others add less than a hundredth."""
@@ -285,10 +286,10 @@ class Exemplar:
 def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Patches (n, count) about pixels near smoke, with their height; and their places (2, count) in v, padded."""
     linear, reach = np.expm1(v), SIZE // 2
-    least = MIN_DEPTH_SHARE * linear.max()
+    least = MIN_DEPTH * linear.max()
     at = np.array(np.nonzero(ndimage.maximum_filter(linear, SIZE) > least), np.int32)
     amounts = linear.sum(0)
-    there = np.flatnonzero(amounts > MIN_DEPTH_SHARE * amounts.max())
+    there = np.flatnonzero(amounts > MIN_DEPTH * amounts.max())
     place = height * (at[1] - there[0]) / max(there[-1] - there[0], 1)
     pixels = _core.unfold(np.pad(v, reach), at + reach, SIZE)
     return np.concatenate([pixels, place[None].astype(np.float32)]), at + reach

@@ -99,5 +99,5 @@ class Wander:
     @property
     def _deviations(self) -> Doubles:
         """`deviation` by octave."""
-        shares = DEVIATION * np.array(self.roughness[: len(NODES)])
-        return shares * (LARGEST_DEVIATION / max(float(np.linalg.norm(shares)), LARGEST_DEVIATION))
+        deviations = DEVIATION * np.array(self.roughness[: len(NODES)])
+        return deviations * (LARGEST_DEVIATION / max(float(np.linalg.norm(deviations)), LARGEST_DEVIATION))

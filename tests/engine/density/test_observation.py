@@ -55,11 +55,11 @@ def test_an_element_is_seen_over_one_color_and_a_white(plume, small, wall) -> No
     sent = (opacity * element.radiance.mean(-1)).sum() / opacity.sum()
     known = np.hypot(1, element.deviation / USEFUL_DEVIATION)
     np.testing.assert_allclose(white * known, WHITE * max(sent, color.mean()), rtol=1e-4)
-    inside = view.share == 1
+    inside = view.probability == 1
     assert inside.sum() > 50
     np.testing.assert_allclose(view.image[inside][:, :3], element.over(color)[inside], rtol=1e-5)
     np.testing.assert_allclose(view.image[inside][:, 3], (white * element.transmittance)[inside], rtol=1e-5)
-    np.testing.assert_allclose(view.image[view.share == 0], view.background[view.share == 0], rtol=1e-6)
+    np.testing.assert_allclose(view.image[view.probability == 0], view.background[view.probability == 0], rtol=1e-6)
     noise = noise_at(picture, plate)
     np.testing.assert_allclose(view.noise, np.dstack([noise, noise.mean(-1)]), rtol=1e-6)
 
@@ -86,7 +86,7 @@ def test_an_element_starts_with_its_optical_depth(plume, small, wall) -> None:
     optics = scene_optics(completed(small))
     view = ObservedView.of(Observation(small.camera, element.over(wall), plate, element), optics)
     true = -np.log(element.transmittance)
-    thick = (view.share == 1) & (true > 0.5)
+    thick = (view.probability == 1) & (true > 0.5)
     assert thick.sum() > 30
     ratio = view.optical_depth[thick] / true[thick]
     np.testing.assert_allclose(ratio, 1, atol=0.02)
@@ -103,7 +103,9 @@ def test_what_an_element_leaves_out_is_a_fault_of_the_fit(plume, small, wall) ->
     for picture in (element.over(wall), element.over(wall) + hand):
         seen = ViewSet.of([Observation(small.camera, picture, plate, element)], optics)
         (view,) = seen.views
-        np.testing.assert_allclose(view.left_out, view.share[..., None] * (picture - element.over(wall)), atol=1e-6)
+        np.testing.assert_allclose(
+            view.left_out, view.probability[..., None] * (picture - element.over(wall)), atol=1e-6
+        )
         figures = GradientFit(QUICK).fit(seen, RoundDepth().estimate(seen), None).figures
         errors.append(figures["relative_error"])
     assert errors[0] < 0.1

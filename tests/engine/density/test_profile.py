@@ -68,11 +68,11 @@ def test_smoke_stands_where_its_ray_is_inside_the_domain(depth: float) -> None:
     everywhere = np.ones(DOMAIN.resolution, np.bool_)
     places = project_voxels(camera, DOMAIN).places(everywhere)
     profile = DepthProfile(amount, camera, DOMAIN, SmokeAxis.upright(depth))
-    share, shape = profile.share_inside()[:, 30], profile.shape(places, everywhere).reshape(DOMAIN.resolution)
+    fraction, shape = profile.fraction_inside()[:, 30], profile.shape(places, everywhere).reshape(DOMAIN.resolution)
     behind = (np.arange(32) + 0.5) / 16 - 1
     mean = behind @ shape[16] / shape[16].sum(0)
     # but where the ray cuts the edge of the domain, along less than the smoke's depth
-    assert np.count_nonzero((share > 0) & (share < 0.6)) <= 4
+    assert np.count_nonzero((fraction > 0) & (fraction < 0.6)) <= 4
     np.testing.assert_allclose(mean[3:-3], depth, atol=0.01)
     assert max(mean[0], mean[-1]) < depth - 0.2
 

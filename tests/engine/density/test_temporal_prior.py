@@ -10,11 +10,11 @@ from scipy import ndimage
 from smokelift.density import DepthEstimate, GuidedSimulation, Observation, RoundDepth, Start, ViewSet
 from smokelift.density.objective import Term
 from smokelift.density.observation import eight_bit_plate
-from smokelift.density.temporal_prior import LARGEST_GAIN
+from smokelift.density.temporal_prior import LARGEST_GAIN, RETENTION
 from smokelift.render import Volume, render, scene_optics
 from smokelift.scene import completed
 
-SHARE = 0.5
+BLEND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class Moment:
         """The depth prior's density."""
         return self.depth.density
 
-    def start(self, carried: Volume, kept: float = 1.0) -> Start:
+    def start(self, carried: Volume) -> Start:
         """Where the fit starts with a carried density."""
-        return GuidedSimulation(SHARE, kept).start(self.depth.views, self.depth, carried)
+        return GuidedSimulation(BLEND).start(self.depth.views, self.depth, carried)
 
 
 @pytest.fixture(scope="module")
@@ -43,19 +43,19 @@ def moment(plume) -> Moment:
     return Moment(RoundDepth().estimate(views), true)
 
 
-def test_a_share_is_taken_over(moment) -> None:
+def test_a_fraction_is_taken_over(moment) -> None:
     start = moment.start(moment.true)
-    assert start.figures == {"share": SHARE}
+    assert start.figures == {"share": BLEND}
     np.testing.assert_allclose(start.density, (moment.prior + moment.true) / 2, rtol=1e-6)
 
 
 def test_a_wrong_density_fades_from_frame_to_frame(moment) -> None:
-    """Carried on without a motion, an error is down to the share's power."""
+    """Carried on without a motion, an error is down to the power of that fraction."""
     density = 5 * np.roll(moment.true, 6, axis=2)
     error = np.linalg.norm(density - moment.prior)
     for _ in range(5):
         density = moment.start(density).density
-    assert np.linalg.norm(density - moment.prior) == pytest.approx(SHARE**5 * error, rel=1e-4)
+    assert np.linalg.norm(density - moment.prior) == pytest.approx(BLEND**5 * error, rel=1e-4)
 
 
 @pytest.mark.parametrize("empty", ["prior", "carried"])
@@ -113,5 +113,4 @@ def test_detail_is_born_where_nothing_is_carried(moment, detailed) -> None:
     little = detailed.start(np.float32(0.01) * moment.prior)
     assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
     np.testing.assert_allclose(little.density.sum(), detailed.prior[hull].sum(), rtol=0.02)
-    some = detailed.start(moment.true, kept=0.6)
-    assert some.figures["share"] == pytest.approx(0.6 * detailed.start(moment.true).figures["share"], rel=0.03)
+    assert detailed.start(moment.prior).figures["share"] == pytest.approx(RETENTION, rel=0.01)

@@ -87,7 +87,7 @@ def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, draft, tmp_path
             again = sequence.render(frame.number, camera=view.camera)
             color = Background(color=tuple(map(float, view.background[0, 0, :3])))
             over_color = render(frame.density, replace(sequence.scene, background=color), camera=view.camera)
-            error = np.square(over_color - view.image[..., :3], dtype=np.float64)[view.counted].mean()
+            error = np.square(over_color - view.image[..., :3], dtype=np.float64)[view.influenced].mean()
             assert -10 * np.log10(error) == pytest.approx(frame.figures["psnr_working"], abs=0.1)
             shown = render(sequence.density(frame.number), sequence.scene, camera=view.camera)
             np.testing.assert_array_equal(shown, again)
