@@ -8,7 +8,6 @@ threads, where plain noise has round grains (Perlin, "An image synthesizer", 198
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -36,55 +35,55 @@ NODES = np.float32((2 / 3) ** 1.5)
 """Standard deviation of linear interpolation in three dimensions between nodes of unit variance."""
 
 
-@dataclass(frozen=True, eq=False)
-class StretchedNoise:
-    """Octaves of noise, each stretched by the motion of the coarser ones.
+def stretched_noise(
+    level: Level, moved: NDArray[np.float64], width: float, strengths: tuple[float, ...], seed: int
+) -> NDArray[np.float32]:
+    """Octaves of noise (n,) at the voxels that may hold smoke, each stretched by the motion of the coarser ones.
 
-    The noise has `moved` (3,), and the smoke is `width` wide (standard deviation across its axis), both in voxels of
-    the finest grid. `strengths` are standard deviations by octave, the coarsest first.
+    The noise has ``moved`` (3,), and the smoke is ``width`` wide (standard deviation across its axis), both in voxels
+    of the finest grid. ``strengths`` are standard deviations by octave, the coarsest first.
     """
+    # an octave's noise, and three more for the motion that draws out the next
+    return _sum(level, moved, width, strengths, iter(_lattices(seed, 4 * len(strengths) - 3)))[0]
 
-    moved: NDArray[np.float64]
-    width: float
-    strengths: tuple[float, ...]
-    seed: int
 
-    def at(self, level: Level) -> NDArray[np.float32]:
-        """Noise (n,) at the voxels that may hold smoke."""
-        # an octave's noise, and three more for the motion that draws out the next
-        return self._sum(level, iter(_lattices(self.seed, 4 * len(self.strengths) - 3)))[0]
+def _sum(
+    level: Level,
+    moved: NDArray[np.float64],
+    width: float,
+    strengths: tuple[float, ...],
+    lattices: Iterator[_Lattice],
+) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+    """The sum (n,) of the octaves that a grid holds, and their number.
 
-    def _sum(self, level: Level, lattices: Iterator[_Lattice]) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
-        """The sum (n,) of the octaves that a grid holds, and their number.
+    Between them is the motion (3, n) in voxels that draws out the next, whose nodes are half as far apart.
+    """
+    where, size, octaves = level.views.where, level.coarseness, 0
+    noise, motion = np.zeros(where.count, np.float32), np.zeros((3, where.count), np.float32)
+    if level.coarser is not None:
+        coarse, motions, octaves = _sum(level.coarser, moved, width, strengths, lattices)
+        for found, values in zip((noise, *motion), (coarse, *motions), strict=True):
+            found[...] = level.coarser.finer(level.coarser.views.volume(values), level)
+    middle = (size - 1) / 2 - moved
 
-        Between them is the motion (3, n) in voxels that draws out the next, whose nodes are half as far apart.
-        """
-        where, size, octaves = level.views.where, level.coarseness, 0
-        noise, motion = np.zeros(where.count, np.float32), np.zeros((3, where.count), np.float32)
-        if level.coarser is not None:
-            coarse, motions, octaves = self._sum(level.coarser, lattices)
-            for found, values in zip((noise, *motion), (coarse, *motions), strict=True):
-                found[...] = level.coarser.finer(level.coarser.views.volume(values), level)
-        middle = (size - 1) / 2 - self.moved
+    def octave(spacing: float, strength: float) -> NDArray[np.float32]:
+        lattice = next(lattices)
+        shift = middle / spacing + lattice.corner
+        values = where.read_lattice(lattice.values, size / spacing, shift.tolist(), motion, 1 / spacing)
+        values *= np.float32(strength)
+        return values
 
-        def octave(spacing: float, strength: float) -> NDArray[np.float32]:
-            lattice = next(lattices)
-            shift = middle / spacing + lattice.corner
-            values = where.read_lattice(lattice.values, size / spacing, shift.tolist(), motion, 1 / spacing)
-            values *= np.float32(strength)
-            return values
-
-        while octaves < len(self.strengths):
-            spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
-            if octaves and spacing < MIN_NODE_DISTANCE * size:
-                break
-            noise += octave(spacing, self.strengths[octaves])
-            octaves += 1
-            if octaves < len(self.strengths):
-                drawn = [octave(spacing, STRETCH * spacing) for _ in motion]
-                for along, more in zip(motion, drawn, strict=True):
-                    along += more
-        return noise, motion, octaves
+    while octaves < len(strengths):
+        spacing = MAX_NODE_DISTANCE * width / 2**octaves
+        if octaves and spacing < MIN_NODE_DISTANCE * size:
+            break
+        noise += octave(spacing, strengths[octaves])
+        octaves += 1
+        if octaves < len(strengths):
+            drawn = [octave(spacing, STRETCH * spacing) for _ in motion]
+            for along, more in zip(motion, drawn, strict=True):
+                along += more
+    return noise, motion, octaves
 
 
 class _Lattice(NamedTuple):

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -21,13 +20,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
-from smokelift.density.detail_noise import StretchedNoise
+from smokelift.density.detail_noise import stretched_noise
 from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, reduced
-from smokelift.density.turntable import Spans, Turntable, filled_spans
+from smokelift.density.turntable import Turntable, UprightSmoke
 from smokelift.density.wander import Wander
 from smokelift.render import Volume
 from smokelift.scene import Camera
@@ -121,8 +120,7 @@ class DetailedDepth:
     def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke; its low pass stays."""
         moved = texture.turntable.height * texture.drift * level.views.frame
-        noise = StretchedNoise(moved, texture.width, texture.roughness, self.seed)
-        values = noise.at(level)
+        values = stretched_noise(level, moved, texture.width, texture.roughness, self.seed)
         np.exp(values, out=values)
         values *= level.views.where.take(smooth)
         noisy = level.views.volume(values)
@@ -142,17 +140,6 @@ def _smooth_answer(level: Level, density: Volume) -> Volume:
         fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, level.views.where)
         return fitted.density
     return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
-
-
-class _Upright(NamedTuple):
-    """Smoke on a turntable, upright, and the spans outside which there is none."""
-
-    values: Volume
-    spans: Spans
-
-    @staticmethod
-    def of(values: Volume) -> _Upright:
-        return _Upright(values, filled_spans(values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,13 +194,13 @@ class EveryView:
         box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
         part = tuple(box)
         first, second = (span.start for span in part if span != slice(None))
-        smooth = _Upright.of(table.upright(self.smooth[part]))
+        smooth = UprightSmoke.of(table, table.upright(self.smooth[part]), (first, second))
         relaxation = self.strength * (FRESH_STEP if fresh else CARRIED_STEP)
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
-                turned = _Upright.of(table.upright(density[part]))
+                turned = UprightSmoke.of(table, table.upright(density[part]), (first, second))
                 for _ in range(AZIMUTHS):
-                    self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
+                    self._step(turned, smooth, exemplar, next(azimuths), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[part], table.lying(turned.values), where=hull[part])
                 density = take_turns(cameras, changed, 1, self.level.views.where)
@@ -221,18 +208,17 @@ class EveryView:
 
     def _step(
         self,
-        now: _Upright,
-        smooth: _Upright,
+        now: UprightSmoke,
+        smooth: UprightSmoke,
         exemplar: Exemplar,
         azimuth: tuple[int, float],
-        corner: tuple[int, int],
         relaxation: float,
     ) -> None:
         """Scale smoke (upright, a part of the domain) along the rays of one azimuth towards the clip's texture."""
         table, scale = self.texture.turntable, exemplar.scale
         thickness = np.float32(self.level.views.optics.medium.extinction * table.domain.voxel_size)
         turn, degrees = azimuth
-        whole, expected = (table.project(each.values, degrees, corner, each.spans) for each in (now, smooth))
+        whole, expected = (each.picture(degrees) for each in (now, smooth))
         shown, known = (reduced(thickness * picture, scale) for picture in (whole, expected))
         if not shown.any():
             return
@@ -244,7 +230,7 @@ class EveryView:
         faint = 1e-3 * wanted.max()
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
         step = np.float32(relaxation) * isotropic_filter(step)
-        table.scale(now.values, enlarged(step, scale, table.shape), degrees, corner, now.spans)
+        now.scale(enlarged(step, scale, table.shape), degrees)
 
     def azimuths(self) -> Iterator[tuple[int, float]]:
         """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""

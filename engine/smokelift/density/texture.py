@@ -88,7 +88,7 @@ class ClipTexture:
     The `turntable` is before the input's camera. It turns about the smoke's own axis: what is seen on the way about it
     looks alike. There is one of the `exemplars` a scale, the coarsest first: its patches are as wide as the smoke.
     `width` is the standard deviation of the smoke across the axis, in voxels. `drift` is the mean motion of the
-    pictures along it, in voxels a frame, and `roughness` the strength of each octave of `StretchedNoise`.
+    pictures along it, in voxels a frame, and `roughness` the strength of each octave of `stretched_noise`.
     """
 
     turntable: Turntable

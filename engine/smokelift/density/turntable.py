@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,6 @@ from smokelift.scene import Camera, Domain, as_matrix
 Volume = NDArray[np.float32]
 Picture = NDArray[np.float32]
 """(columns, voxels along the axis), a pixel a voxel, upwards."""
-Spans = NDArray[np.int32]
-"""First voxel and end of each column of voxels, (n, m, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ class Turntable:
 
     def camera(self, degrees: float) -> Camera:
         """The orthographic camera that sees the domain turned; it stands to the right at 90 degrees."""
-        right = self._right(degrees)
+        right = self.right(degrees)
         back = np.cross(right, self.height)
         distance = np.linalg.norm(np.array(self.domain.max) - self.domain.min)
         matrix = np.eye(4)
@@ -94,42 +93,42 @@ class Turntable:
         turned = upright if self.height[self.axis] > 0 else upright[..., ::-1]
         return np.ascontiguousarray(np.moveaxis(turned, -1, self.axis))
 
-    def project(
-        self, upright: Volume, degrees: float, corner: tuple[int, int] = (0, 0), spans: Spans | None = None
-    ) -> Picture:
-        """Sums (columns, voxels along the axis) of an upright volume, or part of it, along the rays of a turned view.
-
-        ``corner`` is the part's first column of voxels, ``spans`` what `filled_spans` says if that is known.
-        """
-        spans = filled_spans(upright) if spans is None else spans
-        return _core.project_turned(upright, spans, *self._turned(degrees, corner), self.shape[0])
-
-    def scale(
-        self,
-        upright: Volume,
-        logarithm: Picture,
-        degrees: float,
-        corner: tuple[int, int] = (0, 0),
-        spans: Spans | None = None,
-    ) -> None:
-        """Multiply an upright volume along the rays of a turned view by exponentials of a picture; see `project`."""
-        spans = filled_spans(upright) if spans is None else spans
-        _core.scale_turned(upright, spans, *self._turned(degrees, corner), logarithm)
-
-    def _right(self, degrees: float) -> Doubles:
+    def right(self, degrees: float) -> Doubles:
+        """What lies to the right (3,) in a turned view."""
         turn = np.radians(degrees)
         return np.asarray(np.cos(turn) * self.lateral + np.sin(turn) * self.depth)
 
-    def _turned(self, degrees: float, corner: tuple[int, int]) -> tuple[float, tuple[float, float]]:
+
+class UprightSmoke(NamedTuple):
+    """Smoke, or a part of it, upright on a turntable.
+
+    `corner` is its first column of voxels in the domain. `spans` are the first voxel and the end of each of its columns
+    that hold any smoke, (n, m, 2): the work is there alone.
+    """
+
+    table: Turntable
+    values: Volume
+    corner: tuple[int, int]
+    spans: NDArray[np.int32]
+
+    @staticmethod
+    def of(table: Turntable, values: Volume, corner: tuple[int, int] = (0, 0)) -> UprightSmoke:
+        return UprightSmoke(table, values, corner, _core.filled_spans(values))
+
+    def picture(self, degrees: float) -> Picture:
+        """Sums (columns, voxels along the axis) along the rays of a turned view."""
+        return _core.project_turned(self.values, self.spans, *self._turned(degrees), self.table.shape[0])
+
+    def scale(self, logarithm: Picture, degrees: float) -> None:
+        """Multiply the smoke along the rays of a turned view by exponentials of a picture."""
+        _core.scale_turned(self.values, self.spans, *self._turned(degrees), logarithm)
+
+    def _turned(self, degrees: float) -> tuple[float, tuple[float, float]]:
         """Screen column of the first column of voxels, and the steps to the next ones along both other axes."""
-        right = self._right(degrees)
-        a, b = (axis for axis in range(3) if axis != self.axis)
+        table = self.table
+        right = table.right(degrees)
+        a, b = (axis for axis in range(3) if axis != table.axis)
         steps = float(right[a]), float(right[b])
-        middles = [(corner[n] - (self.domain.resolution[axis] - 1) / 2) for n, axis in enumerate((a, b))]
-        first = middles[0] * steps[0] + middles[1] * steps[1] + (self.shape[0] - 1) / 2
+        middles = [(self.corner[n] - (table.domain.resolution[axis] - 1) / 2) for n, axis in enumerate((a, b))]
+        first = middles[0] * steps[0] + middles[1] * steps[1] + (table.shape[0] - 1) / 2
         return first, steps
-
-
-def filled_spans(upright: Volume) -> Spans:
-    """Where the columns of an upright volume are not zero: the work is there alone."""
-    return _core.filled_spans(upright)

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from smokelift.density import DensitySettings, DepthPrior, DetailedDepth, GradientFit, RoundDepth, ViewSet, levels
 from smokelift.density.synthesis import GAIN, OWN_PICTURE_DEGREES, EveryView, isotropic_filter
-from smokelift.density.turntable import Turntable
+from smokelift.density.turntable import Turntable, UprightSmoke
 from smokelift.footage.clip import Clip
 from smokelift.scene import Camera, Domain, Scene
 from smokelift.setup.prepare import prepare_shot
@@ -146,9 +146,10 @@ def test_pictures_of_many_azimuths_add_up_to_detail_without_direction(change, lo
     domain = Domain((-1, -1, -1), (1, 1, 1), (32, 32, 32))
     table = Turntable.before(Camera.look_at((0, -5, 0), (0, 0, 0), fov_y_degrees=30, size=(32, 32)), domain)
     volume, random = np.ones((32, 32, 32), np.float32), np.random.default_rng(1)
+    smoke = UprightSmoke.of(table, volume)
     for degrees in np.arange(0, 180, 180 / 24):
         picture = 0.1 * ndimage.gaussian_filter(random.standard_normal(table.shape).astype(np.float32), 1.5)
-        table.scale(volume, np.ascontiguousarray(change(picture)), float(degrees))
+        smoke.scale(np.ascontiguousarray(change(picture)), float(degrees))
     inner = np.log(volume)[8:24, 8:24]
     x, y, z = slopes(inner)
     assert lowest < 2 * z / (x + y) < highest

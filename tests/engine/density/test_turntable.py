@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.density.turntable import Turntable, filled_spans
+from smokelift.density.turntable import Turntable, UprightSmoke
 from smokelift.scene import Camera, Domain, orbit
 from smokelift.scene.projection import project_points
 
@@ -59,7 +59,7 @@ def test_even_smoke_makes_an_even_picture(degrees) -> None:
     turntable = Turntable.before(CAMERA, domain)
     x, y, _ = domain.offsets(domain.centre)
     volume = np.broadcast_to(np.clip((0.8 - np.hypot(x, y)) / domain.voxel_size + 0.5, 0, 1), domain.resolution)
-    picture = turntable.project(turntable.upright(np.ascontiguousarray(volume, np.float32)), degrees)
+    picture = UprightSmoke.of(turntable, turntable.upright(np.ascontiguousarray(volume, np.float32))).picture(degrees)
     side = (np.arange(len(picture)) + 0.5 - len(picture) / 2) * domain.voxel_size
     inside = np.abs(side) < 0.7
     chords = 2 * np.sqrt(0.64 - side[inside] ** 2) / domain.voxel_size
@@ -74,12 +74,12 @@ def test_a_projection_and_its_scale_are_adjoint() -> None:
     whole = turntable.upright(random.random(DOMAIN.resolution, np.float32))
     part = np.ascontiguousarray(whole[5:20, 3:12])
     step = random.random(turntable.shape, np.float32) * np.float32(1e-3)
-    scaled = part.copy()
-    turntable.scale(scaled, step, 33.0, (5, 3))
+    scaled, picture = part.copy(), UprightSmoke.of(turntable, part, (5, 3)).picture(33.0)
+    UprightSmoke.of(turntable, scaled, (5, 3)).scale(step, 33.0)
     changed = float((scaled - part).sum(dtype=np.float64))
-    assert changed == pytest.approx(float((turntable.project(part, 33.0, (5, 3)) * step).sum()), rel=2e-3)
+    assert changed == pytest.approx(float((picture * step).sum()), rel=2e-3)
     whole[:5], whole[20:], whole[:, :3], whole[:, 12:] = 0, 0, 0, 0
-    np.testing.assert_allclose(turntable.project(part, 33.0, (5, 3)), turntable.project(whole, 33.0), atol=1e-5)
+    np.testing.assert_allclose(picture, UprightSmoke.of(turntable, whole).picture(33.0), atol=1e-5)
 
 
 def test_only_columns_that_hold_something_are_worked_on() -> None:
@@ -88,13 +88,14 @@ def test_only_columns_that_hold_something_are_worked_on() -> None:
     volume[1, 2, 3:6] = 1
     volume[1, 2, 4] = 0
     volume[4, 0, 8] = 2
-    spans = filled_spans(volume)
+    turntable = Turntable.before(CAMERA, Domain((0, 0, 0), (5, 4, 9), (5, 4, 9)))
+    smoke = UprightSmoke.of(turntable, volume)
+    spans = smoke.spans
     assert {tuple(map(int, at)): tuple(spans[at]) for at in np.ndindex(5, 4) if np.diff(spans[at])[0]} == {
         (1, 2): (3, 6),
         (4, 0): (8, 9),
     }
-    turntable = Turntable.before(CAMERA, Domain((0, 0, 0), (5, 4, 9), (5, 4, 9)))
     everywhere = np.broadcast_to(np.array([0, 9], np.int32), (5, 4, 2))
-    pictures = [turntable.project(volume, 33.0, spans=each) for each in (None, everywhere)]
+    pictures = [each.picture(33.0) for each in (smoke, smoke._replace(spans=everywhere))]
     np.testing.assert_array_equal(*pictures)
     assert pictures[0].sum() == pytest.approx(4)
