@@ -65,8 +65,7 @@ MIN_SPREAD_BIAS = 1.2
 (docs/experiments/density-profile.md)."""
 
 LINE_SMOOTHING = 2.0
-"""Standard deviation (voxels) of the Gaussian that smooths the spread from line to line
-(docs/experiments/density-profile.md)."""
+"""Standard deviation (voxels) of the Gaussian that smooths the spread from line to line."""
 
 STEPS_TO_AXIS = 3
 """Fixed-point steps from a ray's place in the middle of the domain to where it meets the axis. A step leaves of the
