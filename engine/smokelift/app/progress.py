@@ -74,8 +74,14 @@ class Reporter:
     def note(self, said: Finding | str) -> None:
         """Something that was assumed or noticed."""
 
-    def start(self, total: int, done: int, seconds: float | None = None) -> None:
-        """Frames begin: ``total`` of them, ``done`` already; ``seconds`` is a forecast of the rest, if there is one."""
+    def start(
+        self, total: int, done: int, seconds: float | None = None, forecast: Mapping[str, Any] | None = None
+    ) -> None:
+        """Frames begin: ``total`` of them, ``done`` already.
+
+        ``seconds`` is a forecast of the rest, and ``forecast`` of what else a program shows of the shot, if there is
+        one.
+        """
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         """One more frame is finished."""
@@ -181,7 +187,9 @@ class _Text(Reporter):
         with _output():
             self._console.print(printable_lines(_words(said)), markup=False, soft_wrap=True)
 
-    def start(self, total: int, done: int, seconds: float | None = None) -> None:
+    def start(
+        self, total: int, done: int, seconds: float | None = None, forecast: Mapping[str, Any] | None = None
+    ) -> None:
         with _output():
             self._bar.update(self._task, total=total, completed=done)
             self._bar.start_task(self._task)
@@ -218,13 +226,15 @@ class _Json(Reporter):
     def note(self, said: Finding | str) -> None:
         self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)
 
-    def start(self, total: int, done: int, seconds: float | None = None) -> None:
+    def start(
+        self, total: int, done: int, seconds: float | None = None, forecast: Mapping[str, Any] | None = None
+    ) -> None:
         self._total, self._done, self._before = total, done, time.monotonic()
         known = {}
         if seconds is not None and total > done:
             self._seconds.append(seconds / (total - done))
             known = {"seconds_left": round(seconds, 1)}
-        self._say("start", total=total, done=done, **known)
+        self._say("start", total=total, done=done, **known, **(forecast or {}))
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         self._done += 1

@@ -8,6 +8,7 @@ from command_line import QUICK, command, events, names, refused
 
 from smokelift.output.sequence import Sequence
 from smokelift.scene import completed
+from smokelift.setup.settings import QUALITIES
 from tests.engine.output.small_sequence import needs_vdb
 
 
@@ -65,6 +66,10 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     assert medium["text"].startswith("Medium not given") and medium["figures"]["albedo"] == 0.9
     start, *frames = sent[len(notes) : -1]
     assert (start["total"], start["done"]) == (5, 0)
+    assert {fact["what"] for fact in start["facts"]} >= {"background", "scale"} and len(start["background_color"]) == 3
+    assert set(start["qualities"]) == set(QUALITIES) and all(
+        said["seconds"] > 0 for said in start["qualities"].values()
+    )
     assert [(event["frame"], event["done"], event["total"]) for event in frames] == [(n, n, 5) for n in range(1, 6)]
     assert all(event["figures"]["psnr"] > 30 for event in frames)
     assert sent[-2]["seconds_left"] == 0

@@ -9,6 +9,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from smokelift.app.options import Command, add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.checks import Finding, counted
@@ -66,6 +68,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         prepared = Preparation(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
         cost = estimate_cost(domain.resolution, work, prepared)
         known = facts(shot, scene, cost)
+        forecast = forecast_of(shot, known, work, prepared)
         files = list(options.page)
         if options.page:
             page = inspection_page(shot, scene, known, findings)
@@ -81,19 +84,26 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             "frames": frames,
             "scene": scene_to_dict(shot.scene),
             "choices": choices(shot.findings),
-            "facts": [fact(line) for line in known],
             "files": [str(path) for path in files],
-            "qualities": _qualities(shot, work, prepared),
+            **forecast,
             **asdict(cost),
         },
     )
 
 
-def _qualities(shot: Shot, work: Workload, prepared: Preparation) -> dict[str, dict[str, Any]]:
-    """Grid and cost of each quality, as JSON holds them."""
+def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload, prepared: Preparation) -> dict[str, Any]:
+    """Return what a program shows of a shot beside its findings, as JSON holds it.
+
+    Those are the facts, the median color of what is behind the smoke (linear), and grid and cost of each quality.
+    """
+    plate = shot.views[0].plates.at(0).image
     return {
-        quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
-        for quality, grid in shot.qualities.items()
+        "facts": [fact(line) for line in known],
+        "background_color": [float(value) for value in np.median(plate.reshape(-1, 3), axis=0)],
+        "qualities": {
+            quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
+            for quality, grid in shot.qualities.items()
+        },
     }
 
 

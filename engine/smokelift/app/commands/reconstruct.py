@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from smokelift.app.commands.inspect import forecast_of
 from smokelift.app.options import (
     Command,
     add_run_options,
@@ -29,8 +30,9 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
-from smokelift.report.cost import Workload, frames_seconds, require_memory
-from smokelift.report.result import count_empty, made_up, shortcomings
+from smokelift.report.cost import Preparation, Workload, estimate_cost, frames_seconds, peak_memory, require_memory
+from smokelift.report.facts import facts
+from smokelift.report.result import count_empty, expected_shortcomings, made_up, shortcomings
 from smokelift.report.views import sentence
 from smokelift.scene import Domain
 from smokelift.setup.backdrop_findings import what_helps
@@ -57,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Reconstruct; say what was assumed, and every frame. ValueError, with empty frames written, if none has smoke."""
-    began = time.monotonic()
+    began, worked = time.monotonic(), time.process_time()
     settings = settings_of(options)
     _check_outputs(options)
     scene, source = scene_of(options)
@@ -68,10 +70,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = reconstruction.shot
         resolution, work = shot.scene.domain.resolution, Workload.of(shot, settings)
         require_memory(resolution, work, given=isinstance(scene.domain, Domain))
-        for finding in (*shot.findings, *made_up(shot)):
+        for finding in (*shot.findings, *expected_shortcomings(shot), *made_up(shot)):
             say.note(finding)
         finished, new = _finished(options), set[int]()
-        say.start(shot.length, finished, frames_seconds(resolution, work) * (1 - finished / shot.length))
+        prepared = Preparation(time.monotonic() - began, time.process_time() - worked, peak_memory())
+        known = facts(shot, scene, estimate_cost(resolution, work, prepared))
+        seconds = frames_seconds(resolution, work) * (1 - finished / shot.length)
+        say.start(shot.length, finished, seconds, forecast_of(shot, known, work, prepared))
         report = _report(shot, options.thumbnail, say, new)
         sequence = reconstruction.write(
             options.out, npz=options.npz, resume=options.resume, start_number=options.start_number, on_frame=report
