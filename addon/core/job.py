@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from .contract import BLENDERS, CANCELLED, PLATFORMS, ZIP_FILE
-from .sentences import sentence, stopped
+from .sentences import REPLACED, advice, sentence, stopped
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 
@@ -135,7 +135,9 @@ class Job:
     notes
         The engine's assumptions and warnings, a sentence each.
     doubts
-        Why the result may be nothing, or wrong: the notes that say so, each after the engine's name for it.
+        Why the result may be nothing, or wrong, each after the engine's name for it; what helps is left out.
+    forecast
+        What a run says of its shot before its first frame, with the doubts of then; None before it does.
     sentence
         The result, or the reason of a failure.
     details
@@ -150,6 +152,7 @@ class Job:
         self.seconds_left: float | None = None
         self.notes: list[str] = []
         self.doubts: list[tuple[str, str]] = []
+        self.forecast: tuple[Mapping[str, Any], list[tuple[str, str]]] | None = None
         self.sentence = ""
         self.details: Mapping[str, Any] = {}
         self.status: int | None = None
@@ -255,12 +258,16 @@ class Job:
     def _handle(self, event: str, message: dict[str, Any]) -> bool:
         match event:
             case "note":
-                self.notes.append(sentence(message, self._before))
+                kind, words = str(message.get("kind", "")), sentence(message, self._before)
+                self.notes.append(f"{words} {advice(kind)}".strip())
                 if message.get("doubt"):
-                    self.doubts.append((str(message.get("kind", "")), self.notes[-1]))
+                    before = [each for each in self.doubts if kind not in REPLACED.get(each[0], ())]
+                    self.doubts = [*before, (kind, words)]
                 self._write_log(self.notes[-1])
             case "start":
                 self.done, self.total = int(message["done"]), int(message["total"])
+                if "qualities" in message:
+                    self.forecast = message, self.doubts
                 if "seconds_left" in message:
                     self.seconds_left = float(message["seconds_left"])
             case "frame":

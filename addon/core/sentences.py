@@ -11,18 +11,20 @@ SENTENCES = {
     "proxy": "The proxy of {frames} is made.",
     "hardly any smoke fitted": (
         "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
-        "changes there. Hide by a Mask what is no smoke, or choose Clean Plate, Scene Lights or Smoke Material. "
-        "Report says what was assumed."
+        "changes there. Report says what was assumed."
     ),
     "not all is smoke": (
         "Some of what counts as smoke may be something else: a typical frame still differs from the clip by "
         "{error:.0%} of what changes in it. Things that move, light that changes and labels look like smoke, too. "
-        "Report shows what counts as smoke. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
+        "Report shows what counts as smoke."
     ),
     "not all may be smoke": (
         "Some of what counts as smoke may be something else: a coarse fit leaves {error:.0%} of it unexplained. "
-        "People, leaves, labels and light that changes look like smoke, too. Hide them by a Mask, or choose a Clean "
-        "Plate."
+        "People, leaves, labels and light that changes look like smoke, too."
+    ),
+    "smoke in the background": (
+        "The background may hold most of the smoke: {fraction:.0%} of the area where smoke may be is never free of it. "
+        "Smoke that stays there all the time is missing from the result."
     ),
     "clearest frame": (
         "Frame {frame} shows more of the background than the others: if it is free of smoke, go to it and press Plate "
@@ -38,6 +40,34 @@ SENTENCES = {
     ),
 }
 """Sentences by kind, with the figures that the engine gives."""
+
+_NOT_SMOKE = (
+    ("mask", "hide by a Mask what is no smoke"),
+    ("plate", "choose a Clean Plate"),
+    ("", "make the Mask smaller, or use Frames in which less else changes"),
+)
+
+REMEDIES = {
+    "hardly any smoke fitted": (
+        ("mask", "hide by a Mask what is no smoke"),
+        ("plate", "choose a Clean Plate"),
+        ("light", "choose Scene Lights"),
+        ("medium", "set Smoke Material"),
+        ("", "use Frames with more smoke"),
+    ),
+    "not all is smoke": _NOT_SMOKE,
+    "not all may be smoke": _NOT_SMOKE,
+    "smoke in the background": (
+        ("plate", "choose a Clean Plate"),
+        ("strokes", "paint Strokes over the smoke"),
+        ("", "use Frames in which the smoke moves more"),
+    ),
+}
+"""What may end a doubt, by its kind: each remedy after the setting that it gives. The last one is for a shot that has
+all others."""
+
+REPLACED = {"not all may be smoke": ("not all is smoke", "hardly any smoke fitted")}
+"""Doubts of a coarse fit, with those that say the same of the result."""
 
 FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
 """Figures that the engine counts from 0, and the panel from 1."""
@@ -83,6 +113,19 @@ def sentence(message: Mapping[str, Any], before: int = 0, doubts: Collection[str
         unrated = any(kind in doubts for kind in UNRATED)
         figures["psnr"] = f"{level}, not rated: see the warning" if unrated else f"{match(figures['psnr'])} ({level})"
     return words.format(**figures)
+
+
+def advice(kind: str, given: Collection[str] = ()) -> str:
+    """What may end a doubt, as a sentence without the settings that are ``given``; empty where nothing is known."""
+    *remedies, last = REMEDIES.get(kind, (("", ""),))
+    left = [words for setting, words in remedies if setting not in given] or [last[1]]
+    words = " or ".join([", ".join(left[:-1]), left[-1]] if len(left) > 2 else left)
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
+
+
+def repeats(kind: str, said: Collection[str]) -> bool:
+    """Whether a doubt says what doubts of the kinds ``said`` do."""
+    return bool(kind) and not {kind, *REPLACED.get(kind, ())}.isdisjoint(said)
 
 
 def stopped(done: int) -> str:

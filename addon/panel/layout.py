@@ -1,15 +1,15 @@
 """How the parts of the tab draw what they have in common."""
 
 import textwrap
+from collections.abc import Iterable
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import MOVING_CAMERA
 from ..core.job import Job
-from ..core.sentences import duration
+from ..core.sentences import advice, duration, repeats
 from ..result.side_job import writing_job
-from ..scene.smoke import active_smoke
 
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
@@ -50,13 +50,42 @@ def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.t
     return row.operator(operator, text="", icon="X")
 
 
-def draw_doubt(layout: bpy.types.UILayout, context: bpy.types.Context, kind: str, words: str) -> None:
-    """Why a result may be wrong, and the button that helps."""
-    draw_text(layout, context, words, "ERROR")
-    if kind in MASK_HELPS:
-        smoke = active_smoke(context.scene)
-        drawn = smoke is not None and smoke.smokelift.drawn_mask is not None
-        layout.operator("smokelift.new_mask", text="Edit Mask" if drawn else "New Mask", icon="MOD_MASK")
+def draw_doubts(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    smoke: bpy.types.Object,
+    doubts: Iterable[tuple[str, str]],
+    said: set[str],
+) -> None:
+    """Why a result may be wrong, what is left to do about it, and the button that does it.
+
+    Parameters
+    ----------
+    layout, context, smoke
+        Where, and whose settings.
+    doubts
+        Each a kind and words.
+    said
+        Kinds that stand elsewhere in the tab, to which these are added.
+    """
+    settings = smoke.smokelift
+    given = {
+        "mask": settings.mask or settings.drawn_mask is not None,
+        "plate": settings.plate_mode in ("FILE", "FRAMES"),
+        "strokes": settings.strokes is not None,
+        "light": settings.light_mode == "SCENE",
+        "medium": settings.use_medium,
+    }
+    for kind, words in doubts:
+        if repeats(kind, said):
+            continue
+        said.add(kind)
+        draw_text(layout, context, words, "ERROR")
+        if left := advice(kind, [name for name, is_given in given.items() if is_given]):
+            draw_text(layout, context, left, "BLANK1")
+        if kind in MASK_HELPS:
+            text = "New Mask" if settings.drawn_mask is None else "Edit Mask"
+            layout.operator("smokelift.new_mask", text=text, icon="MOD_MASK")
 
 
 def draw_failure(layout: bpy.types.UILayout, context: bpy.types.Context, words: str) -> None:
@@ -88,8 +117,7 @@ def draw_work(
         layout.operator(operator, icon=icon)
     if own and writing_job.smoke == smoke.session_uid and writing_job.sentence:
         draw_text(layout, context, writing_job.sentence, "INFO")
-        for kind, words in writing_job.doubts:
-            draw_doubt(layout, context, kind, words)
+        draw_doubts(layout, context, smoke, writing_job.doubts, set())
 
 
 def draw_ticked(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, tick: str, *names: str) -> None:

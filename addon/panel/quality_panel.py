@@ -8,7 +8,7 @@ from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
 from .common import ActsOnSmoke, RequiresClip, automatic_unless
-from .layout import draw_doubt, draw_failure, draw_text
+from .layout import draw_doubts, draw_failure, draw_text
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -115,7 +115,7 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
             )
             for cell, word in zip(cells, words, strict=True):
                 cell.active = checked and state.done
-                cell.alert = cost["memory"] > state.details["memory_free"]
+                cell.alert = cost["memory"] > cost["memory_free"]
                 cell.label(text=word, translate=False)
     reading = not state.done if checked else shot_check.check_soon(context, smoke)
     if state.error or not (checked or reading):
@@ -132,20 +132,19 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         layout.label(text=text, translate=False, icon="MESH_GRID")
 
 
-def draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-    """What the check of this smoke warns of, or why it failed."""
+def draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, said: set[str]) -> None:
+    """What the check of this smoke warns of beside what is ``said`` of its runs, or why it failed."""
     state = shot_check.state
     if not state.fits(smoke):
         return
     if state.error:
         draw_failure(layout, context, state.error)
     elif state.done:
-        free = state.details["memory_free"]
-        if state.costs(smoke)[smoke.smokelift.quality]["memory"] > free:
+        cost = state.costs(smoke)[smoke.smokelift.quality]
+        if cost["memory"] > cost["memory_free"]:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(layout, context, text.format(free / 2**30), "ERROR")
-        for kind, words in state.doubts:
-            draw_doubt(layout, context, kind, words)
+            draw_text(layout, context, text.format(cost["memory_free"] / 2**30), "ERROR")
+        draw_doubts(layout, context, smoke, state.doubts, said)
 
 
 def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:

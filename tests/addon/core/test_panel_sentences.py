@@ -7,7 +7,7 @@ from string import Formatter
 
 import pytest
 
-from addon.core.sentences import SENTENCES, match, sentence, spent, stopped
+from addon.core.sentences import REMEDIES, SENTENCES, advice, match, repeats, sentence, spent, stopped
 from smokelift.report.sentences import SENTENCES as OWN
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "tools"))
@@ -69,6 +69,23 @@ def test_a_sentence(message, said) -> None:
 
 def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
     assert "frame 109 on" in sentence(finding("dissolving smoke", frame=70, room=8.0), before=39)
+
+
+@pytest.mark.parametrize("kind", REMEDIES)
+def test_advice_names_what_is_left(kind) -> None:
+    *settings, last = (setting for setting, _ in REMEDIES[kind])
+    assert last == "" and "" not in settings
+    for number in range(len(settings)):
+        left = [words for setting, words in REMEDIES[kind] if setting in settings[number:]]
+        said = advice(kind, settings[:number])
+        assert said.lower().count(left[0].lower()) == 1 and all(words in said for words in left[1:])
+    assert advice(kind, settings).lower() == f"{REMEDIES[kind][-1][1]}.".lower()
+    assert advice("cut") == ""
+
+
+def test_a_doubt_is_repeated_by_its_own_kind_and_by_that_of_the_result() -> None:
+    assert repeats("not all may be smoke", ["not all is smoke"]) and repeats("cut", ["cut"])
+    assert not repeats("not all is smoke", ["not all may be smoke"]) and not repeats("", [""])
 
 
 def test_a_match_before_a_background_that_may_hold_smoke_is_not_praised() -> None:
