@@ -8,13 +8,14 @@ from bpy.props import StringProperty
 
 from ..core.take import Take, TakeError
 from ..result import run_queue, smoke_takes
+from ..result.shot_check import settings_text
 from ..result.smoke_takes import Run, runs
 from ..scene import volume
 from ..scene.blender import ShotError
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import active_smoke, find_smoke
 from .common import ActsOnSmoke, RequiresClip, refuse
-from .layout import draw_doubt, draw_failure, draw_progress, draw_text
+from .layout import draw_doubts, draw_failure, draw_progress, draw_text
 from .quality_panel import SEEDS, draw_check
 
 
@@ -25,7 +26,7 @@ class SMOKELIFT_OT_run(ActsOnSmoke, RequiresClip, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        run_queue.enqueue(context, smoke, smoke_takes.write_take(smoke))
+        run_queue.enqueue(context, smoke, smoke_takes.write_take(smoke), settings_text(smoke))
 
 
 class SMOKELIFT_OT_vary(ActsOnSmoke, RequiresClip, bpy.types.Operator):
@@ -50,7 +51,7 @@ class SMOKELIFT_OT_vary(ActsOnSmoke, RequiresClip, bpy.types.Operator):
         except (ShotError, TakeError):
             smoke.smokelift.seed = before
             raise
-        run_queue.enqueue(context, smoke, take)
+        run_queue.enqueue(context, smoke, take, settings_text(smoke))
 
 
 class SMOKELIFT_OT_resume(ActsOnSmoke, RequiresClip, bpy.types.Operator):
@@ -107,9 +108,10 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
     row = column.row()
     row.enabled = index is not None and index["complete"]
     row.operator("smokelift.vary", icon="MOD_NOISE")
-    draw_check(layout, context, smoke)
+    draw_check(layout, context, smoke, {kind for run in own for kind, _ in run.job.doubts})
+    said: set[str] = set()
     for run in runs:
-        _draw_run(layout, context, smoke, run)
+        _draw_run(layout, context, smoke, run, said)
     if begun is not None:
         _draw_begun(layout, context, smoke, begun, any(run.take == begun for run in own))
     if index is not None:
@@ -150,8 +152,10 @@ def _draw_shown(
         column.operator("smokelift.make_proxy", icon="MOD_REMESH")
 
 
-def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, run: Run) -> None:
-    """A run, also of another smoke; that one's warnings stand in its own tab."""
+def _draw_run(
+    layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, run: Run, said: set[str]
+) -> None:
+    """A run, also of another smoke; that one's warnings stand in its own tab. Doubts that are ``said`` stand above."""
     box, job, own = layout.box(), run.job, run.smoke == shown.session_uid
     smoke, name = find_smoke(run.smoke), str(run.take.directory)
     if smoke is not None and not own:
@@ -168,8 +172,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy
         draw_text(box, context, job.sentence, "INFO")
     if run.icon:
         box.template_icon(icon_value=run.icon, scale=8.0)
-    for kind, words in job.doubts if own else ():
-        draw_doubt(box, context, kind, words)
+    if own:
+        draw_doubts(box, context, shown, job.doubts, said)
     if not job.ended:
         return
     if own and job.outcome == "done" and run.take != volume.shown_take(shown):  # after an undo to before it

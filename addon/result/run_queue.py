@@ -17,10 +17,17 @@ from .side_job import TICK_SECONDS, call_later, cancel_call
 from .smoke_takes import Run, runs, show_while_made
 
 
-def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:
+def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
     """Append a take to the queue; without a window, wait for its end.
 
     EngineMissingError, TakeError if it cannot be made.
+
+    Parameters
+    ----------
+    context, smoke, take
+        What is made.
+    settings
+        Those that it is made with, as `shot_check.settings_text` has them; empty if they are not the smoke's own.
     """
     try:
         words = engine_command(take.arguments() + thread_options())
@@ -31,7 +38,7 @@ def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> 
     done, uid = take.read().frames, smoke.session_uid
     job = Job(words, take.log_file, volume.frames_before_take(smoke, take), done)
     runs[:] = [run for run in runs if run.smoke != uid or not run.job.ended]
-    runs.append(Run(take, uid, job, (done, False)))
+    runs.append(Run(take, uid, job, (done, False), settings))
     work(context)
 
 
@@ -142,6 +149,9 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         run = running()
         waiting = next((run for run in runs if run.job.outcome == "waiting"), None)
         changed = run is not None and run.job.poll()
+        if changed and run.settings and run.job.forecast is not None and (smoke := find_smoke(run.smoke)) is not None:
+            shot_check.learn(smoke, run.settings, run.job)
+            run.settings = ""
         if run is None and waiting is not None:
             waiting.job.start()
             changed = True

@@ -5,7 +5,8 @@ session is not measured anew.
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -96,13 +97,20 @@ state = ShotCheck()
 """The check of this session, which is never saved."""
 
 
-def settings_text(smoke: bpy.types.Object) -> str:
-    """All settings of a smoke, its scene's size and rate, and the place of its box, as a text to compare them by.
+NEUTRAL = {
+    *("quality", "seed"),
+    *("output", "folder", "results", "saved_as", "before", "directing", "speed", "between"),
+    *("set_up_range", "set_up_camera", "set_up_light", "set_up_plate", "set_up_colors", "plate_place"),
+    "assumed_camera",
+}
+"""Settings that change nothing in what the engine says of a shot: it says what each quality takes."""
 
-    Some of them decide nothing; the engine is not asked again about a shot that differs in those alone.
-    """
+
+def settings_text(smoke: bpy.types.Object) -> str:
+    """What decides a check: settings of a smoke, its scene's size and rate, and the place of its box, as a text."""
     settings, render = smoke.smokelift, scene_of(smoke).render
-    values = [getattr(settings, setting.identifier) for setting in settings.bl_rna.properties]
+    names = [setting.identifier for setting in settings.bl_rna.properties]
+    values = [getattr(settings, name) for name in names if name not in NEUTRAL]
     box = box_of(smoke) if settings.camera_mode == "SCENE" else None
     place = [f"{number:.5g}" for corner in box_corners(box) for number in corner] if box is not None else []
     size = (render.resolution_x, render.resolution_y, render.fps, render.fps_base)
@@ -113,11 +121,11 @@ check_job = SideJob()
 """The check's own, beside which files may be written."""
 
 
-def check(smoke: bpy.types.Object) -> None:
-    """Check a shot; without a window, to the end."""
+def check(smoke: bpy.types.Object, needs_page: bool = True) -> None:
+    """Check a shot; without a window, to the end. A run tells the same, but for the page."""
     bpy.context.view_layer.update()  # or the box would be where it was
     state.settings, state.done, state.error = settings_text(smoke), False, ""
-    _start(smoke)
+    _start(smoke, needs_page)
     if bpy.app.background:
         check_job.wait()
 
@@ -129,8 +137,19 @@ def stop(smoke: bpy.types.Object) -> None:
     state.error = rpt_("Time and memory are not estimated: Check Shot does it.")
 
 
+def learn(smoke: bpy.types.Object, settings: str, job: Job) -> None:
+    """Take the forecast of a run that began with settings for a check, unless they have changed meanwhile."""
+    if job.forecast is None or settings != settings_text(smoke):
+        return
+    with suppress(ShotError):
+        shot = _fingerprint(smoke, shot_tables(smoke, quick=True))
+        _known[shot] = job.forecast
+        state.settings, state.error, state.page = settings, "", str(_page(shot))
+        state.store(smoke, *job.forecast)
+
+
 def make_way() -> None:
-    """Stop reading the clip for a run, which reads it too; the tab begins again when no run is left."""
+    """Stop reading the clip for a run, which reads it too; the tab begins again unless the run says what it found."""
     cancel_call(_start_later)
     if check_job.job is not None:
         check_job.stop()
@@ -157,26 +176,25 @@ def _start_later() -> None:
     with bpy.context.temp_override(window=manager.windows[0]):
         smoke = active_smoke(bpy.context.scene)
         if smoke is not None and smoke.smokelift.clip is not None:
-            check(smoke)
+            check(smoke, needs_page=False)
     redraw(manager)
 
 
-def _start(smoke: bpy.types.Object) -> None:
+def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
     """Start the engine on a shot, unless it is at work on it or it is known what it says.
 
     Its result goes into the state of the session.
     """
-    folder = Path(bpy.app.tempdir)
     try:
-        take, words = Take(folder / "smokelift_check"), options(smoke)
-        take.write(shot_tables(smoke, quick=True), words)
-        shot = _fingerprint(take.scene_file.read_bytes(), words + thread_options(), smoke)
-        page = folder / f"smokelift_inspect_{shot}.png"
+        take, words, tables = Take(Path(bpy.app.tempdir) / "smokelift_check"), options(smoke), shot_tables(smoke, True)
+        take.write(tables, words)
+        shot = _fingerprint(smoke, tables)
+        page = _page(shot)
         if check_job.job is not None and state.page == str(page):
             return
         check_job.stop()
         state.done, state.page = False, str(page)
-        if shot in _known:
+        if shot in _known and (page.is_file() or not needs_page):
             state.store(smoke, *_known[shot])
             return
 
@@ -196,19 +214,24 @@ def _start(smoke: bpy.types.Object) -> None:
         state.error = str(error)
 
 
-def _fingerprint(tables: bytes, words: Sequence[str], smoke: bpy.types.Object) -> str:
+def _page(shot: str) -> Path:
+    """The picture of what was found in a shot, by its fingerprint."""
+    return Path(bpy.app.tempdir) / f"smokelift_inspect_{shot}.png"
+
+
+def _fingerprint(smoke: bpy.types.Object, tables: Mapping[str, Any]) -> str:
     """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads.
 
-    The quality does not: a check says what all of them take.
+    Options that are `NEUTRAL` do not.
     """
-    settings = smoke.smokelift
+    settings, words = smoke.smokelift, options(smoke) + thread_options()
+    neutral = (settings.quality, f"--seed={settings.seed}")
     paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]
     if settings.strokes is not None:
         paths.append(absolute(settings.strokes.filepath, settings.strokes.library))
     states = [(path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None for path in paths]
-    return hashlib.sha256(
-        tables + repr(([word for word in words if word != settings.quality], states)).encode()
-    ).hexdigest()[:16]
+    parts = repr((tables, [word for word in words if word not in neutral], states))
+    return hashlib.sha256(parts.encode()).hexdigest()[:16]
 
 
 @persistent

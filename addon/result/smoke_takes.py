@@ -36,6 +36,8 @@ class Run:
         The engine's process, which may wait.
     shown
         How many frames of it are on show, and whether its end is.
+    settings
+        Those that it was begun with, until its forecast is taken for a check of them; empty without one.
     first
         Whether nothing of it was shown yet.
     before
@@ -52,6 +54,7 @@ class Run:
     smoke: int
     job: Job
     shown: tuple[int, bool]
+    settings: str = ""
     first: bool = True
     before: Take | None = None
     seen: bool = False

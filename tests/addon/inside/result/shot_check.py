@@ -14,15 +14,20 @@ from tests.addon.inside.panel.tab import words
 from tests.example_shot import smoke
 
 FIGURES = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": 0.1}
-DONE = {"event": "done", "text": "Done.", **FIGURES, "qualities": dict.fromkeys(QUALITIES, FIGURES)}
+FOUND = {"qualities": dict.fromkeys(QUALITIES, FIGURES), "background_color": [0.5, 0.6, 0.7]}
+DONE = {"event": "done", "text": "Done.", **FOUND}
 ENGINE = f"""
 import sys, time
+from pathlib import Path
 with open(sys.argv[1], "a") as file:
     print("read", file=file)
 time.sleep(float(sys.argv[2]))
+Path(sys.argv[sys.argv.index("--page") + 1]).touch()
 print({json.dumps(DONE)!r})
 """
 """Stands in for the engine, which reads for some seconds."""
+
+CUT = ("before", "after", "first", "last")
 
 
 @pytest.fixture(params=["30"])
@@ -52,21 +57,21 @@ def test_another_quality_is_known_and_another_shot_is_read(shot, engine) -> None
 
 def test_a_reading_of_the_same_shot_goes_on(shot, engine) -> None:
     obj, job = smoke(shot), shot_check.check_job
-    shot_check._start(obj)
+    shot_check._start(obj, needs_page=True)
     before = job.job
     obj.smokelift.quality = "final"
     bpy.ops.smokelift.match_clip()
-    shot_check._start(obj)
+    shot_check._start(obj, needs_page=True)
     assert job.job is before
     obj.smokelift.use_medium = True
-    shot_check._start(obj)
+    shot_check._start(obj, needs_page=True)
     assert job.job is not before and before.outcome == "cancelled"
 
 
 def test_a_reading_can_be_stopped(shot, engine) -> None:
     bpy.context.view_layer.update()
     shot_check.state.settings = shot_check.settings_text(smoke(shot))
-    shot_check._start(smoke(shot))
+    shot_check._start(smoke(shot), needs_page=True)
     job = shot_check.check_job.job
     assert "[stop_check]" in words(shot)
     assert bpy.ops.smokelift.stop_check() == {"FINISHED"}
@@ -75,10 +80,37 @@ def test_a_reading_can_be_stopped(shot, engine) -> None:
     assert "not estimated" in texts and "[stop_check]" not in texts and "[run]" in texts
 
 
+@pytest.mark.parametrize("engine", ["0"], indirect=True)
+def test_a_run_is_a_reading_too(shot, engine, tmp_path, monkeypatch) -> None:
+    """Until a setting changes that matters; the page alone is made by a reading of its own."""
+    said = [
+        {"event": "note", "kind": "cut", "text": "A cut.", "doubt": True, "figures": dict.fromkeys(CUT, 1)},
+        {"event": "start", "done": 0, "total": 6, **FOUND},
+        {"event": "note", "kind": "empty frames", "text": "No smoke.", "doubt": True, "figures": {}},
+    ]
+    run = f"for line in {[json.dumps(message) for message in said]!r}: print(line)"
+    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", run])
+    state, obj = shot_check.state, smoke(shot)
+    obj.smokelift.output = str(tmp_path)
+    shot_check.state.settings = ""
+    bpy.ops.smokelift.run()
+    assert state.fits(obj) and state.done and [kind for kind, _ in state.doubts] == ["cut"]
+    obj.smokelift.quality, obj.smokelift.seed = "final", 7
+    assert state.fits(obj) and state.costs(obj)["final"] == FIGURES
+    state.settings = ""
+    shot_check.check(obj, needs_page=False)
+    assert state.done and not engine.exists()
+    bpy.ops.smokelift.check()
+    assert engine.read_text() == "read\n" and Path(state.page).is_file()
+    obj.smokelift.detail = 0.0
+    shot_check.check(obj, needs_page=False)
+    assert engine.read_text() == "read\n" * 2
+
+
 def test_a_run_does_not_read_the_clip_beside_a_check(shot, engine, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", ""])
     smoke(shot).smokelift.output = str(tmp_path)
-    shot_check._start(smoke(shot))
+    shot_check._start(smoke(shot), needs_page=True)
     job = shot_check.check_job.job
     assert bpy.ops.smokelift.run() == {"FINISHED"}
     assert job.outcome == "cancelled" and shot_check.check_job.job is None
