@@ -6,6 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty
 
 from ..scene import shot_setup, volume
 from ..scene.blender import ShotError
+from ..scene.plate import clip_behind
 from .common import ChangesScene, RequiresClip, RequiresClipAndResult, sub_panels
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
@@ -22,7 +23,8 @@ class SetUpSettings:
     )
     set_up_camera: BoolProperty(
         name="Camera",
-        description="Look through the camera of the clip, with the clip behind it",
+        description="Look through the camera of the clip, with the background behind it that the render has, and the "
+        "clip at a switch",
         default=True,
     )
     set_up_light: BoolProperty(
@@ -102,6 +104,10 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.use_property_split = True
     row.active = settings.set_up_plate
     row.prop(settings, "plate_place")
+    camera = context.scene.camera
+    clip = clip_behind(smoke, camera.data) if camera is not None and camera.type == "CAMERA" else None
+    if clip is not None:
+        layout.prop(clip, "show_background_image", text="Clip in View", icon="NONE")
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 

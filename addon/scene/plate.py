@@ -6,12 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from mathutils import Vector
+from mathutils import Color, Vector
 
 from . import volume
 from .blender import ShotError, absolute, relative
 from .clip import frame_count, number_in_file
 from .strokes import saved_strokes
+
+MARK = "smokelift_plate"
+"""Custom property of pictures that a camera's view shows behind smoke, by which they are found again."""
+
+BACKGROUND = "Smokelift Background"
+"""Name of a picture of one color."""
 
 
 def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
@@ -101,6 +107,54 @@ def show_plate(
     node = color.links[0].from_node
     node.image = plate_image(smoke)
     synchronize_plate(smoke, node.image, node.image_user)
+
+
+def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None:
+    """Show in the view through a camera what a render shows behind the smoke; the clip can be shown over it.
+
+    The second time only the picture changes: what the artist shows or hides stays.
+    """
+    camera.show_background_images = True
+    pictures, background = camera.background_images, shown_background(smoke)
+    if "image" in background:
+        image = plate_image(smoke)
+    else:
+        image = bpy.data.images.get(BACKGROUND) or bpy.data.images.new(BACKGROUND, 8, 8)
+        color = Color(background.get("color", (0.0, 0.0, 0.0))).from_scene_linear_to_srgb()
+        image.generated_color = (*color, 1.0)
+    image[MARK] = True
+    picture = next((each for each in pictures if each.source == "IMAGE" and each.image and each.image.get(MARK)), None)
+    if picture is None:
+        if (clip := clip_behind(smoke, camera)) is not None:
+            pictures.remove(clip)  # it would be below
+        picture = _new_picture(camera, "IMAGE")
+        picture.frame_method = "STRETCH"
+        _new_picture(camera, "MOVIE_CLIP").clip = smoke.smokelift.clip
+        clip_behind(smoke, camera).show_background_image = False
+    picture.image = image
+    if "image" in background:
+        synchronize_plate(smoke, image, picture.image_user)
+
+
+def show_clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None:
+    """Show the clip in the view through a camera, behind everything."""
+    camera.show_background_images = True
+    if clip_behind(smoke, camera) is None:
+        _new_picture(camera, "MOVIE_CLIP").clip = smoke.smokelift.clip
+    clip_behind(smoke, camera).show_background_image = True
+
+
+def clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
+    """The clip in the view through a camera, shown or hidden; None without one."""
+    clip = smoke.smokelift.clip
+    found = (each for each in camera.background_images if each.source == "MOVIE_CLIP" and each.clip == clip)
+    return next(found, None)
+
+
+def _new_picture(camera: bpy.types.Camera, source: str) -> bpy.types.CameraBackgroundImage:
+    picture = camera.background_images.new()
+    picture.source, picture.alpha, picture.display_depth = source, 1.0, "BACK"
+    return picture
 
 
 def synchronize_plate(smoke: bpy.types.Object, image: bpy.types.Image, user: Any) -> None:

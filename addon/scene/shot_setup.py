@@ -15,7 +15,7 @@ from . import volume
 from .blender import set_and_remember, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
-from .plate import show_plate
+from .plate import show_clip_behind, show_plate, show_plate_behind
 from .projection import project, show_card
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
@@ -82,7 +82,10 @@ def set_up(smoke: bpy.types.Object) -> list[str]:
         match_clip(smoke)
     if settings.set_up_camera:
         scene.camera = assumed_camera(smoke) or scene.camera
-        show_clip_behind(scene.camera.data, settings.clip)
+        if settings.set_up_plate:
+            show_plate_behind(smoke, scene.camera.data)
+        else:
+            show_clip_behind(smoke, scene.camera.data)
     if settings.set_up_light:
         scene.render.engine = "CYCLES"
         _sample_for_a_minute(scene)
@@ -158,18 +161,6 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     if scene.camera is None:
         scene.camera = camera
     return camera
-
-
-def show_clip_behind(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> None:
-    """Show a clip in the view through a camera, behind everything."""
-    camera.show_background_images = True
-    if any(image.source == "MOVIE_CLIP" and image.clip == clip for image in camera.background_images):
-        return
-    image = camera.background_images.new()
-    image.source = "MOVIE_CLIP"
-    image.clip = clip
-    image.alpha = 1.0
-    image.display_depth = "BACK"
 
 
 def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
