@@ -9,7 +9,7 @@ from mathutils import Vector
 from ..scene.blender import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
 from ..scene.floor import Floor
-from ..scene.shot_setup import show_clip_behind
+from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
 from .common import ChangesScene, RequiresClip, automatic_unless, closed_sides, refuse
@@ -167,7 +167,7 @@ class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
         except ShotError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        show_clip_behind(context.scene.camera.data, smoke.smokelift.clip)
+        show_clip_behind(smoke, context.scene.camera.data)
         self._view = context.space_data.region_3d
         self._before = self._view.view_perspective
         self._view.view_perspective = "CAMERA"
@@ -230,7 +230,10 @@ def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         row.prop(settings, "plate_frames", text=" ")
         row.operator("smokelift.clear_plate_frames", text="", icon="X")
     elif settings.plate_mode == "COLOR":
-        layout.prop(settings, "plate_color", text=" ")
+        row = layout.row(align=True)
+        row.prop(settings, "plate_color", text=" ")
+        path = f'blend_data.objects["{bpy.utils.escape_identifier(smoke.name)}"].smokelift.plate_color'
+        row.operator("ui.eyedropper_color", text="", icon="EYEDROPPER").prop_data_path = path
     draw_mask(layout, settings)
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":

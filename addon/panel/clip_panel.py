@@ -15,6 +15,7 @@ from bpy.props import (
 )
 
 from ..result import smoke_takes
+from ..result.shot_check import state
 from ..scene import shot_setup
 from ..scene.blender import ShotError, absolute, frame_rate, relative
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
@@ -34,7 +35,15 @@ def _clip_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) 
         return
     settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
     settings.plate_frames = ""
+    settings.property_unset("plate_color")
     settings.folder, settings.results = free_folder(settings.id_data), ""
+
+
+def _background_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Begin with the color that a reading of the clip found, unless one was chosen before."""
+    found = state.found_color(settings.id_data)
+    if settings.plate_mode == "COLOR" and found is not None and not settings.is_property_set("plate_color"):
+        settings.plate_color = found
 
 
 class ClipSettings:
@@ -69,8 +78,9 @@ class ClipSettings:
                 "Picture of the same view without smoke; for a moving camera, one for each frame",
             ),
             ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
-            ("COLOR", "Color", "One color, as behind stock footage on black"),
+            ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
         ],
+        update=_background_chosen,
     )
     plate_color: FloatVectorProperty(
         name="Background Color",
@@ -267,14 +277,14 @@ class SMOKELIFT_OT_new_mask(ChangesScene, RequiresClip, bpy.types.Operator):
             open_tab(show_clip(settings.clip, settings.drawn_mask))
 
 
-class SMOKELIFT_OT_track_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
-    """Open the clip in the Clip Editor, where its camera is tracked, or the picture stabilized (Stabilization)"""
+class SMOKELIFT_OT_show_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+    """Open the clip in the Clip Editor, to choose its frames, track its camera, or stabilize it (Stabilization)"""
 
-    bl_label = "Track or Stabilize"
+    bl_label = "Show Clip"
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         if not bpy.app.background:
-            show_clip(smoke.smokelift.clip)
+            open_tab(show_clip(smoke.smokelift.clip))
 
 
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -287,6 +297,7 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
+    row.operator("smokelift.show_clip", text="", icon="FILE_MOVIE")
     _draw_gaps(layout, context, settings)
     if is_distorted(clip):
         column = layout.column(align=True)

@@ -92,7 +92,7 @@ def draw_failure(layout: bpy.types.UILayout, context: bpy.types.Context, words: 
     """Why a check or a run ended without a result, and the button that helps."""
     draw_text(layout, context, words, "ERROR")
     if MOVING_CAMERA in words:
-        layout.operator("smokelift.track_clip", icon="TRACKER")
+        layout.operator("smokelift.show_clip", text="Track or Stabilize", icon="TRACKER")
 
 
 def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:

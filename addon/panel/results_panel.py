@@ -70,7 +70,7 @@ class SMOKELIFT_OT_name_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         Take(Path(self.take)).give_title(self.title)
-        redraw(context.window_manager)
+        redraw()
 
 
 class SMOKELIFT_OT_remove_take(_OnResult, ActsOnSmoke, bpy.types.Operator):

@@ -161,7 +161,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
                 self._show(run)
             new = []
         if changed:
-            redraw(context.window_manager)
+            redraw()
         return bool(new) or any(not run.job.ended for run in runs)
 
     def _show(self, run: Run) -> None:

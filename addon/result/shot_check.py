@@ -5,7 +5,7 @@ session is not measured anew.
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,6 +87,10 @@ class ShotCheck:
         """What each quality takes and loses, also of this smoke before its last change; nothing of one that failed."""
         failed = self.fits(smoke) and self.error
         return self.details["qualities"] if self.of == smoke.session_uid and not failed else {}
+
+    def found_color(self, smoke: bpy.types.Object) -> Sequence[float] | None:
+        """The color behind this smoke (linear), also before its last change; None if it was never read."""
+        return self.details.get("background_color") if self.of == smoke.session_uid else None
 
     def store(self, smoke: bpy.types.Object, details: Mapping[str, Any], doubts: list[tuple[str, str]]) -> None:
         """Keep what the engine said of the smoke."""
@@ -172,12 +176,11 @@ def check_soon(context: bpy.types.Context, smoke: bpy.types.Object) -> bool:
 
 def _start_later() -> None:
     """Check the smoke in the tab; a timer, which has no window."""
-    manager = bpy.context.window_manager
-    with bpy.context.temp_override(window=manager.windows[0]):
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         smoke = active_smoke(bpy.context.scene)
         if smoke is not None and smoke.smokelift.clip is not None:
             check(smoke, needs_page=False)
-    redraw(manager)
+    redraw()
 
 
 def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
@@ -242,7 +245,7 @@ def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
     changed = {update.id.original for update in depsgraph.updates}
     if any(smoke.smokelift.drawn_mask in changed for smoke in smokes(scene)):
         state.settings = ""
-        redraw(bpy.context.window_manager)
+        redraw()
 
 
 def register() -> None:

@@ -95,7 +95,7 @@ class SideJob:
             return None
         self.seconds = int(time.monotonic() - self._began)
         if job.poll() or self.seconds != before:
-            redraw(bpy.context.window_manager)
+            redraw()
         if not job.ended:
             return TICK_SECONDS
         self.job = None

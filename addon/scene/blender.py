@@ -1,6 +1,7 @@
 """What all parts ask of Blender: paths, frames, the user's preferences, and values that follow the newest result."""
 
 import os
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -53,6 +54,13 @@ def relative(path: Path, folder: Path | None = None) -> str:
         return bpy.path.relpath(str(path), start=None if folder is None else str(folder))
     except ValueError:  # on another drive
         return str(path)
+
+
+REDRAW_SECONDS = 0.5
+"""Between two drawings of the tab while something counts in it."""
+
+_drawn_at = 0.0
+"""When the tab was drawn last because something counted in it (s)."""
 
 
 class ShotError(ValueError):
@@ -171,9 +179,19 @@ def _classes(module: ModuleType) -> list[type]:
     return [cls for cls in classes if cls.__module__ == module.__name__]
 
 
-def redraw(manager: bpy.types.WindowManager) -> None:
-    """Redraw every area that shows the panel."""
-    for window in manager.windows:
+def redraw() -> None:
+    """Redraw the tab soon, however often it is asked for: while Blender draws, it takes no click."""
+    if not bpy.app.timers.is_registered(_redraw_sidebars):
+        wait = max(0.0, _drawn_at + REDRAW_SECONDS - time.monotonic())
+        bpy.app.timers.register(_redraw_sidebars, first_interval=wait)
+
+
+def _redraw_sidebars() -> None:
+    """Redraw every sidebar that shows the tab, and nothing beside it: the view takes long."""
+    global _drawn_at
+    _drawn_at = time.monotonic()
+    for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in ("VIEW_3D", "CLIP_EDITOR"):
-                area.tag_redraw()
+            for region in area.regions if area.type in ("VIEW_3D", "CLIP_EDITOR") else ():
+                if region.type == "UI":
+                    region.tag_redraw()

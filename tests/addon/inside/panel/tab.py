@@ -67,7 +67,12 @@ def words(scene: bpy.types.Scene) -> str:
     return " ".join(said(scene))
 
 
-def know(scene: bpy.types.Scene, doubts: list[tuple[str, str]] | None = None, **figures: Any) -> None:
+def know(
+    scene: bpy.types.Scene,
+    doubts: list[tuple[str, str]] | None = None,
+    background_color: list[float] | None = None,
+    **figures: Any,
+) -> None:
     """The shot is checked, and all qualities have these figures."""
     each = {
         "resolution": [48, 48, 64],
@@ -79,6 +84,7 @@ def know(scene: bpy.types.Scene, doubts: list[tuple[str, str]] | None = None, **
     }
     each |= figures
     details = {"qualities": dict.fromkeys(QUALITIES, each)}
+    details["background_color"] = background_color
     details["facts"] = [{"what": "background", "short": "a picture"}]
     shot_check.state.settings, shot_check.state.error = shot_check.settings_text(smoke(scene)), ""
     shot_check.state.store(smoke(scene), details, doubts or [])
@@ -223,10 +229,10 @@ def test_a_camera_that_travels_is_said_with_the_button_that_tracks_it(shot, tmp_
     refused = f"{MOVING_CAMERA} from the clip. Stabilize the clip."
     shot_check.state.settings, shot_check.state.error = shot_check.settings_text(smoke(shot)), refused
     job = known_run(smoke(shot), Take(tmp_path), "failed", refused).job
-    assert said(shot).count("[track_clip]") == 2
-    assert bpy.ops.smokelift.track_clip() == {"FINISHED"}
+    assert said(shot).count("Track or Stabilize") == 2
+    assert bpy.ops.smokelift.show_clip() == {"FINISHED"}
     shot_check.state.error = job.sentence = "The box is flat."
-    assert "[track_clip]" not in said(shot)
+    assert "Track or Stabilize" not in said(shot)
 
 
 def buttons(texts: list[str]) -> int:
@@ -240,7 +246,7 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
     know(shot)
     places = [buttons(drawn(shot))]
     state.error = refused
-    assert buttons(drawn(shot)) < drawn(shot).index("[track_clip]")
+    assert buttons(drawn(shot)) < said(shot).index("Track or Stabilize")
     know(shot)
     volume.show(smoke(shot), made(tmp_path))
     for outcome in ("done", "waiting", "running", "failed"):
@@ -251,12 +257,12 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
     assert "[cancel]" in drawn(shot, bpy.types.SMOKELIFT_PT_view_direct)
     texts = said(shot)
     assert texts.count("[cancel]") == 2 and texts.count("A person moves.") == 1
-    assert {"[track_clip]", "[show_take]"} <= set(texts)
+    assert {"Track or Stabilize", "[show_take]"} <= set(texts)
     for run in runs:
         run.smoke += 1
     texts = said(shot)
     assert texts.count("[cancel]") == 2
-    assert not {"A person moves.", "[track_clip]", "[show_take]"} & set(texts)
+    assert not {"A person moves.", "Track or Stabilize", "[show_take]"} & set(texts)
 
 
 @pytest.mark.parametrize("name", ["plate", "mask"])

@@ -5,14 +5,17 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Color
 
 from addon.core.take import Take
 from addon.panel import element_panel
 from addon.result.smoke_takes import output_folder
+from addon.scene import volume
 from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables, shot_tables
-from conftest import pixels, pixels_of, save_image
+from conftest import changed, made, pixels, pixels_of, save_image
 from smokelift.scene import Background, Scene
+from tests.addon.inside.panel.tab import drawn, know
 from tests.example_shot import EXAMPLE, smoke
 
 # frames of the clip as the clean plate
@@ -52,6 +55,56 @@ def test_one_color_is_the_background(shot) -> None:
     assert footage_tables(smoke(shot))["background"] == {"color": [0.0, 0.0, 0.0]}
     settings.plate_color = (0.25, 0.5, 2.0)
     assert Background(**footage_tables(smoke(shot))["background"]).color == (0.25, 0.5, 2.0)
+
+
+# what the view through the camera shows behind the smoke
+
+
+def test_the_view_has_the_plate_of_the_render_and_the_clip_at_a_switch(shot, tmp_path) -> None:
+    """Also where a file of before shows the clip; a second set-up changes the plate alone."""
+    obj, camera = smoke(shot), shot.camera.data
+    for name in ("set_up_range", "set_up_light", "set_up_colors"):
+        setattr(obj.smokelift, name, False)
+    obj.smokelift.set_up_plate = False
+    takes = [made(tmp_path, number=number) for number in (1, 2)]
+    for take, background in zip(
+        takes, ({"image": str(EXAMPLE / "plate.png")}, {"color": [0.2, 0.5, 1.0]}), strict=True
+    ):
+        with changed(take) as index:
+            index["scene"] |= {"background": background, "camera": {}}
+    volume.show(obj, takes[0])
+    bpy.ops.smokelift.set_up()
+    (clip,) = camera.background_images
+    assert (clip.clip, clip.show_background_image) == (obj.smokelift.clip, True)
+    obj.smokelift.set_up_plate = True
+    bpy.ops.smokelift.set_up()
+    plate, clip = camera.background_images
+    assert (Path(plate.image.filepath).name, plate.show_background_image) == ("plate.png", True)
+    assert (clip.clip, clip.show_background_image) == (obj.smokelift.clip, False)
+    assert "Clip in View" in drawn(shot, bpy.types.SMOKELIFT_PT_view_set_up)
+    plate.show_background_image, clip.show_background_image = False, True
+    volume.show(obj, takes[1])
+    bpy.ops.smokelift.set_up()
+    plate, clip = camera.background_images
+    shown = Color(plate.image.generated_color[:3]).from_srgb_to_scene_linear()
+    assert tuple(shown) == pytest.approx((0.2, 0.5, 1.0), abs=1e-3)
+    assert (plate.show_background_image, clip.show_background_image) == (False, True)
+
+
+def test_the_color_begins_with_the_one_that_was_found(shot) -> None:
+    """Unless there is none, or one was chosen; another clip has another."""
+    settings = smoke(shot).smokelift
+    for found, chosen, wanted in ((None, None, 0.0), (0.5, None, 0.5), (0.7, None, 0.5), (0.7, 0.9, 0.9)):
+        know(shot, background_color=None if found is None else [found] * 3)
+        settings.plate_mode = "ESTIMATE"
+        if chosen is not None:
+            settings.plate_color = [chosen] * 3
+        settings.plate_mode = "COLOR"
+        assert tuple(settings.plate_color) == pytest.approx([wanted] * 3)
+    settings.plate_mode, settings.clip = "ESTIMATE", bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+    settings.plate_mode = "COLOR"
+    assert tuple(settings.plate_color) == pytest.approx([0.7] * 3)
+    assert "[ui.eyedropper_color]" in drawn(shot, bpy.types.SMOKELIFT_PT_view)
 
 
 # strokes
