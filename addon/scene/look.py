@@ -214,18 +214,12 @@ def _new_material(name: str) -> bpy.types.Material:
     tree = material.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
-    node = _add_group(tree)
-    node.name = node.label = NODE
-    node.location = (-300.0, 0.0)
-    tree.links.new(node.outputs[0], output.inputs["Volume"])
-    return material
-
-
-def _add_group(tree: bpy.types.NodeTree) -> bpy.types.ShaderNode:
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")], _build)
-    node.width = 220.0
-    return node
+    node.name = node.label = NODE
+    node.width, node.location = 220.0, (-300.0, 0.0)
+    tree.links.new(node.outputs[0], output.inputs["Volume"])
+    return material
 
 
 def _build(tree: bpy.types.NodeTree) -> None:

@@ -16,7 +16,7 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, add_node, get_input, input_path, math_node, new_group, own_group, set_input
+from .nodes import Input, add_node, file_group, get_input, input_path, math_node, set_input
 
 
 @dataclass(frozen=True)
@@ -25,20 +25,17 @@ class SecondVolume:
 
     Attributes
     ----------
-    name
-        Of the modifier; the name of the second Volume ends in `socket`.
-    mark
-        Custom property by which its node group is known under any name.
+    name, mark, inputs, build
+        Of the modifier and its node group, as `file_group` has them.
     socket
-        Input of the group that is the second Volume's object.
-    new_group
-        Makes a new node group with that mark.
+        Input that is the second Volume's object, whose name ends so.
     """
 
     name: str
     mark: str
+    inputs: tuple[Input, ...]
+    build: Callable[[bpy.types.NodeTree], None]
     socket: str
-    new_group: Callable[[], bpy.types.NodeTree]
 
     def modifier(self, smoke: bpy.types.Object) -> bpy.types.Modifier | None:
         """The modifier of a smoke."""
@@ -56,7 +53,9 @@ class SecondVolume:
         modifier = self.modifier(smoke)
         if modifier is None:
             modifier = smoke.modifiers.new(self.name, "NODES")
-            modifier.node_group = own_group(self.mark) or self.new_group()
+            smoke_out = [("Smoke", "NodeSocketGeometry")]
+            group = file_group(self.name, "GeometryNodeTree", self.mark, self.inputs, smoke_out, self.build)
+            modifier.node_group = group
             smoke.modifiers.move(len(smoke.modifiers) - 1, 0)  # those of the artist act on what it makes
         obj = get_input(modifier, self.socket)
         if obj is None or obj.users > 1:  # that of the smoke that this one is a duplicate of
@@ -118,15 +117,13 @@ def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
         _PROXY.remove(smoke)
 
 
-def _proxy_group() -> bpy.types.NodeTree:
-    tree = new_group(PROXY, "GeometryNodeTree", _PROXY.mark, _PROXY_INPUTS, [("Shown", "NodeSocketGeometry")])
+def _build_proxy(tree: bpy.types.NodeTree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0)
     shown = add_node(tree, "GeometryNodeObjectInfo", 1, 0, given.outputs["Proxy"])
     add_node(tree, "NodeGroupOutput", 2, 0, shown.outputs["Geometry"])
-    return tree
 
 
-_PROXY = SecondVolume(PROXY, "smokelift_proxy", "Proxy", _proxy_group)
+_PROXY = SecondVolume(PROXY, "smokelift_proxy", _PROXY_INPUTS, _build_proxy, "Proxy")
 
 INTERPOLATION = "Smokelift Frames Between"
 """Name of the node group, and of the modifier."""
@@ -184,10 +181,7 @@ def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> 
     driver.expression = f"fmod({place},1)"
 
 
-def _interpolation_group() -> bpy.types.NodeTree:
-    tree = new_group(
-        INTERPOLATION, "GeometryNodeTree", _INTERPOLATION.mark, _INTERPOLATION_INPUTS, [("Smoke", "NodeSocketGeometry")]
-    )
+def _build_interpolation(tree: bpy.types.NodeTree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0).outputs
     later = add_node(tree, "GeometryNodeObjectInfo", 1, 3, given["Next Frame"]).outputs["Geometry"]
 
@@ -211,7 +205,8 @@ def _interpolation_group() -> bpy.types.NodeTree:
         mixed = math_node(tree, "ADD", 6, row, before, moved(later, name, row + 2, back, given["Part"]))
         result = add_node(tree, "GeometryNodeStoreNamedGrid", 7 + number, row, result, name, mixed).outputs[0]
     add_node(tree, "NodeGroupOutput", 7 + len(GRIDS), 0, result)
-    return tree
 
 
-_INTERPOLATION = SecondVolume(INTERPOLATION, "smokelift_between", "Next Frame", _interpolation_group)
+_INTERPOLATION = SecondVolume(
+    INTERPOLATION, "smokelift_between", _INTERPOLATION_INPUTS, _build_interpolation, "Next Frame"
+)

@@ -20,25 +20,30 @@ class Input(NamedTuple):
     high: float | None = None
 
 
-def own_group(mark: str) -> bpy.types.NodeTree | None:
-    """The file's own node group with a mark, which the artist may have renamed or changed; None if there is none."""
-    return next((group for group in bpy.data.node_groups if group.library is None and group.get(mark)), None)
-
-
-def new_group(
-    name: str, kind: str, mark: str, inputs: Sequence[Input], outputs: Sequence[tuple[str, str]]
+def file_group(
+    name: str,
+    kind: str,
+    mark: str,
+    inputs: Sequence[Input],
+    outputs: Sequence[tuple[str, str]],
+    build: Callable[[bpy.types.NodeTree], None],
 ) -> bpy.types.NodeTree:
-    """A new node group without nodes.
+    """The file's own node group, which the artist may have changed, or else a new one.
 
     Parameters
     ----------
     name, kind
         Its name, and the type of its tree.
     mark
-        Custom property by which `own_group` finds it under any name.
+        Custom property by which it is found under any name.
     inputs, outputs
         Its sockets; of the outputs name and type.
+    build
+        Adds the nodes to a new one.
     """
+    for group in bpy.data.node_groups:
+        if group.library is None and group.get(mark):
+            return group
     tree = bpy.data.node_groups.new(name, kind)
     tree[mark] = True
     if kind == "GeometryNodeTree":
@@ -52,25 +57,7 @@ def new_group(
                 setattr(socket, attribute, value)
     for output, output_kind in outputs:
         tree.interface.new_socket(output, in_out="OUTPUT", socket_type=output_kind)
-    return tree
-
-
-def file_group(
-    name: str,
-    kind: str,
-    mark: str,
-    inputs: Sequence[Input],
-    outputs: Sequence[tuple[str, str]],
-    build: Callable[[bpy.types.NodeTree], None],
-) -> bpy.types.NodeTree:
-    """The file's own node group, which the artist may have changed, else a new one with the nodes that `build` adds.
-
-    The other parameters are those of `new_group`.
-    """
-    tree = own_group(mark)
-    if tree is None:
-        tree = new_group(name, kind, mark, inputs, outputs)
-        build(tree)
+    build(tree)
     return tree
 
 
