@@ -15,11 +15,11 @@ from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from ..core.job import EngineMissingError, Job
 from ..core.sentences import disk_size
 from ..scene import volume
-from ..scene.blender import absolute, relative
+from ..scene.blender import absolute, call_later, relative
 from ..scene.look import fit_look
 from ..scene.smoke import find_smoke
 from . import smoke_takes
-from .side_job import REST_SECONDS, call_later, cancel_call, writing_job
+from .side_job import REST_SECONDS, writing_job
 
 
 class SizeEstimate:
@@ -151,7 +151,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Unregister it, and the estimate that waits."""
-    cancel_call(_estimate)
+    """Unregister it."""
     if getattr(SMOKELIFT_USD_import, "is_registered", False):
         bpy.utils.unregister_class(SMOKELIFT_USD_import)

@@ -129,7 +129,7 @@ def _set(settings: bpy.types.PropertyGroup, name: str, path: str) -> None:
         setattr(settings, name, path)
 
 
-_HANDLERS = (
+HANDLERS = (
     (bpy.app.handlers.save_pre, _before_save),
     (bpy.app.handlers.save_post, _after_save),
     (bpy.app.handlers.save_post_fail, _stay),
@@ -137,13 +137,3 @@ _HANDLERS = (
     (bpy.app.handlers.undo_post, _after_undo),
     (bpy.app.handlers.redo_post, _after_undo),
 )
-
-
-def register() -> None:
-    for handlers, handler in _HANDLERS:
-        handlers.append(handler)
-
-
-def unregister() -> None:
-    for handlers, handler in _HANDLERS:
-        handlers.remove(handler)

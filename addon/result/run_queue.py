@@ -10,10 +10,10 @@ from bpy.app.handlers import persistent
 from ..core.job import EngineMissingError, Job, engine_command
 from ..core.take import Take, TakeError
 from ..scene import volume
-from ..scene.blender import redraw, thread_options
+from ..scene.blender import call_later, redraw, thread_options
 from ..scene.smoke import active_smoke, find_smoke, scene_of
 from . import shot_check
-from .side_job import TICK_SECONDS, call_later, cancel_call
+from .side_job import TICK_SECONDS
 from .smoke_takes import Run, runs, show_while_made
 
 
@@ -223,14 +223,11 @@ def _forget_all(_file: str = "") -> None:
     runs.clear()
 
 
-def register() -> None:
-    bpy.app.handlers.load_post.append(_forget_all)
+HANDLERS = ((bpy.app.handlers.load_post, _forget_all),)
 
 
 def unregister() -> None:
     """End the worker and its jobs."""
-    bpy.app.handlers.load_post.remove(_forget_all)
-    cancel_call(_work_later)
     manager = bpy.context.window_manager
     running = workers(manager)
     for worker in running:

@@ -17,12 +17,12 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core.job import EngineMissingError, Job
 from ..core.take import Take, TakeError
-from ..scene.blender import ShotError, absolute, redraw, thread_options
+from ..scene.blender import ShotError, absolute, call_later, cancel_call, redraw, thread_options
 from ..scene.box import box_corners, box_of
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
 from ..scene.smoke import active_smoke, scene_of, smokes
-from .side_job import REST_SECONDS, SideJob, call_later, cancel_call
+from .side_job import REST_SECONDS, SideJob
 from .smoke_takes import runs
 
 _known: dict[str, tuple[Mapping[str, Any], list[tuple[str, str]]]] = {}
@@ -248,11 +248,4 @@ def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
         redraw()
 
 
-def register() -> None:
-    bpy.app.handlers.depsgraph_update_post.append(_when_drawn_on)
-
-
-def unregister() -> None:
-    """End what would start a check."""
-    bpy.app.handlers.depsgraph_update_post.remove(_when_drawn_on)
-    cancel_call(_start_later)
+HANDLERS = ((bpy.app.handlers.depsgraph_update_post, _when_drawn_on),)

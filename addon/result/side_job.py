@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.job import Job, engine_command
-from ..scene.blender import redraw, thread_options
+from ..scene.blender import call_later, redraw, thread_options
 from ..scene.smoke import find_smoke
 
 TICK_SECONDS = 0.1
@@ -111,18 +111,6 @@ writing_job = SideJob()
 """WritesFiles files, or estimates how large they will be."""
 
 
-def call_later(timer: Callable[[], float | None], seconds: float) -> None:
-    """Have Blender call a function, once, however often it is asked for."""
-    cancel_call(timer)
-    bpy.app.timers.register(timer, first_interval=seconds)
-
-
-def cancel_call(timer: Callable[[], float | None]) -> None:
-    """Have Blender not call it."""
-    if bpy.app.timers.is_registered(timer):
-        bpy.app.timers.unregister(timer)
-
-
 class SMOKELIFT_OT_stop_writing(bpy.types.Operator):
     """Stop writing these files"""
 
@@ -142,13 +130,9 @@ def _stop_all(_file: str = "") -> None:
         job.stop()
 
 
-def register() -> None:
-    bpy.app.handlers.load_pre.append(_stop_all)
+HANDLERS = ((bpy.app.handlers.load_pre, _stop_all),)
 
 
 def unregister() -> None:
-    """Unregister it and end the engine."""
+    """End the engine."""
     _stop_all()
-    for job in SideJob.all:
-        cancel_call(job._timer)
-    bpy.app.handlers.load_pre.remove(_stop_all)

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -152,22 +152,45 @@ def _equal(found: list[float], set_last: list[float]) -> bool:
     )
 
 
+def call_later(timer: Callable[[], float | None], seconds: float) -> None:
+    """Have Blender call a function, once, however often it is asked for."""
+    cancel_call(timer)
+    bpy.app.timers.register(timer, first_interval=seconds)
+    _called_later.add(timer)
+
+
+def cancel_call(timer: Callable[[], float | None]) -> None:
+    """Have Blender not call it."""
+    if bpy.app.timers.is_registered(timer):
+        bpy.app.timers.unregister(timer)
+
+
+_called_later: set[Callable[[], float | None]] = set()
+"""What Blender was ever asked to call."""
+
+
 def register_modules(modules: Sequence[ModuleType]) -> None:
-    """Register the classes of modules, and whatever else each has to register."""
+    """Register the classes of modules, their ``HANDLERS``, each after the list that it is for, and whatever else."""
     for module in modules:
         for cls in _classes(module):
             bpy.utils.register_class(cls)
+        for handlers, handler in getattr(module, "HANDLERS", ()):
+            handlers.append(handler)
         if hasattr(module, "register"):
             module.register()
 
 
 def unregister_modules(modules: Sequence[ModuleType]) -> None:
-    """Unregister them."""
+    """Unregister them, and what would be called later."""
     for module in reversed(modules):
         if hasattr(module, "unregister"):
             module.unregister()
+        for handlers, handler in getattr(module, "HANDLERS", ()):
+            handlers.remove(handler)
         for cls in reversed(_classes(module)):
             bpy.utils.unregister_class(cls)
+    for timer in _called_later:
+        cancel_call(timer)
 
 
 def _classes(module: ModuleType) -> list[type]:
@@ -181,9 +204,7 @@ def _classes(module: ModuleType) -> list[type]:
 
 def redraw() -> None:
     """Redraw the tab soon, however often it is asked for: while Blender draws, it takes no click."""
-    if not bpy.app.timers.is_registered(_redraw_sidebars):
-        wait = max(0.0, _drawn_at + REDRAW_SECONDS - time.monotonic())
-        bpy.app.timers.register(_redraw_sidebars, first_interval=wait)
+    call_later(_redraw_sidebars, max(0.0, _drawn_at + REDRAW_SECONDS - time.monotonic()))
 
 
 def _redraw_sidebars() -> None:

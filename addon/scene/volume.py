@@ -357,15 +357,12 @@ _TIMES = (
     ("RenderSettings", "fps_base"),
 )
 
-_HANDLERS = (correct_positions, _listen)
+HANDLERS = ((bpy.app.handlers.load_post, correct_positions), (bpy.app.handlers.load_post, _listen))
 
 
 def register() -> None:
-    bpy.app.handlers.load_post.extend(_HANDLERS)
     _listen()
 
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_LISTENER)
-    for handler in _HANDLERS:
-        bpy.app.handlers.load_post.remove(handler)
