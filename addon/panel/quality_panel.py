@@ -133,9 +133,9 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
 
 
 def draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, said: set[str]) -> None:
-    """What the check of this smoke warns of beside what is ``said`` of its runs, or why it failed."""
+    """What the check of this smoke warns of, or why it failed, but for sentences and doubts that are ``said``."""
     state = shot_check.state
-    if not state.fits(smoke):
+    if not state.fits(smoke) or (state.error and state.error in said):
         return
     if state.error:
         draw_failure(layout, context, state.error)

@@ -108,7 +108,9 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
     row = column.row()
     row.enabled = index is not None and index["complete"]
     row.operator("smokelift.vary", icon="MOD_NOISE")
-    draw_check(layout, context, smoke, {kind for run in own for kind, _ in run.job.doubts})
+    jobs = [run.job for run in own]
+    of_runs = {job.sentence for job in jobs} | {kind for job in jobs for kind, _ in job.doubts}
+    draw_check(layout, context, smoke, of_runs)
     said: set[str] = set()
     for run in runs:
         _draw_run(layout, context, smoke, run, said)
@@ -131,7 +133,8 @@ def _draw_begun(
         text = iface_("{:s} was interrupted.") if frames else iface_("{:s} was interrupted before its first frame.")
         draw_text(layout, context, text.format(take.read().title), "ERROR")
     if frames:
-        text = iface_("Resume after Frame {:d}").format(volume.frames_before_take(smoke, take) + frames)
+        last = volume.frames_before_take(smoke, take) + frames
+        text = iface_("Resume {:s} after Frame {:d}").format(take.read().title, last)
         layout.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
 
 
