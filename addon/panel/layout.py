@@ -8,14 +8,11 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import MOVING_CAMERA
 from ..core.job import Job
-from ..core.sentences import advice, duration, repeats
+from ..core.sentences import REMEDIES, advice, duration, repeats
 from ..result.side_job import writing_job
 
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
-
-MASK_HELPS = ("not all may be smoke", "not all is smoke", "hardly any smoke fitted")
-"""Doubts that a mask may end."""
 
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
@@ -83,7 +80,7 @@ def draw_doubts(
         draw_text(layout, context, words, "ERROR")
         if left := advice(kind, [name for name, is_given in given.items() if is_given]):
             draw_text(layout, context, left, "BLANK1")
-        if kind in MASK_HELPS:
+        if "mask" in dict(REMEDIES.get(kind, ())):
             text = "New Mask" if settings.drawn_mask is None else "Edit Mask"
             layout.operator("smokelift.new_mask", text=text, icon="MOD_MASK")
 

@@ -122,15 +122,22 @@ def _layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
 
 
+def _untouched(scene: bpy.types.Scene, name: str, kind: str) -> bpy.types.Object | None:
+    """An object of a new file that renders show, unless something was added to it or moves it."""
+    obj = scene.objects.get(name)
+    if obj is None or obj.type != kind or obj.hide_render:
+        return None
+    added = obj.parent or obj.children or obj.modifiers or obj.constraints or obj.animation_data
+    return None if added else obj
+
+
 def hide_default_cube(scene: bpy.types.Scene) -> bool:
     """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place.
 
     Returns whether it was seen.
     """
-    cube = scene.objects.get("Cube")
-    if cube is None or cube.type != "MESH" or cube.hide_render or cube.matrix_basis != Matrix.Identity(4):
-        return False
-    if cube.parent or cube.children or cube.modifiers or cube.constraints or cube.animation_data:
+    cube = _untouched(scene, "Cube", "MESH")
+    if cube is None or cube.matrix_basis != Matrix.Identity(4):
         return False
     places = {tuple(vertex.co) for vertex in cube.data.vertices}
     if places != {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
@@ -141,10 +148,8 @@ def hide_default_cube(scene: bpy.types.Scene) -> bool:
 
 def hide_default_lamp(scene: bpy.types.Scene) -> bool:
     """Hide the lamp of a new file, which would light smoke that has its own light; returns whether it was seen."""
-    lamp = scene.objects.get("Light")
-    if lamp is None or lamp.type != "LIGHT" or lamp.data.type != "POINT" or lamp.hide_render:
-        return False
-    if lamp.parent or lamp.children or lamp.constraints or lamp.animation_data or lamp.data.animation_data:
+    lamp = _untouched(scene, "Light", "LIGHT")
+    if lamp is None or lamp.data.type != "POINT" or lamp.data.animation_data:
         return False
     place, power = LAMP_OF_A_NEW_FILE
     same_place = (lamp.location - Vector(place)).length < 1e-4
