@@ -148,8 +148,9 @@ def learn(smoke: bpy.types.Object, settings: str, job: Job) -> None:
     with suppress(ShotError):
         shot = _fingerprint(smoke, shot_tables(smoke, quick=True))
         _known[shot] = job.forecast
-        state.settings, state.error, state.page = settings, "", str(_page(shot))
-        state.store(smoke, *job.forecast)
+        if smoke == active_smoke(scene_of(smoke)):
+            state.settings, state.error, state.page = settings, "", str(_page(shot))
+            state.store(smoke, *job.forecast)
 
 
 def make_way() -> None:
