@@ -127,35 +127,16 @@ private:
     Shape n_{};
 };
 
-// Owns a vector field on faces in one block, so that sums and dot products are one loop; not defined at first
-// either.
-class StaggeredField {
-public:
+// Owns a vector field on faces, each component with memory of its own; not defined at first either.
+struct StaggeredField {
+    Box box;
+    std::array<Field, 3> components;
+
     StaggeredField() = default;
-    explicit StaggeredField(const Box &box) : box_(box) {
-        std::size_t size = 0;
-        for (const Shape &n : box.faces())
-            size += volume(n);
-        data_ = Values(size);
-    }
-
-    StaggeredOut out() {
-        float *p = data_.data();
-        StaggeredOut views{{}, box_};
-        for (int c = 0; c < 3; ++c) {
-            views.faces[c] = {p, box_.faces()[c]};
-            p += volume(views[c].n);
-        }
-        return views;
-    }
-    StaggeredIn in() const { return read(const_cast<StaggeredField *>(this)->out()); }
-    float *data() { return data_.data(); }
-    const float *data() const { return data_.data(); }
-    std::size_t size() const { return data_.size(); }
-
-private:
-    Values data_;
-    Box box_;
+    explicit StaggeredField(const Box &of)
+        : box(of), components{Field(of.faces()[0]), Field(of.faces()[1]), Field(of.faces()[2])} {}
+    StaggeredOut out() { return {{components[0].out(), components[1].out(), components[2].out()}, box}; }
+    StaggeredIn in() const { return {{components[0].in(), components[1].in(), components[2].in()}, box}; }
 };
 
 } // namespace smokelift

@@ -203,46 +203,19 @@ float LeastSquares::data_diagonal(int c, int x, int y, int z) const {
     return weight_.row(x, y)[z] * along * along;
 }
 
-// The weight of vorticity on the edges along axis c.
-Field LeastSquares::irrotational_edges(int c) const {
-    Field edges(box_.edges()[c]);
-    std::fill(edges.data().begin(), edges.data().end(), 0.0f);
-    for (int i = c != 0; i < box_.cells[0]; ++i)
-        edge_means_slab(irrotational_, c, slab(edges.out(), i), i);
-    return edges;
-}
-
-StaggeredField LeastSquares::diagonal(Workers &workers) const {
-    StaggeredField diagonal(box_);
-    const StaggeredOut out = diagonal.out();
+void LeastSquares::find_diagonal(const StaggeredOut &diagonal, Workers &workers) const {
     const Regularization &r = regularization_;
     // Differences of the vorticity: 4 edges times 6 neighbors, and 4 for pairs of edges.
     const float everywhere = 6 * r.first_order + 28 * r.second_order + r.kinetic;
-    const std::array<Field, 3> edges{irrotational_edges(0), irrotational_edges(1), irrotational_edges(2)};
     for (int c = 0; c < 3; ++c) {
-        const Shape n = out[c].n;
-        workers.run(n[0], [&](int i) {
-            for (int j = 0; j < n[1]; ++j)
-                for (int k = 0; k < n[2]; ++k)
-                    out[c].row(i, j)[k] = everywhere + data_diagonal(c, i, j, k) +
-                                          data_diagonal(c, i - (c == 0), j - (c == 1), k - (c == 2));
+        const Out out = diagonal[c];
+        workers.run(out.n[0], [&](int i) {
+            for (int j = 0; j < out.n[1]; ++j)
+                for (int k = 0; k < out.n[2]; ++k)
+                    out.row(i, j)[k] = everywhere + data_diagonal(c, i, j, k) +
+                                       data_diagonal(c, i - (c == 0), j - (c == 1), k - (c == 2));
         });
-        // A face turns around four edges: two in each of the directions across it.
-        for (int e = 0; e < 3; ++e) {
-            if (e == c)
-                continue;
-            const int across = 3 - c - e;
-            const In around = edges[e].in();
-            workers.run(n[0], [&](int i) {
-                for (int j = 0; j < n[1]; ++j)
-                    for (int k = 0; k < n[2]; ++k)
-                        out[c].row(i, j)[k] +=
-                            around.row(i, j)[k] +
-                            around.row(i + (across == 0), j + (across == 1))[k + (across == 2)];
-            });
-        }
     }
-    return diagonal;
 }
 
 } // namespace smokelift

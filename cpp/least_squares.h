@@ -29,7 +29,8 @@ public:
     double apply(const StaggeredIn &u, const StaggeredOut &result,
                  Workers &workers) const; // A u; returns u.Au
     StaggeredField right_hand_side(In offset, const StaggeredIn &center, Workers &workers) const; // b
-    StaggeredField diagonal(Workers &workers) const; // of A, as it is away from the sides
+    // The diagonal of A, as it is away from the sides, without what `irrotational` adds.
+    void find_diagonal(const StaggeredOut &diagonal, Workers &workers) const;
 
     // Coefficients of k^0, k^2 and k^4 of a problem with constant coefficients that resembles this one.
     std::array<double, 3> symbol(Workers &workers) const;
@@ -44,7 +45,6 @@ private:
     void along(Window &window, const StaggeredIn &u, In offset, int i) const;
     double finish(Window &window, const StaggeredIn &u, const StaggeredOut &result, int i) const;
     float data_diagonal(int c, int x, int y, int z) const;
-    Field irrotational_edges(int c) const;
 
     Box box_;
     Regularization regularization_;
@@ -58,5 +58,13 @@ struct Figures {
     int projections = 0;
     double residual = 0; // relative, as the stopping rule of the method has it
 };
+
+// Minimizes the quadratic over velocities without divergence by conjugate gradients, from u, which has to be
+// free of divergence and stays so. Stops when the projected gradient has fallen to `tolerance` times that of
+// the fluid at rest, after `limit` iterations, or when rounding keeps it from falling any further. `b`, the
+// right-hand side, gives its room to the residual in the meantime and is the same as before, to rounding, in
+// the end.
+Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tolerance, int limit,
+                     const StaggeredOut &u, Workers &workers);
 
 } // namespace smokelift

@@ -1,4 +1,4 @@
-#include "solvers.h"
+#include "least_squares.h"
 
 #include "spectral.h"
 #include "vectors.h"
@@ -30,7 +30,8 @@ Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tole
     StaggeredField search(problem.box());
     const StaggeredOut residual = b.out(),
                        product = spectral.room(); // a product is not needed when modes are made
-    std::fill_n(search.data(), search.size(), 0.0f);
+    for (Field &component : search.components)
+        std::fill(component.data().begin(), component.data().end(), 0.0f);
     const auto project_residual = [&] {
         ++figures.projections;
         return spectral.precondition(read(residual), workers);

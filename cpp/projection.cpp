@@ -61,26 +61,25 @@ float largest(const float *p, std::size_t n) {
     return value;
 }
 
-} // namespace
-
-void scale_sides(const StaggeredOut &u, float open, float wall) {
-    for (int axis = 0; axis < 3; ++axis)
-        for (int high = 0; high < 2; ++high) {
-            const float factor = u.box.closed[2 * axis + high] ? wall : open;
-            if (factor == 1)
-                continue;
-            Shape first{}, last = u[axis].n;
-            first[axis] = high ? last[axis] - 1 : 0;
-            last[axis] = first[axis] + 1;
-            for (int i = first[0]; i < last[0]; ++i)
-                for (int j = first[1]; j < last[1]; ++j)
-                    for (int k = first[2]; k < last[2]; ++k)
-                        u[axis].row(i, j)[k] *= factor;
-        }
+// Walls let nothing through.
+void stop_at_walls(const StaggeredOut &u) {
+    for (int side = 0; side < 6; ++side) {
+        if (!u.box.closed[side])
+            continue;
+        const int axis = side / 2;
+        Shape first{}, last = u[axis].n;
+        first[axis] = side % 2 ? last[axis] - 1 : 0;
+        last[axis] = first[axis] + 1;
+        for (int i = first[0]; i < last[0]; ++i)
+            for (int j = first[1]; j < last[1]; ++j)
+                std::fill(u[axis].row(i, j) + first[2], u[axis].row(i, j) + last[2], 0.0f);
+    }
 }
 
+} // namespace
+
 void Projection::apply(const StaggeredOut &u, Workers &workers) {
-    scale_sides(u, 1, 0);
+    stop_at_walls(u);
     divergence(read(u), pressure_, workers);
     // div u = -laplace p here, so that u - (-grad p) loses its divergence.
     poisson_.solve(pressure_, workers);

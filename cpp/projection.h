@@ -42,9 +42,6 @@ private:
     Field pressure_;
 };
 
-// Multiplies the normal velocities on the sides of the box, by `open` or by `wall`.
-void scale_sides(const StaggeredOut &u, float open, float wall);
-
 // max |div u| / max |u|, both in units of one cell; zero for a fluid at rest.
 double relative_divergence(const StaggeredIn &u, Workers &workers);
 

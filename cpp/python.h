@@ -81,16 +81,6 @@ inline StaggeredIn in_box(const StaggeredIn &faces, const Box &box) {
     return {faces.faces, box};
 }
 
-// A new velocity for the caller, each component with memory of its own.
-struct NewFaces {
-    Box box;
-    std::array<Field, 3> components;
-
-    explicit NewFaces(const Box &of)
-        : box(of), components{Field(of.faces()[0]), Field(of.faces()[1]), Field(of.faces()[2])} {}
-    StaggeredOut out() { return {{components[0].out(), components[1].out(), components[2].out()}, box}; }
-};
-
 // An array that owns what its data lies in.
 template <class T, class Owned> py::array array_of(T *data, const std::vector<Index> &shape, Owned &&values) {
     auto owned = std::make_unique<std::decay_t<Owned>>(std::move(values));
@@ -244,10 +234,10 @@ template <> struct type_caster<smokelift::Field> {
     }
 };
 
-template <> struct type_caster<smokelift::NewFaces> {
+template <> struct type_caster<smokelift::StaggeredField> {
     static constexpr auto name = const_name("list[Array]");
 
-    static handle cast(smokelift::NewFaces &&faces, return_value_policy policy, handle parent) {
+    static handle cast(smokelift::StaggeredField &&faces, return_value_policy policy, handle parent) {
         return make_caster<std::array<smokelift::Field, 3>>::cast(std::move(faces.components), policy,
                                                                   parent);
     }

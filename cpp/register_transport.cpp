@@ -22,7 +22,7 @@ void register_transport(py::module_ &module) {
     module.def("project",
                unlocked([](Workers &workers, StaggeredIn faces, const Box::Closed &closed, int passes) {
                    faces.box.closed = closed;
-                   NewFaces result(faces.box);
+                   StaggeredField result(faces.box);
                    const StaggeredOut u = result.out();
                    copy(faces, u, workers);
                    Projection projection(u.box);
@@ -61,7 +61,7 @@ void register_transport(py::module_ &module) {
                unlocked([](Workers &workers, const StaggeredIn &field, const StaggeredIn &displacement,
                            bool maccormack) {
                    require_fit(displacement.box.cells == field.box.cells);
-                   NewFaces moved(field.box);
+                   StaggeredField moved(field.box);
                    advect_faces(field, displacement, maccormack, moved.out(), workers);
                    return moved;
                }),

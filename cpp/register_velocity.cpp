@@ -1,6 +1,7 @@
 #include "blur.h"
+#include "least_squares.h"
+#include "projection.h"
 #include "python.h"
-#include "solvers.h"
 #include "vectors.h"
 
 template <> struct pybind11::detail::type_caster<smokelift::Figures> {
@@ -36,21 +37,6 @@ public:
     const LeastSquares &linear() const { return linear_; }
     const Box &box() const { return box_; }
 
-    // What solve(projection, u) makes of a copy u of `start`, and how.
-    template <class Solve>
-    std::pair<NewFaces, Figures> solved(Workers &workers, const StaggeredIn &start,
-                                        const Solve &solve) const {
-        NewFaces result(box_);
-        const StaggeredOut u = result.out();
-        copy(in_box(start, box_), u, workers);
-        Projection projection(box_);
-        Figures figures = solve(projection, u);
-        // Rounding in the course of the iterations leaves a little divergence.
-        projection.apply(u, workers);
-        ++figures.projections;
-        return {std::move(result), figures};
-    }
-
     StaggeredField b; // the right-hand side
 
 private:
@@ -74,7 +60,7 @@ void register_velocity(py::module_ &module) {
 
     module.def("prolong", unlocked([](Workers &workers, const StaggeredIn &u) {
                    const auto [x, y, z] = u.box.cells;
-                   NewFaces fine(Box{{2 * x, 2 * y, 2 * z}, {}});
+                   StaggeredField fine(Box{{2 * x, 2 * y, 2 * z}, {}});
                    prolong(u, fine.out(), workers);
                    return fine;
                }),
@@ -97,23 +83,34 @@ void register_velocity(py::module_ &module) {
              py::kw_only(), "direction"_a, "offset"_a, "weight"_a, "irrotational"_a, "center"_a,
              "first_order"_a, "second_order"_a, "kinetic"_a, "closed"_a)
         .def("apply", unlocked([](Workers &workers, const Problem &problem, const StaggeredIn &u) {
-                 NewFaces product(problem.box());
+                 StaggeredField product(problem.box());
                  problem.linear().apply(in_box(u, problem.box()), product.out(), workers);
                  return product;
              }),
              "u"_a, "A u.")
         .def("right_hand_side", unlocked([](Workers &workers, const Problem &problem) {
-                 NewFaces result(problem.box());
+                 StaggeredField result(problem.box());
                  copy(problem.b.in(), result.out(), workers);
                  return result;
              }),
              "b.")
+        .def("diagonal", unlocked([](Workers &workers, const Problem &problem) {
+                 StaggeredField result(problem.box());
+                 problem.linear().find_diagonal(result.out(), workers);
+                 return result;
+             }),
+             "The diagonal of A as it is away from the sides, without what irrotational adds.")
         .def("projected_cg",
              unlocked([](Workers &workers, Problem &problem, const StaggeredIn &start, double tolerance,
                          int limit) {
-                 return problem.solved(workers, start, [&](Projection &, const StaggeredOut &u) {
-                     return projected_cg(problem.linear(), problem.b, tolerance, limit, u, workers);
-                 });
+                 StaggeredField result(problem.box());
+                 const StaggeredOut u = result.out();
+                 copy(in_box(start, problem.box()), u, workers);
+                 Figures figures = projected_cg(problem.linear(), problem.b, tolerance, limit, u, workers);
+                 // Rounding in the course of the iterations leaves a little divergence.
+                 Projection(problem.box()).apply(u, workers);
+                 ++figures.projections;
+                 return std::pair(std::move(result), figures);
              }),
              "start"_a, py::kw_only(), "tolerance"_a, "limit"_a,
              R"(Minimize over velocities without divergence by preconditioned conjugate gradients among them.
@@ -125,34 +122,7 @@ void register_velocity(py::module_ &module) {
         tolerance
             Stops at this fraction of the preconditioned gradient at rest.
         limit
-            Iterations at most.)")
-        .def("primal_dual",
-             unlocked([](Workers &workers, const Problem &problem, const StaggeredIn &start, double sigma,
-                         double tau, double theta, double absolute, double relative, int limit,
-                         double inner_tolerance, int inner_limit) {
-                 const PrimalDual settings{sigma,    tau,   theta,           absolute,
-                                           relative, limit, inner_tolerance, inner_limit};
-                 return problem.solved(workers, start, [&](Projection &projection, const StaggeredOut &u) {
-                     return primal_dual(problem.linear(), problem.b, projection, settings, u, workers);
-                 });
-             }),
-             "start"_a, py::kw_only(), "sigma"_a, "tau"_a, "theta"_a, "absolute"_a, "relative"_a, "limit"_a,
-             "inner_tolerance"_a, "inner_limit"_a,
-             R"(Minimize over velocities without divergence by Chambolle and Pock's splitting (2011).
-
-        Parameters
-        ----------
-        start
-            Any velocity.
-        sigma, tau, theta
-            Dual step, primal step and over-relaxation. ValueError unless sigma and tau are positive, sigma tau <= 1 and
-            theta is in [0, 1].
-        absolute, relative
-            Stops at |u' - u| <= sqrt(3) absolute + relative |u'|.
-        limit
-            Iterations at most.
-        inner_tolerance, inner_limit
-            Of the conjugate gradients in the proximal operator.)");
+            Iterations at most.)");
 }
 
 } // namespace smokelift

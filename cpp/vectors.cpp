@@ -3,13 +3,6 @@
 #include <algorithm>
 
 namespace smokelift {
-namespace {
-
-constexpr std::size_t chunk = 1 << 14;
-
-int chunks(std::size_t n) { return int((n + chunk - 1) / chunk); }
-
-} // namespace
 
 SMOKELIFT_CLONES
 double dot(const float *__restrict a, const float *__restrict b, std::size_t n) {
@@ -40,28 +33,10 @@ void xpay(const float *__restrict x, float factor, float *__restrict y, std::siz
         y[i] = x[i] + factor * y[i];
 }
 
-double dot(const float *a, const float *b, std::size_t n, Workers &workers) {
-    return workers.sum(chunks(n), [&](int c) {
-        const std::size_t start = c * chunk;
-        return dot(a + start, b + start, std::min(chunk, n - start));
-    });
-}
-
-void axpy(float factor, const float *x, float *y, std::size_t n, Workers &workers) {
-    workers.run_ranges(n, chunk, [&](std::size_t begin, std::size_t end) {
-        axpy(factor, x + begin, y + begin, end - begin);
-    });
-}
-
-void xpay(const float *x, float factor, float *y, std::size_t n, Workers &workers) {
-    workers.run_ranges(n, chunk, [&](std::size_t begin, std::size_t end) {
-        xpay(x + begin, factor, y + begin, end - begin);
-    });
-}
-
 void axpy(float factor, const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {
     for (int c = 0; c < 3; ++c)
-        axpy(factor, x[c].data, y[c].data, volume(x[c].n), workers);
+        workers.run(x[c].n[0],
+                    [&](int i) { axpy(factor, x[c].row(i, 0), y[c].row(i, 0), x[c].slab_size()); });
 }
 
 void copy(const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {

@@ -10,10 +10,6 @@ double dot(const float *a, const float *b, std::size_t n);
 void axpy(float factor, const float *x, float *y, std::size_t n); // y += factor x
 void xpay(const float *x, float factor, float *y, std::size_t n); // y = x + factor y
 
-// The same in chunks of a fixed size, so that sums do not depend on the number of threads.
-double dot(const float *a, const float *b, std::size_t n, Workers &workers);
-void axpy(float factor, const float *x, float *y, std::size_t n, Workers &workers);
-void xpay(const float *x, float factor, float *y, std::size_t n, Workers &workers);
 void axpy(float factor, const StaggeredIn &x, const StaggeredOut &y, Workers &workers);
 void copy(const StaggeredIn &x, const StaggeredOut &y, Workers &workers); // y = x
 

@@ -99,6 +99,9 @@ class LeastSquares:
     def right_hand_side(self) -> list[Array]:
         """b."""
 
+    def diagonal(self) -> list[Array]:
+        """The diagonal of A as it is away from the sides, without what irrotational adds."""
+
     def projected_cg(self, start: Faces, *, tolerance: float, limit: int) -> tuple[list[Array], Figures]:
         """Minimize over velocities without divergence by preconditioned conjugate gradients among them.
 
@@ -110,36 +113,6 @@ class LeastSquares:
             Stops at this fraction of the preconditioned gradient at rest.
         limit
             Iterations at most.
-        """
-
-    def primal_dual(
-        self,
-        start: Faces,
-        *,
-        sigma: float,
-        tau: float,
-        theta: float,
-        absolute: float,
-        relative: float,
-        limit: int,
-        inner_tolerance: float,
-        inner_limit: int,
-    ) -> tuple[list[Array], Figures]:
-        """Minimize over velocities without divergence by Chambolle and Pock's splitting (2011).
-
-        Parameters
-        ----------
-        start
-            Any velocity.
-        sigma, tau, theta
-            Dual step, primal step and over-relaxation. ValueError unless sigma and tau are positive, sigma tau <= 1 and
-            theta is in [0, 1].
-        absolute, relative
-            Stops at |u' - u| <= sqrt(3) absolute + relative |u'|.
-        limit
-            Iterations at most.
-        inner_tolerance, inner_limit
-            Of the conjugate gradients in the proximal operator.
         """
 
 def zeros(shape: npt.ArrayLike) -> Array:

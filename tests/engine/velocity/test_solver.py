@@ -8,9 +8,9 @@ from scipy import ndimage
 
 from smokelift import _core
 from smokelift.baselines.velocity import PaperVelocity
-from smokelift.transport import face_shapes
+from smokelift.transport import StaggeredGrid, face_shapes
 from smokelift.velocity import DensityPair, PrimalDual
-from tests.engine.transport.random_fields import random_faces
+from tests.engine.transport.random_fields import names, random_faces
 from tests.engine.velocity.known_motions import DT, VOXEL, translation
 
 OPEN = [False] * 6
@@ -76,19 +76,10 @@ def test_both_solvers_reach_the_constrained_minimum(orders, closed):
     start = split(np.zeros(truth.size))
     cg, _ = problem.projected_cg(start, tolerance=2e-5, limit=500)
     endless, _ = problem.projected_cg(start, tolerance=0.0, limit=500)
-    pd, figures = problem.primal_dual(
-        start,
-        sigma=0.3,
-        tau=3.0,
-        theta=1.0,
-        absolute=0.0,
-        relative=1e-5,
-        limit=2000,
-        inner_tolerance=0.01,
-        inner_limit=100,
-    )
+    splitting = PrimalDual(0.3, 3.0, 1.0, 0.0, 1e-5, 2000, inner_tolerance=0.01, inner_iterations=100)
+    pd, figures = splitting.solve(problem, StaggeredGrid(tuple(start), 1.0, names(closed)))
     assert np.linalg.norm(flat(cg) - truth) < 3e-3 * np.linalg.norm(truth)
-    assert np.linalg.norm(flat(pd) - truth) < 1e-3 * np.linalg.norm(truth)
+    assert np.linalg.norm(flat(pd.faces) - truth) < 1e-3 * np.linalg.norm(truth)
     # A tolerance out of reach of single precision does not lead away from the minimum again.
     assert np.linalg.norm(flat(endless) - truth) < 0.03 * np.linalg.norm(truth)
     assert figures["iterations"] < 2000
