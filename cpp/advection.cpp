@@ -62,8 +62,8 @@ SMOKELIFT_INLINE Corners corners(const Shape &n, int i, int j, float x, float y,
 }
 
 SMOKELIFT_INLINE float mixed(const float *row, const Corners &at) {
-    const auto mix = [](float a, float b, float share)
-                         SMOKELIFT_INLINE_LAMBDA { return a + share * (b - a); };
+    const auto mix = [](float a, float b, float fraction)
+                         SMOKELIFT_INLINE_LAMBDA { return a + fraction * (b - a); };
     const auto along_z = [&](int first)
                              SMOKELIFT_INLINE_LAMBDA { return mix(row[first], row[first + at.z], at.h); };
     const int high = at.low + at.x;

@@ -75,20 +75,20 @@ constexpr Series ESCAPED_DERIVATIVE = ESCAPED.derivative(), KEPT_DERIVATIVE = KE
                  SLANTED_DERIVATIVE = SLANTED.derivative(), TILTED_DERIVATIVE = TILTED.derivative();
 
 // P, B, Q and C of the formulas above, or their derivatives by t.
-struct Shares {
+struct Coefficients {
     float escaped, kept, slanted, tilted;
 };
 
 // Of a path of optical depth t >= THIN, `inverse` = 1 / t.
 
-SMOKELIFT_INLINE Shares thick_shares(const Attenuation &through, float inverse) {
+SMOKELIFT_INLINE Coefficients thick_coefficients(const Attenuation &through, float inverse) {
     const float escaped = through.opacity * inverse, kept = (1 - escaped) * inverse;
     const float slanted = kept - 0.5f * escaped;
     return {escaped, kept, slanted, SPREAD * inverse - (0.5f + inverse) * inverse * slanted};
 }
 
-SMOKELIFT_INLINE Shares thick_share_derivatives(const Attenuation &through, float inverse) {
-    const Shares of = thick_shares(through, inverse);
+SMOKELIFT_INLINE Coefficients thick_derivatives(const Attenuation &through, float inverse) {
+    const Coefficients of = thick_coefficients(through, inverse);
     const float escaped = (through.transmittance - of.escaped) * inverse,
                 kept = -(escaped + of.kept) * inverse;
     const float slanted = kept - 0.5f * escaped;
@@ -97,18 +97,18 @@ SMOKELIFT_INLINE Shares thick_share_derivatives(const Attenuation &through, floa
     return {escaped, kept, slanted, tilted};
 }
 
-SMOKELIFT_INLINE Shares shares(float t, const Attenuation &through) {
+SMOKELIFT_INLINE Coefficients coefficients(float t, const Attenuation &through) {
     const bool thin = t < THIN;
     const float low = std::min(t, THIN);
-    const Shares thick = thick_shares(through, 1 / std::max(t, THIN));
+    const Coefficients thick = thick_coefficients(through, 1 / std::max(t, THIN));
     return {thin ? ESCAPED(low) : thick.escaped, thin ? KEPT(low) : thick.kept,
             thin ? SLANTED(low) : thick.slanted, thin ? TILTED(low) : thick.tilted};
 }
 
-SMOKELIFT_INLINE Shares share_derivatives(float t) {
+SMOKELIFT_INLINE Coefficients coefficient_derivatives(float t) {
     const bool thin = t < THIN;
     const float low = std::min(t, THIN);
-    const Shares thick = thick_share_derivatives(attenuation(t), 1 / std::max(t, THIN));
+    const Coefficients thick = thick_derivatives(attenuation(t), 1 / std::max(t, THIN));
     return {thin ? ESCAPED_DERIVATIVE(low) : thick.escaped, thin ? KEPT_DERIVATIVE(low) : thick.kept,
             thin ? SLANTED_DERIVATIVE(low) : thick.slanted, thin ? TILTED_DERIVATIVE(low) : thick.tilted};
 }
@@ -201,7 +201,7 @@ void BlockTransport::clear_border(Fields &values) const {
 // C l r / SPREAD is its own.
 SMOKELIFT_CLONES
 void BlockTransport::set_up(Crossing &c) {
-    const float share = c.weight * c.length, all = share * (c.along + c.across);
+    const float scale = c.weight * c.length, all = scale * (c.along + c.across);
     const std::size_t count = lattice_.count();
     for (Fields *values : {&c.passed, &c.escaped, &c.slanted})
         values->resize(count);
@@ -209,11 +209,11 @@ void BlockTransport::set_up(Crossing &c) {
     float *const __restrict passed = c.passed.data(), *const __restrict escaped = c.escaped.data();
     float *const __restrict slanted = c.slanted.data();
     float *const __restrict own = own_[0].data(), *const __restrict own_slope = own_[1].data();
-    const float along = share * c.along / SPREAD, across = share * c.across;
+    const float along = scale * c.along / SPREAD, across = scale * c.across;
     for (std::size_t i = 0; i < count; ++i) {
         const float t = c.length * extinction[i];
         const Attenuation through = attenuation(t);
-        const Shares of = shares(t, through);
+        const Coefficients of = coefficients(t, through);
         passed[i] = through.transmittance;
         escaped[i] = of.escaped;
         slanted[i] = of.slanted;
@@ -225,7 +225,7 @@ void BlockTransport::set_up(Crossing &c) {
 SMOKELIFT_CLONES
 void BlockTransport::differentiate(const Crossing &c, DepthDerivatives &derivatives,
                                    Own &own_derivative) const {
-    const float share = c.weight * c.length * c.length, all = share * (c.along + c.across);
+    const float scale = c.weight * c.length * c.length, all = scale * (c.along + c.across);
     const std::size_t count = lattice_.count();
     derivatives.escaped.resize(count);
     derivatives.slanted.resize(count);
@@ -234,9 +234,9 @@ void BlockTransport::differentiate(const Crossing &c, DepthDerivatives &derivati
                                                                       derivatives.slanted.data();
     float *const __restrict own = own_derivative[0].data(), *const __restrict own_slope =
                                                                 own_derivative[1].data();
-    const float along = share * c.along / SPREAD, across = share * c.across;
+    const float along = scale * c.along / SPREAD, across = scale * c.across;
     for (std::size_t i = 0; i < count; ++i) {
-        const Shares of = share_derivatives(c.length * extinction[i]);
+        const Coefficients of = coefficient_derivatives(c.length * extinction[i]);
         escaped[i] = of.escaped;
         slanted[i] = of.slanted;
         own[i] += all * of.kept;
@@ -367,13 +367,7 @@ void BlockTransport::through_axis(int axis, const float *emission, float *mean) 
     const std::size_t all = lattice_.count();
     const auto memory = uninitialized(CARRIED * all);
     float *const arrived = memory.get();
-    follow_axis(axis, 1, emission,
-                [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
-                    by_lanes(count, [&](int i) SMOKELIFT_INLINE_LAMBDA {
-                        for (int part = 0; part < CARRIED; ++part)
-                            at(arrived + part * all + first + i) = at(arriving + part * count + i);
-                    });
-                });
+    arriving_along_axis(axis, 1, emission, arrived);
     const float weight = crossing.weight, of_slope = -weight / SPREAD;
     follow_axis(
         axis, -1, emission, [&](std::size_t first, int count, const float *back) SMOKELIFT_INLINE_LAMBDA {
@@ -383,12 +377,12 @@ void BlockTransport::through_axis(int axis, const float *emission, float *mean) 
             float *const across[2] = {of_mean + (1 + LATERAL[axis][0]) * all,
                                       of_mean + (1 + LATERAL[axis][1]) * all};
             by_lanes(count, [&](int i) SMOKELIFT_INLINE_LAMBDA {
-                const Lanes share = weight * at(block.escaped + i);
-                at(of_mean + i) = share * (at(forth + i) + at(back + i));
+                const Lanes factor = weight * at(block.escaped + i);
+                at(of_mean + i) = factor * (at(forth + i) + at(back + i));
                 at(along + i) = of_slope * at(block.slanted + i) * (at(forth + i) - at(back + i));
                 for (int side = 0; side < 2; ++side)
                     at(across[side] + i) =
-                        share * (at(forth + (1 + side) * all + i) + at(back + (1 + side) * count + i));
+                        factor * (at(forth + (1 + side) * all + i) + at(back + (1 + side) * count + i));
             });
         });
 }
@@ -425,12 +419,12 @@ void BlockTransport::gather(const float *emission, const float *parts, float *me
         // all diagonals lie along x, so that their sum forth is also that with the sign along x
         const float *const __restrict forth = diagonals + std::max(field - 1, 0) * all;
         const float *const __restrict back = forth + DIAGONAL_FIELDS * all;
-        const float *const __restrict share = field ? c.slanted.data() : c.escaped.data();
+        const float *const __restrict coefficient = field ? c.slanted.data() : c.escaped.data();
         float *const __restrict out = mean + field * all;
         const float factor = field ? of_slope : weight, sign = field ? -1.0f : 1.0f;
         for (std::size_t i = 0; i < all; ++i)
             out[i] = own[i] * emitted[i] + ((x[i] + y[i]) + z[i]) +
-                     factor * share[i] * (forth[i] + sign * back[i]);
+                     factor * coefficient[i] * (forth[i] + sign * back[i]);
     }
 }
 
@@ -485,11 +479,11 @@ void BlockTransport::axis_gradient(int axis, const DepthDerivatives &derivatives
         const Beams beams = arriving.beams(part);
         const int field = part ? 1 + LATERAL[axis][part - 1] : 0;
         const float *const emitted = emission + field * all, *const weight = weights + field * all;
-        const float share = c.weight * (part ? SPREAD : 1.0f);
+        const float factor = c.weight * (part ? SPREAD : 1.0f);
         for (std::size_t i = 0; i < all; ++i) {
             const float by_passed = beams.by_passed(i);
             const float by_escaped = beams.by_escaped(i, emitted[i], weight[i]);
-            const float value = share * (c.length * escaped[i] * by_escaped - passed[i] * by_passed);
+            const float value = factor * (c.length * escaped[i] * by_escaped - passed[i] * by_passed);
             result[i] = part ? result[i] + value : value;
         }
     }

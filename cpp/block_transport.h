@@ -50,17 +50,17 @@ private:
     // What a block does to light that crosses it along a direction of the class, on a path of length l and
     // optical depth t = kappa l. The formulas (block_transport.cpp) and their names here:
     //
-    //     T = exp(-t)      passed   share of what enters that leaves
-    //     P = (1 - T) / t  escaped  share of the emission that leaves
-    //     Q                slanted  share of the rise of the emission along the path that leaves
-    //     B                kept     share of the emission that is the block's own mean
-    //     C                tilted   share of the rise that is
+    //     T = exp(-t)      passed   fraction of what enters that leaves
+    //     P = (1 - T) / t  escaped  fraction of the emission that leaves
+    //     Q                slanted  fraction of the rise of the emission along the path that leaves
+    //     B                kept     fraction of the emission that is the block's own mean
+    //     C                tilted   fraction of the rise that is
     struct Crossing {
         float length, weight; // m; of a direction of the class in the mean over all
         float along, across;  // directions of the class: that a slope lies along, and across
         Fields passed, escaped, slanted;
 
-        // The shares of neighboring blocks from one on.
+        // The coefficients of neighboring blocks from one on.
         struct Row {
             const float *passed, *escaped, *slanted;
         };

@@ -64,23 +64,13 @@ struct AlongZ {
 // A plane of voxels across x takes and gives whole rows along z: rows of voxels in a loop that vectorises,
 // and of the few rows of blocks each place along z by itself.
 
-// The first floats of voxels, `width` apart.
-SMOKELIFT_INLINE void load(const float *__restrict from, int width, const Span &span, float *__restrict to) {
-    if (width == 2)
-        for (int z = span[0]; z < span[1]; ++z)
-            to[z] = from[2 * z];
-    else
-        for (int z = span[0]; z < span[1]; ++z)
-            to[z] = from[width * z];
-}
-
 // Adds plane x of the voxels to plane `block_x` of means; `sums` of the rows in a block, by place along z.
 SMOKELIFT_CLONES
 void average_plane(const Voxels &medium, const Spans &spans, const Blocks &blocks, const AlongZ &along_z,
                    int block_x, int x, float *means) {
     const int length = medium.n[2], channels = medium.width - 1;
     const std::size_t count = blocks.count();
-    const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
+    const float voxel_weight = 1.0f / float(blocks.size * blocks.size * blocks.size);
     const float along_x = lever_of(blocks, 0, x);
     std::vector<float> memory((3 + 2 * std::size_t(channels)) * length);
     float *const __restrict kappa = memory.data(), *const __restrict radiance = kappa + length;
@@ -96,12 +86,13 @@ void average_plane(const Voxels &medium, const Spans &spans, const Blocks &block
             filled = joined(filled, span);
             const float along_y = lever_of(blocks, 1, y);
             const float *const voxel = medium.at(x, y, 0);
-            load(voxel, medium.width, span, kappa);
+            load_row(voxel + span[0] * medium.width, medium.width, span[1] - span[0], kappa + span[0]);
             float *const __restrict extinction = sums;
             for (int z = span[0]; z < span[1]; ++z)
                 extinction[z] += kappa[z];
             for (int channel = 0; channel < channels; ++channel) {
-                load(voxel + 1 + channel, medium.width, span, radiance);
+                load_row(voxel + span[0] * medium.width + 1 + channel, medium.width, span[1] - span[0],
+                         radiance + span[0]);
                 float *const __restrict emission = sums + (1 + 2 * channel) * length;
                 float *const __restrict lifted = emission + length;
                 for (int z = span[0]; z < span[1]; ++z) {
@@ -114,13 +105,13 @@ void average_plane(const Voxels &medium, const Spans &spans, const Blocks &block
         float *const row = means + row_of(blocks, block_x, block_y);
         for (int z = filled[0]; z < filled[1]; ++z) {
             float *out = row + along_z.block[z];
-            out[0] += share * sums[z];
+            out[0] += voxel_weight * sums[z];
             for (int channel = 0; channel < channels; ++channel) {
-                const float emission = share * sums[(1 + 2 * channel) * length + z];
+                const float emission = voxel_weight * sums[(1 + 2 * channel) * length + z];
                 float *const fields = out + (1 + channel * Blocks::FIELDS) * count;
                 fields[0] += emission;
                 fields[count] += emission * along_x;
-                fields[2 * count] += share * sums[(2 + 2 * channel) * length + z];
+                fields[2 * count] += voxel_weight * sums[(2 + 2 * channel) * length + z];
                 fields[3 * count] += emission * along_z.lever[z];
             }
         }
@@ -146,7 +137,7 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
                            int x) {
     const int width = medium.width, length = medium.n[2];
     const std::size_t count = blocks.count();
-    const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
+    const float voxel_weight = 1.0f / float(blocks.size * blocks.size * blocks.size);
     const float along_x = lever_of(blocks, 0, x);
     std::vector<float> memory((2 * std::size_t(width) - 1) * length);
     for (int block_y = 0; block_y < blocks.n[1]; ++block_y) {
@@ -157,12 +148,13 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
         const float *const row = means_gradient + row_of(blocks, block_of(blocks, 0, x), block_y);
         for (int z = filled[0]; z < filled[1]; ++z) {
             const float *const in = row + along_z.block[z];
-            memory[z] = share * in[0];
+            memory[z] = voxel_weight * in[0];
             for (int channel = 0; channel < width - 1; ++channel) {
                 const float *const fields = in + (1 + channel * Blocks::FIELDS) * count;
                 float *const out = memory.data() + (1 + 2 * channel) * length + z;
-                out[0] = share * (fields[0] + along_x * fields[count] + along_z.lever[z] * fields[3 * count]);
-                out[length] = share * fields[2 * count];
+                out[0] = voxel_weight *
+                         (fields[0] + along_x * fields[count] + along_z.lever[z] * fields[3 * count]);
+                out[length] = voxel_weight * fields[2 * count];
             }
         }
         for (int y = first; y < end; ++y) {
@@ -272,7 +264,7 @@ void gather_rows(const Voxels &gradient, const Spans &spans, const Blocks &block
         const auto &span = spans.along_z[std::size_t(x) * gradient.n[1] + y];
         const Between across_y = between(blocks, 1, y);
         const Mix mix(across_y.fraction, 1);
-        load(gradient.at(x, y, 0) + channel, gradient.width, span, value);
+        load_row(gradient.at(x, y, span[0]) + channel, gradient.width, span[1] - span[0], value + span[0]);
         float *const __restrict near = rows + 2 * across_y.block * length;
         float *const __restrict near_slope = near + length, *const __restrict far = near_slope + length;
         float *const __restrict far_slope = far + length;
@@ -340,15 +332,15 @@ void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float facto
         for (int channel = 0; channel < channels; ++channel) {
             const float *const mean = planes.data() + (std::size_t(x) * channels + channel) * PARTS * plane;
             for (int side = 0; side < 2; ++side) {
-                const float share = factor * (side ? across_x.fraction : 1 - across_x.fraction);
-                const float from_center = share * (across_x.fraction - float(side));
+                const float weight = factor * (side ? across_x.fraction : 1 - across_x.fraction);
+                const float from_center = weight * (across_x.fraction - float(side));
                 float *const to =
                     values_gradient + channel * Blocks::FIELDS * count + (across_x.block + side) * plane;
                 for (std::size_t i = 0; i < plane; ++i) {
-                    to[i] += share * mean[i];
+                    to[i] += weight * mean[i];
                     to[count + i] += from_center * mean[i];
-                    to[2 * count + i] += share * mean[plane + i];
-                    to[3 * count + i] += share * mean[2 * plane + i];
+                    to[2 * count + i] += weight * mean[plane + i];
+                    to[3 * count + i] += weight * mean[2 * plane + i];
                 }
             }
         }

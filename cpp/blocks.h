@@ -21,21 +21,17 @@ struct Blocks {
 };
 
 // Arrays over blocks are [field][x][y][z], one after the other, z fastest. What is linear across a block has
-// four fields: the mean, and the slopes along x, y and z, which are the differences across a block.
+// four fields: the mean, and the slopes along x, y and z, which are the differences across a block. The
+// docstrings in register_render.cpp say what each function does.
 
-// Over blocks: the mean of the extinction kappa, then kappa J by channel, linear.
 void average(const Voxels &medium, const Spans &spans, const Blocks &blocks, float *means, Workers &workers);
 
-// Adds to `gradient` what the derivatives by these fields say of kappa and J.
 void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks,
                      const float *means_gradient, const Voxels &gradient, Workers &workers);
 
-// J += factor x values, by channel linear across blocks: what the eight blocks around a voxel say of it,
-// weighted as between their centers.
 void add_interpolated(const float *values, float factor, const Blocks &blocks, const Voxels &medium,
                       const Spans &spans, Workers &workers);
 
-// Derivative by these values, from that by J.
 void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float factor, const Blocks &blocks,
                          float *values_gradient, Workers &workers);
 

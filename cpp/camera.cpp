@@ -19,6 +19,7 @@
 
 #include <algorithm>
 #include <array>
+#include <type_traits>
 
 namespace smokelift {
 namespace {
@@ -30,6 +31,9 @@ constexpr int AHEAD = 3; // planes before a look-up that its voxels are asked fo
 
 template <int N> struct Floats {
     typedef float type __attribute__((vector_size(4 * N), aligned(4), may_alias));
+};
+template <> struct Floats<1> {
+    using type = float;
 };
 
 // The values of a cell of four voxels, W floats each, mixed. Vectors: what one voxel holds, or two neighbors
@@ -53,28 +57,10 @@ SMOKELIFT_INLINE void look_up(const float *at, Stride along_b, Stride along_c, f
     *reinterpret_cast<One *>(out) = near + g * (far - near);
 }
 
-template <>
-SMOKELIFT_INLINE void look_up<1, true>(const float *at, Stride along_b, Stride along_c, float f, float g,
-                                       float *out) {
-    const float near = at[0] + f * (at[along_b] - at[0]);
-    const float far = at[along_c] + f * (at[along_b + along_c] - at[along_c]);
-    *out = near + g * (far - near);
-}
-template <>
-SMOKELIFT_INLINE void look_up<1, false>(const float *at, Stride along_b, Stride along_c, float f, float g,
-                                        float *out) {
-    look_up<1, true>(at, along_b, along_c, f, g, out);
-}
-
 template <int W, bool Adjacent>
 SMOKELIFT_INLINE void add_to(float *at, Stride along_b, Stride along_c, float f, float g,
                              const float *value) {
-    if constexpr (W == 1) {
-        at[0] += (1 - f) * (1 - g) * *value;
-        at[along_c] += (1 - f) * g * *value;
-        at[along_b] += f * (1 - g) * *value;
-        at[along_b + along_c] += f * g * *value;
-    } else if constexpr (Adjacent && W == 2) {
+    if constexpr (Adjacent && W == 2) {
         using Two = typename Floats<4>::type;
         const Two all = {(1 - g) * value[0], (1 - g) * value[1], g * value[0], g * value[1]};
         *reinterpret_cast<Two *>(at) += (1 - f) * all;
@@ -271,41 +257,34 @@ SMOKELIFT_INLINE void scatter_planes(const Rays &rays, const Run &run, const Rec
     }
 }
 
-SMOKELIFT_CLONES
-void march_runs(const Voxels &medium, const Rays &rays, int first, int end, float *scattered, float *depth,
-                const Record &record) {
-    for (int r = first; r < end; ++r) {
-        const Run &run = rays.runs[r];
-        switch (medium.width) {
-        case 1:
-            march_run<1>(medium, rays, run, scattered, depth, record);
-            break;
-        case 2:
-            march_run<2>(medium, rays, run, scattered, depth, record);
-            break;
-        default:
-            march_run<CHANNELS>(medium, rays, run, scattered, depth, record);
-        }
-    }
+// work(width) with the width as a constant.
+template <class Work> SMOKELIFT_INLINE void by_width(int width, const Work &work) {
+    if (width == 1)
+        work(std::integral_constant<int, 1>());
+    else if (width == 2)
+        work(std::integral_constant<int, 2>());
+    else
+        work(std::integral_constant<int, CHANNELS>());
 }
 
 SMOKELIFT_CLONES
-void adjoint_sweeps(const Rays &rays, int width, int first, int end, const float *depth,
+void march_runs(const Voxels &medium, const Rays &rays, std::size_t first, std::size_t end, float *scattered,
+                float *depth, const Record &record) {
+    by_width(medium.width, [&](auto width) SMOKELIFT_INLINE_LAMBDA {
+        for (std::size_t r = first; r < end; ++r)
+            march_run<width>(medium, rays, rays.runs[r], scattered, depth, record);
+    });
+}
+
+SMOKELIFT_CLONES
+void adjoint_sweeps(const Rays &rays, int width, std::size_t first, std::size_t end, const float *depth,
                     const float *scattered_gradient, const float *transmittance_gradient,
                     const Record &record) {
-    for (int r = first; r < end; ++r) {
-        const Run &run = rays.runs[r];
-        switch (width) {
-        case 1:
-            adjoint_sweep<1>(rays, run, depth, scattered_gradient, transmittance_gradient, record);
-            break;
-        case 2:
-            adjoint_sweep<2>(rays, run, depth, scattered_gradient, transmittance_gradient, record);
-            break;
-        default:
-            adjoint_sweep<CHANNELS>(rays, run, depth, scattered_gradient, transmittance_gradient, record);
-        }
-    }
+    by_width(width, [&](auto width) SMOKELIFT_INLINE_LAMBDA {
+        for (std::size_t r = first; r < end; ++r)
+            adjoint_sweep<width>(rays, rays.runs[r], depth, scattered_gradient, transmittance_gradient,
+                                 record);
+    });
 }
 
 SMOKELIFT_CLONES
@@ -328,48 +307,26 @@ void scatter_runs(const Rays &rays, int axis, int first, int end, const Record &
 SMOKELIFT_CLONES
 void clip_run(const Voxels &medium, Rays &rays, const Run &run) {
     const Lanes lanes(medium, rays, run);
-    float sample[1][LANES];
-    int first[LANES], last[LANES];
-    std::fill_n(first, LANES, 0);
-    std::fill_n(last, LANES, -1);
     // from both ends, as far as the first samples that hold anything: what lies between them does not matter
-    int found = 0;
-    for (int k = run.first; k <= run.last && found < run.count; ++k) {
-        if (!sample_lanes<1>(medium, lanes, k, sample))
-            continue;
-        for (int lane = 0; lane < run.count; ++lane) {
-            if (last[lane] < 0 && sample[0][lane] > 0) {
-                first[lane] = last[lane] = k;
-                ++found;
-            }
-        }
-    }
-    bool ended[LANES] = {};
-    for (int k = run.last; k >= run.first && found > 0; --k) {
-        if (!sample_lanes<1>(medium, lanes, k, sample))
-            continue;
-        for (int lane = 0; lane < run.count; ++lane) {
-            if (!ended[lane] && sample[0][lane] > 0) {
-                last[lane] = k;
-                ended[lane] = true;
-                --found;
-            }
-        }
-    }
+    const auto find = [&](int k, int step, int (&found)[LANES]) SMOKELIFT_INLINE_LAMBDA {
+        float sample[1][LANES];
+        std::fill_n(found, LANES, -1);
+        for (int left = run.count; run.first <= k && k <= run.last && left > 0; k += step)
+            if (sample_lanes<1>(medium, lanes, k, sample))
+                for (int lane = 0; lane < run.count; ++lane)
+                    if (found[lane] < 0 && sample[0][lane] > 0) {
+                        found[lane] = k;
+                        --left;
+                    }
+    };
+    int first[LANES], last[LANES];
+    find(run.first, 1, first);
+    find(run.last, -1, last);
     const std::size_t pixel = std::size_t(run.row) * rays.columns + run.column;
     for (int lane = 0; lane < run.count; ++lane) {
-        rays.planes[4 * (pixel + lane) + 2] = first[lane];
+        rays.planes[4 * (pixel + lane) + 2] = std::max(first[lane], 0);
         rays.planes[4 * (pixel + lane) + 3] = last[lane];
     }
-}
-
-int tasks_of(const Rays &rays) { return (int(rays.runs.size()) + RUNS_PER_TASK - 1) / RUNS_PER_TASK; }
-
-// work(first, end) for portions of the runs.
-template <class Work> void over_runs(const Rays &rays, Workers &workers, const Work &work) {
-    workers.run(tasks_of(rays), [&](int task) {
-        work(task * RUNS_PER_TASK, std::min(int(rays.runs.size()), (task + 1) * RUNS_PER_TASK));
-    });
 }
 
 } // namespace
@@ -414,8 +371,8 @@ void Rays::find_runs() {
 }
 
 void clip(const Voxels &medium, Rays &rays, Workers &workers) {
-    over_runs(rays, workers, [&](int first, int end) {
-        for (int r = first; r < end; ++r)
+    workers.run_ranges(rays.runs.size(), RUNS_PER_TASK, [&](std::size_t first, std::size_t end) {
+        for (std::size_t r = first; r < end; ++r)
             clip_run(medium, rays, rays.runs[r]);
     });
     rays.find_runs();
@@ -425,24 +382,23 @@ void march(const Voxels &medium, const Rays &rays, float *scattered, float *dept
            Workers &workers) {
     std::fill_n(depth, rays.pixels(), 0.0f);
     std::fill_n(scattered, rays.pixels() * (medium.width - 1), 0.0f);
-    over_runs(rays, workers,
-              [&](int first, int end) { march_runs(medium, rays, first, end, scattered, depth, record); });
+    workers.run_ranges(rays.runs.size(), RUNS_PER_TASK, [&](std::size_t first, std::size_t end) {
+        march_runs(medium, rays, first, end, scattered, depth, record);
+    });
 }
 
 void march_adjoint(const Rays &rays, const float *depth, const float *scattered_gradient,
                    const float *transmittance_gradient, const Record &record, const Voxels &gradient,
                    Workers &workers) {
-    over_runs(rays, workers, [&](int first, int end) {
+    workers.run_ranges(rays.runs.size(), RUNS_PER_TASK, [&](std::size_t first, std::size_t end) {
         adjoint_sweeps(rays, gradient.width, first, end, depth, scattered_gradient, transmittance_gradient,
                        record);
     });
     for (int axis = 0; axis < 3; ++axis) {
         if (std::none_of(rays.runs.begin(), rays.runs.end(), [&](const Run &r) { return r.axis == axis; }))
             continue;
-        const int planes = gradient.n[axis];
-        workers.run((planes + PLANES_PER_TASK - 1) / PLANES_PER_TASK, [&](int task) {
-            const int first = task * PLANES_PER_TASK;
-            scatter_runs(rays, axis, first, std::min(planes, first + PLANES_PER_TASK), record, gradient);
+        workers.run_ranges(gradient.n[axis], PLANES_PER_TASK, [&](std::size_t first, std::size_t end) {
+            scatter_runs(rays, axis, int(first), int(end), record, gradient);
         });
     }
 }

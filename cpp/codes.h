@@ -1,5 +1,6 @@
 // Pictures as they are stored, in codes of 8 bits, whose values a table tells, and means of them. Every
 // product is rounded by itself (CMakeLists.txt): sums are those of the same steps in NumPy, to the last bit.
+// The docstrings in register_pictures.cpp say what each function does.
 #pragma once
 
 #include <cstddef>
@@ -21,15 +22,12 @@ struct LineWeights {
     int count = 0;
 };
 
-// Writes the weighted sums of values, (count, width), each added up in the order of its weights: as a sparse
-// matrix would be multiplied with the values.
 void sum_lines(const CodedLines &picture, const float *table, const LineWeights &weights, float *sums);
 
 struct Extent {
     int lines = 0, columns = 0, channels = 0;
 };
 
-// The same of the columns of values (lines, columns, channels): the sums are (lines, count, channels).
 void sum_columns(const float *values, const Extent &picture, const LineWeights &weights, float *sums);
 
 // Parts of a picture: `rows` x `columns` of them, with a weight for each channel of each. The n-th part down
@@ -40,7 +38,6 @@ struct PartWeights {
     int rows = 0, columns = 0;
 };
 
-// Adds the values of a picture of three channels, times the weights of its parts, to sums (lines, width).
 void add_weighted(const CodedLines &picture, const float *table, const PartWeights &weights, float *sums);
 
 } // namespace smokelift

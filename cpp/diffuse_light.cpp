@@ -191,9 +191,9 @@ void DiffuseLight::solve_adjoint(const float *emission, const float *phi, const 
     without_border(kappa_gradient, 1, all_, result.data());
     without_border(mu, FIELDS, all_, emission_gradient);
     for (int field = 0; field < FIELDS; ++field) {
-        const float share = field ? SPREAD : 1.0f;
+        const float weight = field ? SPREAD : 1.0f;
         for (std::size_t i = 0; i < count; ++i) {
-            emission_gradient[field * count + i] *= share;
+            emission_gradient[field * count + i] *= weight;
             result[i] += albedo_ * phi[field * count + i] * emission_gradient[field * count + i];
         }
     }

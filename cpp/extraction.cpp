@@ -29,7 +29,7 @@ constexpr float BASIS[3][2] = {{R2, R6}, {0, -2 * R6}, {-R2, R6}};
 constexpr float MIN_OPACITY = 0.03f; // at which J is linearized, so that J can move where no smoke is yet
 constexpr float BRIGHTEST = 2;       // largest g
 constexpr float MAX_FIELD = 3;       // bound of the fields of J where they are linearized
-constexpr float ENOUGH = 1e-3f;      // residual, as a share of the first, where a solve ends
+constexpr float ENOUGH = 1e-3f;      // residual, as a fraction of the first, where a solve ends
 constexpr int WINDOW = 2;            // level whose cells tell how certain T is: four cells wide
 constexpr float SPREAD = 0.4f; // of the sum over a coefficient's cells, the energy of its bilinear weights
 
@@ -139,23 +139,13 @@ void invert(const float *matrix, float *inverse) {
     const double second = 1 / (d * f - e * e);
     const double x = second * f, y = -second * e, z = second * d;
     const double t = p * x + q * y, u = p * y + q * z, v = r * x + s * y, w = r * y + s * z;
-    const double values[16] = {a + t * p + u * q,
-                               b + t * r + u * s,
-                               -t,
-                               -u, //
-                               b + t * r + u * s,
-                               c + v * r + w * s,
-                               -v,
-                               -w, //
-                               -t,
-                               -v,
-                               x,
-                               y, //
-                               -u,
-                               -w,
-                               y,
-                               z};
-    std::copy_n(values, 16, inverse);
+    const double upper[4][4] = {{a + t * p + u * q, b + t * r + u * s, -t, -u},
+                                {0, c + v * r + w * s, -v, -w},
+                                {0, 0, x, y},
+                                {0, 0, 0, z}};
+    for (int row = 0; row < 4; ++row)
+        for (int column = 0; column < 4; ++column)
+            inverse[4 * row + column] = float(upper[std::min(row, column)][std::max(row, column)]);
 }
 
 constexpr int UPPER[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}; // of the upper triangle of a symmetric matrix

@@ -16,7 +16,6 @@ struct LatticePlaces {
     float stretch;
 };
 
-// Values at voxels, linear between nodes.
 void read_lattice(In lattice, const LatticePlaces &places, const MarkedVoxels &voxels, float *values,
                   Workers &workers);
 

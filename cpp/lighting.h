@@ -30,10 +30,10 @@ struct ParallelLight {
 struct PointLight {
     // A side of the cube around the light, and the planes of voxels in front of it, the nearest first.
     struct Face {
-        int axis, travel;    // travel: +1 or -1
-        int first_k, planes; // plane number n is first_k + travel n
-        double far;          // distance of the plane where columns are one voxel apart, in voxels
-        int first_p, count_p, first_q, count_q; // columns that meet the grid, along the two other axes
+        int axis, travel;  // travel: +1 or -1
+        int first, planes; // plane number n is first + travel n
+        double far;        // distance of the plane where columns are one voxel apart, in voxels
+        std::array<int, 2> columns_b, columns_c; // that meet the grid, along the two other axes: first, count
     };
 
     std::array<double, 3> position{}; // in grid coordinates, voxel centers at integers

@@ -142,19 +142,19 @@ void MarkedVoxels::put(const float *values, float factor, float *volume, Workers
     });
 }
 
-void share_in_cubes(const MarkedVoxels &voxels, int size, double weight, const float *values, float *shared,
-                    Workers &workers) {
+void smooth_in_cubes(const MarkedVoxels &voxels, int size, double weight, const float *values,
+                     float *smoothed, Workers &workers) {
     Cubes whole(voxels, size, 0), between(voxels, size, size / 2);
-    const double share = weight / (1 + weight) / 2;
-    whole.find(values, share, workers);
-    between.find(values, share, workers);
+    const double lattice_weight = weight / (1 + weight) / 2;
+    whole.find(values, lattice_weight, workers);
+    between.find(values, lattice_weight, workers);
     const float own = float(1 + weight);
     workers.run(voxels.shape()[0], [&](int x) {
         voxels.in_plane(x, [&](int y, int z, int count, std::size_t at) {
             for (int k = 0; k < count; ++k)
-                shared[at + k] = values[at + k] / own;
-            whole.add(x, y, z, count, shared + at);
-            between.add(x, y, z, count, shared + at);
+                smoothed[at + k] = values[at + k] / own;
+            whole.add(x, y, z, count, smoothed + at);
+            between.add(x, y, z, count, smoothed + at);
         });
     });
 }

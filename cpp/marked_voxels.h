@@ -51,9 +51,7 @@ private:
     std::vector<Plane> planes_;
 };
 
-// values / (1 + weight) and, `weight` times as much, their means over cubes of `size` voxels: half of it over
-// each of two lattices, half a cube apart. Both arrays may be the same.
-void share_in_cubes(const MarkedVoxels &voxels, int size, double weight, const float *values, float *shared,
-                    Workers &workers);
+void smooth_in_cubes(const MarkedVoxels &voxels, int size, double weight, const float *values,
+                     float *smoothed, Workers &workers);
 
 } // namespace smokelift

@@ -8,7 +8,7 @@
 // reversed light.
 //
 // Columns do not depend on each other, so a task takes some neighboring rows of them through all planes and
-// keeps its running sums in the cache; the row that two tasks share is computed by both.
+// keeps its running sums in the cache; the row between two tasks is computed by both.
 #include "lighting.h"
 
 #include "exponential.h"
@@ -59,26 +59,6 @@ struct Columns {
     }
     int tasks() const { return (end_p - 1 - first_p + ROWS_PER_TASK - 1) / ROWS_PER_TASK; }
 };
-
-template <int S> SMOKELIFT_INLINE void load(const float *__restrict from, int count, float *__restrict to) {
-    for (int c = 0; c < count; ++c)
-        to[c] = from[c * S];
-}
-
-// The first floats of a row of voxels.
-SMOKELIFT_INLINE void load_row(const float *from, Stride stride, int count, float *__restrict to) {
-    switch (stride) {
-    case 1:
-        return load<1>(from, count, to);
-    case 2:
-        return load<2>(from, count, to);
-    case 4:
-        return load<4>(from, count, to);
-    default:
-        for (int c = 0; c < count; ++c)
-            to[c] = from[c * stride];
-    }
-}
 
 // One task's rows of columns on their way through the planes of voxels, with the sum so far in every column.
 // A plane is sampled in two steps: rows of voxels are slid along themselves to where the columns are, then

@@ -85,9 +85,9 @@ void to_quantiles(float *values, int lines, std::size_t count, const float *want
             const double at = std::clamp((rank + 0.5) / count * known - 0.5, 0.0, double(known - 1));
             const std::size_t below = std::min(std::size_t(at), known - 1),
                               above = std::min(below + 1, known - 1);
-            const float share = float(at - below);
+            const float fraction = float(at - below);
             float &value = line[ranked[rank].place];
-            value = quantiles[below] + share * (quantiles[above] - quantiles[below]) - value;
+            value = quantiles[below] + fraction * (quantiles[above] - quantiles[below]) - value;
         }
     });
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 namespace smokelift {
 namespace {
@@ -127,20 +126,6 @@ void mark_plane(const PictureMap &map, const unsigned char *picture, const Marke
     }
 }
 
-SMOKELIFT_CLONES
-double nearest_in_plane(const PictureMap &map, int i) {
-    const Shape n = map.shape();
-    double nearest = std::numeric_limits<double>::infinity();
-    for (int j = 0; j < n[1]; ++j) {
-        const PixelRow line(map, i, j);
-        for (int k = 0; k < n[2]; ++k) {
-            const double depth = line.at(2, map.centers[2][k]);
-            nearest = depth > 0 && depth < nearest ? depth : nearest;
-        }
-    }
-    return nearest;
-}
-
 // A picture read bilinearly; the nearest pixel's value outside.
 SMOKELIFT_INLINE float read_at(const double *__restrict picture, int rows, int columns, float at_row,
                                float at_column) {
@@ -169,19 +154,15 @@ void read_range(const double *__restrict picture, int rows, int columns, const f
 SMOKELIFT_CLONES
 void read_row(const double *picture, const PictureMap &map, const PixelRow &line, int first, int count,
               float *__restrict values) {
-    const auto [start, along, end] = line;
+    const PixelRow own = line; // no array that is written may be it
+    const int bottom = map.rows, right = map.columns;
     const double *const z = map.centers[2].data() + first;
-    const double right = map.columns - 0.5, bottom = map.rows - 0.5;
     float rows[TOGETHER] = {}, columns[TOGETHER] = {}, shown[TOGETHER];
     for (int n = 0; n < count; ++n) {
-        const double depth = (start[2] + z[n] * along[2]) + end[2];
-        const double safe = std::abs(depth) < MIN_DEPTH ? MIN_DEPTH : depth;
-        const double column = ((start[0] + z[n] * along[0]) + end[0]) / safe - 0.5;
-        const double row = ((start[1] + z[n] * along[1]) + end[1]) / safe - 0.5;
-        rows[n] = float(row);
-        columns[n] = float(column);
-        shown[n] =
-            (column > -0.5) & (column < right) & (row > -0.5) & (row < bottom) & (depth > 0) ? 1.0f : 0.0f;
+        const Place found = place_of(own, z[n], bottom, right);
+        rows[n] = found.row;
+        columns[n] = found.column;
+        shown[n] = found.visible ? 1.0f : 0.0f;
     }
     read_range(picture, map.rows, map.columns, rows, columns, 0, std::size_t(count), values);
     for (int n = 0; n < count; ++n)
@@ -189,20 +170,21 @@ void read_row(const double *picture, const PictureMap &map, const PixelRow &line
 }
 
 SMOKELIFT_CLONES
-void scale_evenly(const float *__restrict steps, float share, const float *values, float *scaled, int count) {
+void scale_evenly(const float *__restrict steps, float fraction, const float *values, float *scaled,
+                  int count) {
     for (int n = 0; n < count; ++n)
-        scaled[n] = values[n] * exponential(share * steps[n]);
+        scaled[n] = values[n] * exponential(fraction * steps[n]);
 }
 
 SMOKELIFT_CLONES
 void scale_unevenly(const float *__restrict steps, const RayScale &scale, const float *__restrict plausible,
                     const float *values, float *scaled, int count) {
-    const float share = scale.share, faint = scale.faint, most = scale.most;
+    const float fraction = scale.fraction, faint = scale.faint, most = scale.most;
     for (int n = 0; n < count; ++n) {
         const float step = steps[n], value = values[n];
         const float wanted = plausible[n] + faint, reached = value * exponential(step) + faint;
         const float gain = step < 0 ? reached / wanted : wanted / reached;
-        scaled[n] = value * exponential(share * step * (gain < most ? gain : most));
+        scaled[n] = value * exponential(fraction * step * (gain < most ? gain : most));
     }
 }
 
@@ -252,12 +234,6 @@ void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown
                 [&](int i) { mark_plane(map, picture, marked, i, shown + std::size_t(i) * n[1] * n[2]); });
 }
 
-double nearest_depth(const PictureMap &map, Workers &workers) {
-    std::vector<double> nearest(map.shape()[0]);
-    workers.run(map.shape()[0], [&](int i) { nearest[i] = nearest_in_plane(map, i); });
-    return *std::min_element(nearest.begin(), nearest.end());
-}
-
 void scale_along_rays(const RayScale &scale, const PictureMap &map, const MarkedVoxels &voxels,
                       const float *values, float *scaled, Workers &workers) {
     workers.run(voxels.shape()[0], [&](int x) {
@@ -271,7 +247,7 @@ void scale_along_rays(const RayScale &scale, const PictureMap &map, const Marked
                 if (scale.plausible)
                     scale_unevenly(steps, scale, scale.plausible + at, values + at, scaled + at, count);
                 else
-                    scale_evenly(steps, scale.share, values + at, scaled + at, count);
+                    scale_evenly(steps, scale.fraction, values + at, scaled + at, count);
             }
         });
     });

@@ -1,4 +1,5 @@
-// Where voxels lie in a camera's picture, and what the picture shows there.
+// Where voxels lie in a camera's picture, and what the picture shows there; the docstrings in
+// register_pictures.cpp and register_density.cpp say what each function does.
 #pragma once
 
 #include "grid.h"
@@ -42,30 +43,19 @@ std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
                  const Places &places, Workers &workers);
 
-// Marks the voxels whose center's nearest pixel is marked in a picture (rows, columns), and in it.
 void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers);
-
-// Least depth of the voxels before the camera; infinite if there are none.
-double nearest_depth(const PictureMap &map, Workers &workers);
 
 // How the smoke of voxels is scaled along the rays of a picture.
 struct RayScale {
     const double *logarithm; // (rows, columns): of each pixel's factor
-    // Smoke towards which a step leads: one that would scale a value to v is multiplied by plausible / v
-    // where it adds smoke and by v / plausible where it takes some, by `most` at most. Without it steps are
-    // even.
-    const float *plausible;
-    float faint; // what counts beside both
-    float most;
-    float share; // of the step that is made
+    const float *plausible;  // smoke towards which a step leads; without it steps are even
+    float faint, most;
+    float fraction; // of the step that is made
 };
 
-// Scales values of some voxels; those that the picture does not show stay as they are. Both arrays may be the
-// same.
 void scale_along_rays(const RayScale &scale, const PictureMap &map, const MarkedVoxels &voxels,
                       const float *values, float *scaled, Workers &workers);
 
-// A picture (rows, columns) read bilinearly at some places; the nearest pixel's value outside.
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,
                      const float *at_columns, std::size_t count, float *values, Workers &workers);
 

@@ -24,12 +24,13 @@ constexpr int ROWS_PER_TASK = 8; // of columns
 // A face with the light it belongs to, over a grid.
 struct Cone : PointLight::Face {
     std::array<double, 3> light;
-    int count_b, count_c;
+    int count_b, count_c, first_p, count_p, first_q, count_q; // of voxels, and of columns
 
     Cone(const PointLight::Face &face, const PointLight &of, const Shape &n)
-        : Face(face), light(of.position), count_b(n[LATERAL[axis][0]]), count_c(n[LATERAL[axis][1]]) {}
+        : Face(face), light(of.position), count_b(n[LATERAL[axis][0]]), count_c(n[LATERAL[axis][1]]),
+          first_p(columns_b[0]), count_p(columns_b[1]), first_q(columns_c[0]), count_q(columns_c[1]) {}
 
-    int plane(int number) const { return first_k + travel * number; }
+    int plane(int number) const { return first + travel * number; }
     double distance(int number) const { return travel * (plane(number) - light[axis]); }
     double light_b() const { return light[LATERAL[axis][0]]; }
     double light_c() const { return light[LATERAL[axis][1]]; }

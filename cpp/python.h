@@ -175,30 +175,18 @@ template <class T> struct type_caster<smokelift::Part<T>> {
     }
 };
 
-// A volume that is read.
-template <> struct type_caster<smokelift::In> {
-    PYBIND11_TYPE_CASTER(smokelift::In, array_name<const float>);
-
-    bool load(handle from, bool) {
-        const auto given = smokelift::Floats::ensure(from);
-        if (!given)
-            return false;
-        loader_life_support::add_patient(given);
-        value = smokelift::view(given);
-        return true;
-    }
-};
-
-// Marked voxels.
-template <> struct type_caster<smokelift::Mask> {
-    PYBIND11_TYPE_CASTER(smokelift::Mask, array_name<const bool>);
+// A volume, or marked voxels.
+template <class T> struct type_caster<smokelift::Grid<T>> {
+    using Stored = std::conditional_t<std::is_same_v<T, const unsigned char>, const bool, T>;
+    PYBIND11_TYPE_CASTER(smokelift::Grid<T>, array_name<Stored>);
 
     bool load(handle from, bool convert) {
-        make_caster<smokelift::Array<const bool, 3>> given;
+        make_caster<smokelift::Array<Stored, 3>> given;
         if (!given.load(from, convert))
             return false;
-        const auto &[data, n, size] = cast_op<smokelift::Array<const bool, 3> &>(given);
-        value = {reinterpret_cast<const unsigned char *>(data), {int(n[0]), int(n[1]), int(n[2])}};
+        const auto &[data, n, size] = cast_op<smokelift::Array<Stored, 3> &>(given);
+        smokelift::require_fit(size > 0);
+        value = {reinterpret_cast<T *>(data), {int(n[0]), int(n[1]), int(n[2])}};
         return true;
     }
 };

@@ -1,4 +1,3 @@
-#include "descent.h"
 #include "lattice.h"
 #include "marked_voxels.h"
 #include "pictures.h"
@@ -50,12 +49,12 @@ void register_density(py::module_ &module) {
             }),
             "values"_a, "volume"_a, "factor"_a = 1.0f, "Write values, times a factor, into a volume.")
         .def(
-            "share_in_cubes",
+            "smooth_in_cubes",
             unlocked([](Workers &workers, const MarkedVoxels &self, Read<> values, int size, double weight,
                         Write<> out) {
                 require_size(self.count(), values, out);
                 require_fit(size > 0);
-                share_in_cubes(self, size, weight, values.data, out.data, workers);
+                smooth_in_cubes(self, size, weight, values.data, out.data, workers);
             }),
             "values"_a, "size"_a, "weight"_a, "out"_a,
             R"(Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
@@ -76,45 +75,21 @@ void register_density(py::module_ &module) {
         .def("scale_along_rays",
              unlocked([](Workers &workers, const MarkedVoxels &self, const PictureMap &picture, Read<> values,
                          std::optional<Read<>> plausible, Read<2, double> logarithm, float faint, float most,
-                         float share, Write<> out) {
+                         float fraction, Write<> out) {
                  require_size(self.count(), values, plausible.value_or(values), out);
                  require_fit(self.shape() == picture.shape() &&
                              logarithm.n == std::array<Index, 2>{picture.rows, picture.columns});
                  const RayScale scale{logarithm.data, plausible ? plausible->data : nullptr, faint, most,
-                                      share};
+                                      fraction};
                  scale_along_rays(scale, picture, self, values.data, out.data, workers);
              }),
-             "picture"_a, "values"_a, "plausible"_a, "logarithm"_a, "faint"_a, "most"_a, "share"_a, "out"_a,
-             R"(Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
+             "picture"_a, "values"_a, "plausible"_a, "logarithm"_a, "faint"_a, "most"_a, "fraction"_a,
+             "out"_a,
+             R"(Scale values by a fraction of the logarithmic steps (rows, columns) of their pixels' rays.
 
         Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
         would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
         some, both plus ``faint``, by ``most`` at most. The result may replace the values.)");
-
-    module.def(
-        "hold",
-        unlocked(
-            [](Workers &workers, Read<> values, Read<> gradient, Read<> density, float bound, Write<> out) {
-                require_size(values.size, gradient, density, out);
-                hold(values.data, gradient.data, density.data, bound, values.size, out.data, workers);
-            }),
-        "values"_a, "gradient"_a, "density"_a, "bound"_a, "out"_a,
-        "Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that.");
-
-    module.def(
-        "descend",
-        unlocked([](Workers &workers, Read<> density, Read<> direction, Read<> scale, Read<> floor,
-                    float length, float max_change, float bound, Write<> arrived, Write<> moved) {
-            require_size(density.size, direction, scale, floor, arrived, moved);
-            const DescentStep step{density.data, direction.data, scale.data, floor.data,
-                                   length,       max_change,     bound};
-            descend(step, density.size, arrived.data, moved.data, workers);
-        }),
-        "density"_a, "direction"_a, "scale"_a, "floor"_a, "length"_a, "max_change"_a, "bound"_a, "arrived"_a,
-        "moved"_a,
-        R"(Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
-
-        A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.)");
 }
 
 } // namespace smokelift

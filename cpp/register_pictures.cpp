@@ -108,11 +108,7 @@ void register_places(py::module_ &module) {
                             workers);
                  return shown;
              }),
-             "picture"_a, "Voxels in the picture whose nearest pixel is marked (rows, columns).")
-        .def_property_readonly(
-            "nearest",
-            unlocked([](Workers &workers, const PictureMap &map) { return nearest_depth(map, workers); }),
-            "Least depth (m) of the voxels before the camera; infinite if there are none.");
+             "picture"_a, "Voxels in the picture whose nearest pixel is marked (rows, columns).");
 
     module.def("read_bilinearly",
                unlocked([](Workers &workers, Read<2, double> picture, Read<> rows, Read<> columns) {
@@ -271,11 +267,10 @@ void register_turning(py::module_ &module) {
         of the voxels' shadows, so that even smoke makes an even picture from every angle.)");
 
     module.def("scale_turned",
-               unlocked([](Workers &workers, Write<3> volume, Read<3, int> spans, double first,
+               unlocked([](Workers &workers, Out volume, Read<3, int> spans, double first,
                            const std::array<double, 2> &steps, Read<2> logarithm) {
-                   const Out voxels{volume.data, {int(volume.n[0]), int(volume.n[1]), int(volume.n[2])}};
                    require_fit(logarithm.n[0] > 0 && logarithm.n[1] == volume.n[2]);
-                   scale_turned(voxels, spans_of(spans, voxels.n),
+                   scale_turned(volume, spans_of(spans, volume.n),
                                 {first, steps[0], steps[1], int(logarithm.n[0])}, logarithm.data, workers);
                }),
                "volume"_a, "spans"_a, "first"_a, "steps"_a, "logarithm"_a,

@@ -2,11 +2,62 @@
 #include "camera.h"
 #include "diffuse_light.h"
 #include "lighting.h"
-#include "pixel_rays.h"
 #include "python.h"
 
 #include <optional>
 #include <variant>
+
+// Lights are those of light_sweeps.py, read by their attributes.
+namespace pybind11::detail {
+
+template <class T> void read(handle from, const char *name, T &value) { value = from.attr(name).cast<T>(); }
+
+inline void read_energy(handle from, std::array<float, 3> &energy) {
+    const auto channels = from.attr("energy").cast<std::vector<float>>();
+    std::copy_n(channels.begin(), std::min(channels.size(), energy.size()), energy.begin());
+}
+
+template <> struct type_caster<smokelift::ParallelLight> {
+    PYBIND11_TYPE_CASTER(smokelift::ParallelLight, const_name("ParallelSweep"));
+
+    bool load(handle from, bool) {
+        if (!hasattr(from, "slope"))
+            return false;
+        read_energy(from, value.energy);
+        read(from, "direction", value.direction);
+        read(from, "axis", value.axis);
+        read(from, "travel", value.travel);
+        read(from, "first", value.first);
+        read(from, "slope", value.slope);
+        read(from, "step", value.step);
+        return true;
+    }
+};
+
+template <> struct type_caster<smokelift::PointLight> {
+    PYBIND11_TYPE_CASTER(smokelift::PointLight, const_name("PointSweep"));
+
+    bool load(handle from, bool) {
+        if (!hasattr(from, "faces"))
+            return false;
+        read_energy(from, value.energy);
+        read(from, "position", value.position);
+        read(from, "voxel_size", value.voxel_size);
+        for (const handle side : from.attr("faces")) {
+            smokelift::PointLight::Face &face = value.faces.emplace_back();
+            read(side, "axis", face.axis);
+            read(side, "travel", face.travel);
+            read(side, "first", face.first);
+            read(side, "planes", face.planes);
+            read(side, "far", face.far);
+            read(side, "columns_b", face.columns_b);
+            read(side, "columns_c", face.columns_c);
+        }
+        return true;
+    }
+};
+
+} // namespace pybind11::detail
 
 namespace smokelift {
 namespace {
@@ -57,12 +108,6 @@ struct OwnedRays {
         rays.columns = int(d.shape(1));
         rays.find_runs();
     }
-    std::size_t samples() const {
-        std::size_t count = 0;
-        for (std::size_t ray = 0; ray < rays.pixels(); ++ray)
-            count += std::max(0, planes[4 * ray + 3] - planes[4 * ray + 2] + 1);
-        return count;
-    }
     // Values of each channel that a record holds.
     std::size_t recorded() const { return rays.planes_of_runs() * Rays::LANES; }
     void require_pixels(std::size_t size, int channels) const {
@@ -76,14 +121,9 @@ struct OwnedRays {
     }
 };
 
-// The box of an array that a support stands for.
-template <class T> Strided<T> box_of(Part<T> a, const Support &support, const Shape &corner) {
-    Strided<T> box = a.at;
-    for (int axis = 0; axis < 3; ++axis) {
-        require_fit(corner[axis] >= 0 && corner[axis] + support.n[axis] <= a.n[axis]);
-        box.data += corner[axis] * box.stride[axis];
-    }
-    return box;
+template <class T> Strided<T> on_support(Part<T> box, const Support &support) {
+    require_fit(box.n == support.n);
+    return box.at;
 }
 
 Fields over_blocks(int fields, const Shape &n) { return Fields({fields, n[0], n[1], n[2]}); }
@@ -128,24 +168,23 @@ void register_voxels(py::module_ &module) {
         .def(py::init<const Bytes &>(), "marked"_a);
 
     module.def("pack",
-               unlocked([](Workers &workers, Part<const float> density, const Shape &corner,
-                           const Support &support, float extinction, VoxelArray medium) {
-                   pack(box_of(density, support, corner), support.marked.data(), extinction, support.spans,
+               unlocked([](Workers &workers, Part<const float> density, const Support &support,
+                           float extinction, VoxelArray medium) {
+                   pack(on_support(density, support), support.marked.data(), extinction, support.spans,
                         voxels_of(medium, support), workers);
                }),
-               "density"_a, "corner"_a, "support"_a, "extinction"_a, "medium"_a,
-               R"(Write the extinction of the marked voxels from their density.
-
-        ``corner`` is where the support begins in the array of densities; ``extinction`` is in 1/m at density 1.)");
+               "density"_a, "support"_a, "extinction"_a, "medium"_a,
+               "Write the extinction of the marked voxels from their density; ``extinction`` is in 1/m at "
+               "density 1.");
 
     module.def(
         "unpack",
         unlocked([](Workers &workers, VoxelArray gradient, const Support &support, float extinction,
-                    Part<float> result, const Shape &corner) {
+                    Part<float> result) {
             unpack(voxels_of(gradient, support), support.marked.data(), extinction,
-                   box_of(result, support, corner), workers);
+                   on_support(result, support), workers);
         }),
-        "gradient"_a, "support"_a, "extinction"_a, "result"_a, "corner"_a,
+        "gradient"_a, "support"_a, "extinction"_a, "result"_a,
         "Write the derivative by density of the marked voxels into ``result``; others are left as they are.");
 }
 
@@ -157,70 +196,6 @@ void register_lights(py::module_ &module) {
                  return Phase{to_eye, albedo, anisotropy};
              }),
              py::kw_only(), "to_eye"_a, "albedo"_a, "anisotropy"_a);
-
-    py::class_<ParallelLight>(module, "ParallelLight",
-                              R"(Parallel light, swept through planes of voxels across its dominant axis.
-
-        Parameters
-        ----------
-        direction : (3,)
-            Of travel, unit length.
-        energy : (3,)
-            Irradiance by channel in W/m^2.
-        axis, travel
-            Dominant axis, and +1 or -1 along it.
-        first
-            Number of the first plane in the grid of which this one is a part.
-        slope
-            Voxels that a ray moves from plane to plane along the two other axes.
-        step
-            Length of a ray between two planes in meters.)")
-        .def(py::init([](const std::array<float, 3> &direction, const std::array<float, 3> &energy, int axis,
-                         int travel, int first, const std::array<double, 2> &slope, float step) {
-                 return ParallelLight{direction, energy, axis, travel, first, slope, step};
-             }),
-             py::kw_only(), "direction"_a, "energy"_a, "axis"_a, "travel"_a, "first"_a, "slope"_a, "step"_a);
-
-    using Face = PointLight::Face;
-    py::class_<Face>(
-        module, "Face",
-        R"(A side of the cube around a point light, and the planes of voxels in front of it, the nearest first.
-
-        Parameters
-        ----------
-        axis, travel
-            Axis across the side, and +1 or -1 along it.
-        first, planes
-            The nearest plane of voxels, and how many there are.
-        far
-            Distance in voxels of the plane where columns are one voxel apart.
-        columns_b, columns_c
-            First column and number of columns that meet the grid along the two other axes.)")
-        .def(py::init([](int axis, int travel, int first, int planes, double far,
-                         std::array<int, 2> columns_b, std::array<int, 2> columns_c) {
-                 return Face{axis,         travel,       first,        planes,      far,
-                             columns_b[0], columns_b[1], columns_c[0], columns_c[1]};
-             }),
-             py::kw_only(), "axis"_a, "travel"_a, "first"_a, "planes"_a, "far"_a, "columns_b"_a,
-             "columns_c"_a);
-
-    py::class_<PointLight>(module, "PointLight", R"(Light from a point outside the grid.
-
-        Parameters
-        ----------
-        position : (3,)
-            In grid coordinates, voxel centers at integers.
-        energy : (3,)
-            Intensity by channel over the squared voxel edge, in W/m^2.
-        voxel_size
-            In meters.
-        faces
-            The sides of the cube around it that see the grid.)")
-        .def(py::init([](const std::array<double, 3> &position, const std::array<float, 3> &energy,
-                         float voxel_size, const std::vector<Face> &faces) {
-                 return PointLight{position, energy, voxel_size, faces};
-             }),
-             py::kw_only(), "position"_a, "energy"_a, "voxel_size"_a, "faces"_a);
 
     module.def("shade",
                unlocked([](Workers &workers, VoxelArray medium, const Support &support, const Phase &phase,
@@ -281,50 +256,25 @@ void register_camera(py::module_ &module) {
                  clip(voxels_of(medium, support), self.rays, workers);
              }),
              "support"_a, "medium"_a, "Shorten every ray to where the voxels around it hold anything.")
-        .def_property_readonly("samples", &OwnedRays::samples, "Samples of all rays together.")
         .def_property_readonly("recorded", &OwnedRays::recorded,
                                "Samples that a record holds of each channel: neighboring rays have as many.");
 
-    using Places = std::vector<double>;
     module.def(
-        "pixel_rays",
-        unlocked([](Workers &workers, const std::array<Vector, 3> &start,
-                    const std::array<Vector, 3> &direction, bool far, const Places &columns,
-                    const Places &rows, const Shape &n) {
-            const Index height = Index(rows.size()), width = Index(columns.size());
-            Made<float, 3> lines({height, width, 4});
-            Made<float, 2> length({height, width});
-            Made<int, 3> planes({height, width, 4});
-            const Lens lens{{start[0], start[1], start[2]}, {direction[0], direction[1], direction[2]}, far};
-            pixel_rays(lens, columns, rows, n, lines.data(), length.data(), planes.data(), workers);
-            return std::tuple(std::move(lines), std::move(length), std::move(planes));
+        "march",
+        unlocked([](Workers &workers, VoxelArray medium, const Support &support, const OwnedRays &rays,
+                    std::optional<Write<>> record) {
+            const Voxels voxels = voxels_of(medium, support);
+            const Index rows = rays.rays.rows, columns = rays.rays.columns;
+            Made<float, 3> scattered({rows, columns, voxels.width - 1});
+            Made<float, 2> depth({rows, columns});
+            march(voxels, rays.rays, scattered.data(), depth.data(), rays.record(record, voxels.width),
+                  workers);
+            return std::pair(std::move(scattered), std::move(depth));
         }),
-        "start"_a, "direction"_a, "far"_a, "columns"_a, "rows"_a, "shape"_a,
-        R"(Lines, lengths in voxels and planes of `Rays` through all pixels, as far as their samples meet a grid.
+        "medium"_a, "support"_a, "rays"_a, "record"_a,
+        R"(Radiance towards the camera (rows, columns, channels) and optical depth (rows, columns) of every ray.
 
-        Where in the grid a ray starts, and which way it goes, is a + x b + y c at the places x and y of its column and row,
-        (3, 3) each. Samples lie before the start unless the camera is far away.)");
-
-    module.def("march",
-               unlocked([](Workers &workers, VoxelArray medium, const Support &support, const OwnedRays &rays,
-                           Write<> scattered, Write<> depth, std::optional<Write<>> record) {
-                   const Voxels voxels = voxels_of(medium, support);
-                   rays.require_pixels(scattered.size, voxels.width - 1);
-                   rays.require_pixels(depth.size, 1);
-                   march(voxels, rays.rays, scattered.data, depth.data, rays.record(record, voxels.width),
-                         workers);
-               }),
-               "medium"_a, "support"_a, "rays"_a, "scattered"_a, "depth"_a, "record"_a,
-               R"(Write the radiance towards the camera and the optical depth of every ray.
-
-        Parameters
-        ----------
-        scattered : (rows, columns, channels)
-            Radiance, written.
-        depth : (rows, columns)
-            Optical depth, written.
-        record : (1 + channels, `Rays.recorded`)
-            What the samples held, written for `march_adjoint`; may be None.)");
+        ``record`` (1 + channels, `Rays.recorded`) is written for `march_adjoint`: what the samples held. It may be None.)");
 
     module.def(
         "march_adjoint",

@@ -1,5 +1,5 @@
 // A volume on a turntable: its picture from any angle, a pixel a voxel, and factors along the rays of that
-// picture.
+// picture; see the docstrings in register_pictures.cpp.
 #pragma once
 
 #include "grid.h"
@@ -14,16 +14,8 @@ struct Turned {
     int columns; // of the picture
 };
 
-// Of every column of voxels (i, j) the first that is not zero, and the end of those that are not.
 void find_filled(In volume, int *spans, Workers &workers);
-
-// Adds the voxels in some spans, beyond which all are zero, up along the rays into a picture (columns, nz). A
-// pixel gets what it covers of the shadow of a voxel, a turned square, so that even smoke makes an even
-// picture from every angle.
 void project_turned(In volume, const int *spans, const Turned &turned, float *picture, Workers &workers);
-
-// Multiplies the voxels in such spans by the exponential of a picture (columns, nz), read with the same
-// weights.
 void scale_turned(Out volume, const int *spans, const Turned &turned, const float *logarithm,
                   Workers &workers);
 

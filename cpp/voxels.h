@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 namespace smokelift {
@@ -35,6 +36,22 @@ struct Voxels {
         return axis == 0 ? at(k, i, j) : axis == 1 ? at(i, k, j) : at(i, j, k);
     }
 };
+
+// The first floats of neighboring voxels of a row, `stride` apart.
+SMOKELIFT_INLINE void load_row(const float *__restrict from, Stride stride, int count, float *__restrict to) {
+    const auto load = [&](auto apart) SMOKELIFT_INLINE_LAMBDA {
+        for (int c = 0; c < count; ++c)
+            to[c] = from[c * apart];
+    };
+    if (stride == 1)
+        load(std::integral_constant<int, 1>());
+    else if (stride == 2)
+        load(std::integral_constant<int, 2>());
+    else if (stride == 4)
+        load(std::integral_constant<int, 4>());
+    else
+        load(stride);
+}
 
 // Ranges of rows of voxels: along z by (x, y), and along y by (x, z).
 struct Spans {

@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks.array_types import Array, Mask
+from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 
 Reals = npt.NDArray[np.floating[Any]]
 Integers = npt.NDArray[np.int32]

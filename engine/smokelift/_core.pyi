@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks.array_types import Array, Mask
+from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 
 Reals = npt.NDArray[np.floating[Any]]
 Integers = npt.NDArray[np.int32]
@@ -122,13 +123,10 @@ class Support:
     """Where there can be smoke; ``marked`` is (nx, ny, nz), not 0 in such voxels."""
     def __init__(self, marked: Bytes) -> None: ...
 
-def pack(density: Array, corner: npt.ArrayLike, support: Support, extinction: float, medium: Array) -> None:
-    """Write the extinction of the marked voxels from their density.
+def pack(density: Array, support: Support, extinction: float, medium: Array) -> None:
+    """Write the extinction of the marked voxels from their density; ``extinction`` is in 1/m at density 1."""
 
-    ``corner`` is where the support begins in the array of densities; ``extinction`` is in 1/m at density 1.
-    """
-
-def unpack(gradient: Array, support: Support, extinction: float, result: Array, corner: npt.ArrayLike) -> None:
+def unpack(gradient: Array, support: Support, extinction: float, result: Array) -> None:
     """Write the derivative by density of the marked voxels into ``result``; others are left as they are."""
 
 class Phase:
@@ -138,81 +136,7 @@ class Phase:
     """
     def __init__(self, *, to_eye: npt.ArrayLike, albedo: float, anisotropy: float) -> None: ...
 
-class ParallelLight:
-    """Parallel light, swept through planes of voxels across its dominant axis.
-
-    Parameters
-    ----------
-    direction : (3,)
-        Of travel, unit length.
-    energy : (3,)
-        Irradiance by channel in W/m^2.
-    axis, travel
-        Dominant axis, and +1 or -1 along it.
-    first
-        Number of the first plane in the grid of which this one is a part.
-    slope
-        Voxels that a ray moves from plane to plane along the two other axes.
-    step
-        Length of a ray between two planes in meters.
-    """
-    def __init__(
-        self,
-        *,
-        direction: npt.ArrayLike,
-        energy: npt.ArrayLike,
-        axis: int,
-        travel: int,
-        first: int,
-        slope: npt.ArrayLike,
-        step: float,
-    ) -> None: ...
-
-class Face:
-    """A side of the cube around a point light, and the planes of voxels in front of it, the nearest first.
-
-    Parameters
-    ----------
-    axis, travel
-        Axis across the side, and +1 or -1 along it.
-    first, planes
-        The nearest plane of voxels, and how many there are.
-    far
-        Distance in voxels of the plane where columns are one voxel apart.
-    columns_b, columns_c
-        First column and number of columns that meet the grid along the two other axes.
-    """
-    def __init__(
-        self,
-        *,
-        axis: int,
-        travel: int,
-        first: int,
-        planes: int,
-        far: float,
-        columns_b: npt.ArrayLike,
-        columns_c: npt.ArrayLike,
-    ) -> None: ...
-
-class PointLight:
-    """Light from a point outside the grid.
-
-    Parameters
-    ----------
-    position : (3,)
-        In grid coordinates, voxel centers at integers.
-    energy : (3,)
-        Intensity by channel over the squared voxel edge, in W/m^2.
-    voxel_size
-        In meters.
-    faces
-        The sides of the cube around it that see the grid.
-    """
-    def __init__(
-        self, *, position: npt.ArrayLike, energy: npt.ArrayLike, voxel_size: float, faces: Sequence[Face]
-    ) -> None: ...
-
-def shade(medium: Array, support: Support, phase: Phase, lights: Sequence[ParallelLight | PointLight]) -> None:
+def shade(medium: Array, support: Support, phase: Phase, lights: Sequence[ParallelSweep | PointSweep]) -> None:
     """Write the radiance that the lights scatter in every voxel towards the camera."""
 
 def shade_adjoint(
@@ -221,7 +145,7 @@ def shade_adjoint(
     scratch: Array | None,
     support: Support,
     phase: Phase,
-    lights: Sequence[ParallelLight | PointLight],
+    lights: Sequence[ParallelSweep | PointSweep],
 ) -> None:
     """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
 
@@ -247,38 +171,13 @@ class Rays:
         """Shorten every ray to where the voxels around it hold anything."""
 
     @property
-    def samples(self) -> int:
-        """Samples of all rays together."""
-
-    @property
     def recorded(self) -> int:
         """Samples that a record holds of each channel: neighboring rays have as many."""
 
-def pixel_rays(
-    start: npt.ArrayLike,
-    direction: npt.ArrayLike,
-    far: bool,
-    columns: npt.ArrayLike,
-    rows: npt.ArrayLike,
-    shape: npt.ArrayLike,
-) -> tuple[Array, Array, Integers]:
-    """Lines, lengths in voxels and planes of `Rays` through all pixels, as far as their samples meet a grid.
+def march(medium: Array, support: Support, rays: Rays, record: Array | None) -> tuple[Array, Array]:
+    """Radiance towards the camera (rows, columns, channels) and optical depth (rows, columns) of every ray.
 
-    Where in the grid a ray starts, and which way it goes, is a + x b + y c at the places x and y of its column and row,
-    (3, 3) each. Samples lie before the start unless the camera is far away.
-    """
-
-def march(medium: Array, support: Support, rays: Rays, scattered: Array, depth: Array, record: Array | None) -> None:
-    """Write the radiance towards the camera and the optical depth of every ray.
-
-    Parameters
-    ----------
-    scattered : (rows, columns, channels)
-        Radiance, written.
-    depth : (rows, columns)
-        Optical depth, written.
-    record : (1 + channels, `Rays.recorded`)
-        What the samples held, written for `march_adjoint`; may be None.
+    ``record`` (1 + channels, `Rays.recorded`) is written for `march_adjoint`: what the samples held. It may be None.
     """
 
 def march_adjoint(
@@ -355,10 +254,6 @@ class PictureMap:
 
     def shown(self, picture: Mask) -> Mask:
         """Voxels in the picture whose nearest pixel is marked (rows, columns)."""
-
-    @property
-    def nearest(self) -> float:
-        """Least depth (m) of the voxels before the camera; infinite if there are none."""
 
 def read_bilinearly(picture: Reals, rows: Reals, columns: Reals) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
@@ -464,7 +359,7 @@ class MarkedVoxels:
     def put(self, values: Reals, volume: Array, factor: float = 1.0) -> None:
         """Write values, times a factor, into a volume."""
 
-    def share_in_cubes(self, values: Reals, size: int, weight: float, out: Array) -> None:
+    def smooth_in_cubes(self, values: Reals, size: int, weight: float, out: Array) -> None:
         """Write values / (1 + weight) and, ``weight`` times as much, their means over cubes of ``size`` voxels.
 
         Half of it is over each of two lattices, half a cube apart. The result may replace the values.
@@ -484,31 +379,12 @@ class MarkedVoxels:
         logarithm: Reals,
         faint: float,
         most: float,
-        share: float,
+        fraction: float,
         out: Array,
     ) -> None:
-        """Scale values by a share of the logarithmic steps (rows, columns) of their pixels' rays.
+        """Scale values by a fraction of the logarithmic steps (rows, columns) of their pixels' rays.
 
         Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
         would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
         some, both plus ``faint``, by ``most`` at most. The result may replace the values.
         """
-
-def hold(values: Reals, gradient: Reals, density: Reals, bound: float, out: Array) -> None:
-    """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
-
-def descend(
-    density: Reals,
-    direction: Reals,
-    scale: Reals,
-    floor: Reals,
-    length: float,
-    max_change: float,
-    bound: float,
-    arrived: Array,
-    moved: Array,
-) -> None:
-    """Write where a step against a direction arrives, and the way there in units of the scale; arrays (n,).
-
-    A density stays between 0 and ``bound`` and changes by a share ``max_change`` of itself and its floor at most.
-    """

@@ -73,9 +73,9 @@ class PaperRenderer:
         self._background = np.asarray(background, np.float64)
         setup = plan_render(camera, domain, medium, lights, scattering, None)
         self._shadows = setup.shadows
-        self._lights = setup.lighting.lights
+        self._lights = setup.lights
         # without lights a black one: kernels want a channel
-        self._color = setup.lighting.color if self._lights else np.zeros((1, 3))
+        self._color = setup.color if self._lights else np.zeros((1, 3))
         self._channels = len(self._color)
         x, y, z = domain.resolution
         self._to_eye = taichi.matrix(setup.to_eye)

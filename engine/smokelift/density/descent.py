@@ -91,9 +91,9 @@ def descend(
         before, gradient = gradient, problem.gradient(residuals, room.take())
         if before is not None and step is not None:
             curvature.learn(step.moved, np.subtract(gradient, before, out=before))
-        _core.hold(gradient, gradient, current, bound, direction)
+        _free(gradient, gradient, current, bound, direction)
         curvature.newton(direction)
-        _core.hold(direction, gradient, current, bound, direction)
+        _free(direction, gradient, current, bound, direction)
         slope = _dot(gradient, direction)
         if not slope > 0:
             break
@@ -164,10 +164,16 @@ class _Problem:
     ) -> _Step | None:
         """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
         density, moved = room.take(), room.take()
+        reach = np.float32(MAX_CHANGE) * (current + self.floor)
+        lowest, highest = np.maximum(current - reach, 0), np.minimum(current + reach, np.float32(bound))
         for _ in range(SHORTENINGS):
-            _core.descend(
-                current, direction, self.scale, self.floor, length, MAX_CHANGE, bound, arrived=density, moved=moved
-            )
+            with np.errstate(over="ignore", invalid="ignore"):  # the first step may be longer than numbers reach
+                np.multiply(direction, np.float32(-length), out=density)
+                density *= self.scale
+                density += current
+            np.clip(density, lowest, highest, out=density)
+            np.subtract(density, current, out=moved)
+            moved /= self.scale
             residuals = self.residuals(density)
             found = objective(self.terms, residuals)
             # what the bounds leave of a long step need not lead down
@@ -230,12 +236,18 @@ class _Curvature:
             saxpy(s, q, a=alpha - beta)
 
 
+def _free(values: Array, gradient: Array, density: Array, bound: float, out: Array) -> None:
+    """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
+    np.copyto(out, values)
+    out[((density <= 0) & (gradient > 0)) | ((density >= bound) & (gradient < 0))] = 0
+
+
 def with_neighbors(where: _core.MarkedVoxels, values: Array, out: Array) -> Array:
     """The voxels' values (n,) and, `SHARED` times as much, their means over cubes.
 
     The cubes are those of two lattices half a cube apart, so that no cube shows. The result may replace the values.
     """
-    where.share_in_cubes(values, BLOCK, SHARED, out)
+    where.smooth_in_cubes(values, BLOCK, SHARED, out)
     return out
 
 

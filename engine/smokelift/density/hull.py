@@ -65,9 +65,11 @@ class Projection:
 @lru_cache(maxsize=8)
 def project_voxels(camera: Camera, domain: Domain) -> Projection:
     """Project every voxel center of a domain."""
-    axes = [axis.ravel() for axis in domain.offsets((0, 0, 0))]
-    projected = _core.PictureMap(world_to_pixel(camera), axes, camera.size)
-    near = projected.nearest if camera.type == "perspective" else 1.0
+    x, y, z = domain.offsets((0, 0, 0))
+    to_pixel = world_to_pixel(camera)
+    projected = _core.PictureMap(to_pixel, [axis.ravel() for axis in (x, y, z)], camera.size)
+    depth = x * to_pixel[2, 0] + y * to_pixel[2, 1] + z * to_pixel[2, 2] + to_pixel[2, 3]
+    near = np.min(depth, where=depth > 0, initial=np.inf) if camera.type == "perspective" else 1.0
     # the diagonal of a voxel is its largest width from any side
     footprint = max(camera.fx, camera.fy) * domain.voxel_size * np.sqrt(3) / near
     return Projection(float(footprint), projected, camera.size)

@@ -10,19 +10,28 @@ The distance between samples is between one voxel edge and sqrt(3) of it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-import smokelift._core as _core
-from smokelift.checks.array_types import Doubles
+from smokelift.checks.array_types import Array, Doubles
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import world_to_pixel
 
 LATERAL = ((1, 2), (0, 2), (0, 1))
 """The two other axes of each axis."""
+
+INSIDE = 1e-3
+"""The footprint is open, so places are kept so many voxels inside: floats then round to the same cell everywhere."""
+
+MIN_SLOPE = 1e-9
+"""Voxels per plane. Rays of less slope stay in one column of voxels, and dividing by this loses nothing."""
+
+BAND = 1 << 16
+"""Pixels whose rays are found together, about: what lies between takes some hundred bytes a pixel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,17 +69,43 @@ def camera_rays(camera: Camera, domain: Domain) -> Rays:
     width, height = camera.size
     across = (np.arange(width) + 0.5 - camera.cx) / camera.fx
     up = -(np.arange(height) + 0.5 - camera.cy) / camera.fy
-    matrix = np.array(camera.matrix, np.float64)
-    right, above, back, eye = matrix[:3].T
-    h, far = domain.voxel_size, camera.type == "orthographic"
-    start, direction = np.zeros((2, 3, 3))
-    start[0], direction[0] = (eye - np.array(domain.min)) / h - 0.5, -back
-    if far:
-        start[1:] = right / h, above / h
-    else:
-        direction[1:] = right, above
-    lines, length, planes = _core.pixel_rays(start, direction, far, across, up, domain.resolution)
+    h = domain.voxel_size
+    bands = np.array_split(up, math.ceil(width * height / BAND))
+    found = [_band(camera, domain, across, band) for band in bands]
+    lines, length, planes = (np.concatenate(parts) for parts in zip(*found, strict=True))
     to_grid = np.eye(4)
     to_grid[:3, :3] *= h
     to_grid[:3, 3] = np.array(domain.min) + 0.5 * h
     return Rays(lines, length * np.float32(h), planes, world_to_pixel(camera) @ to_grid)
+
+
+def _band(camera: Camera, domain: Domain, across: Doubles, up: Doubles) -> tuple[Array, Array, NDArray[np.int32]]:
+    """Lines, lengths in voxels and planes of the rays of some rows, by the places of columns and rows in the picture.
+
+    Samples lie where the bilinear footprint meets the grid, and before the eye unless the camera is far away.
+    """
+    right, above, back, eye = np.array(camera.matrix, np.float64)[:3].T
+    h, far = domain.voxel_size, camera.type == "orthographic"
+    start, direction = (eye - np.array(domain.min)) / h - 0.5, -back
+    shift = across[:, None] * right + up[:, None, None] * above
+    start, direction = np.broadcast_arrays(*((start + shift / h, direction) if far else (start, direction + shift)))
+    axis = np.argmax(np.abs(direction), axis=-1)
+    order = np.array([(along, *LATERAL[along]) for along in range(3)])[axis]  # the dominant axis and the two others
+    start, direction = (np.take_along_axis(vectors, order, -1) for vectors in (start, direction))
+    count = np.array(domain.resolution)[order]
+    along = direction[..., 0]
+    slope = direction[..., 1:] / along[..., None]
+    offset = start[..., 1:] - slope * start[..., :1]
+    steep = np.where(np.abs(slope) < MIN_SLOPE, MIN_SLOPE, slope)
+    ends = np.sort([(INSIDE - 1 - offset) / steep, (count[..., 1:] - INSIDE - offset) / steep], axis=0)
+    first = np.ceil(np.maximum(ends[0].max(-1), 0))
+    last = np.floor(np.minimum(ends[1].min(-1), count[..., 0] - 1))
+    if not far:  # nothing behind the eye
+        first = np.where(along > 0, np.maximum(first, np.floor(start[..., 0]) + 1), first)
+        last = np.where(along < 0, np.minimum(last, np.ceil(start[..., 0]) - 1), last)
+    hits = first <= last
+    # a ray that misses can pass at any distance
+    lines = np.where(hits[..., None], np.stack([offset, slope], -1).reshape(*hits.shape, 4), 0)
+    length = np.linalg.norm(direction, axis=-1) / np.abs(along)
+    planes = [axis, np.where(along > 0, 1, -1), np.where(hits, first, 0), np.where(hits, last, -1)]
+    return lines.astype(np.float32), length.astype(np.float32), np.stack(planes, -1).astype(np.int32)

@@ -14,7 +14,7 @@ import numpy as np
 import smokelift._core as _core
 from smokelift.checks.array_types import Array
 from smokelift.render.diffuse_light import DiffuseLight
-from smokelift.render.light_sweeps import ParallelSweep, PointSweep
+from smokelift.render.light_sweeps import ParallelSweep
 from smokelift.render.plan import RenderPlan
 
 
@@ -23,14 +23,14 @@ class CpuBackend:
 
     def __init__(self, plan: RenderPlan) -> None:
         self._axes = (0, 1, 2)
-        lights = plan.lighting.lights
+        lights = plan.lights
         parallel = [light for light in lights if isinstance(light, ParallelSweep)]
         # a point light's voxels belong to the first of its faces, an order that a swap would change
         if len(parallel) == len(lights) and 2 * sum(light.axis == 2 for light in parallel) > len(lights):
             self._axes = (0, 2, 1)
             plan = _with_y_and_z_swapped(plan, parallel)
         self._plan = plan
-        channels = plan.lighting.channels
+        channels = plan.channels
         x, y, z = plan.shape
         self._support = _core.Support(plan.marked)
         self._rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
@@ -43,63 +43,47 @@ class CpuBackend:
         self._gradient: Array | None = None
         self._scratch: Array | None = None
         self._record: Array | None = None
-        pixels = plan.rays.length.shape
-        self._scattered = np.zeros((*pixels, channels), np.float32)
-        self._depth = np.zeros(pixels, np.float32)
+        self._depth = np.zeros(plan.rays.length.shape, np.float32)
         self._phase = _core.Phase(to_eye=plan.to_eye, albedo=plan.medium.albedo, anisotropy=plan.medium.anisotropy)
-        self._lights = [_compiled(light) for light in plan.lighting.lights]
         self._diffuse = DiffuseLight(plan, self._support) if plan.diffuse else None
         if channels and not plan.shadows:
-            _core.shade(self._medium, self._support, self._phase, self._lights)
+            self._shade()
 
     def image(self, density: Array, keep_record: bool) -> tuple[Array, Array]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
         plan = self._plan
-        density = np.asarray(density, np.float32).transpose(self._axes)
-        _core.pack(density, plan.corner, self._support, plan.medium.extinction, self._medium)
+        part = np.asarray(density, np.float32).transpose(self._axes)[plan.box]
+        _core.pack(part, self._support, plan.medium.extinction, self._medium)
         if plan.shadows:
-            _core.shade(self._medium, self._support, self._phase, self._lights)
+            self._shade()
         if self._diffuse:
             self._diffuse.add(self._medium)
         if keep_record and self._record is None:
-            self._record = _core.zeros((plan.lighting.channels + 1, self._rays.recorded))
+            self._record = _core.zeros((plan.channels + 1, self._rays.recorded))
         record = self._record if keep_record else None
-        _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
-        return self._scattered, self._depth
+        scattered, self._depth = _core.march(self._medium, self._support, self._rays, record)
+        return scattered, self._depth
 
     def gradient(self, scattered_gradient: Array, transmittance_gradient: Array, out: Array | None = None) -> Array:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:
             self._gradient = _core.zeros(self._medium.shape)
-        _core.march_adjoint(
-            self._rays,
-            self._depth,
-            scattered_gradient,
-            transmittance_gradient,
-            self._record,
-            self._gradient,
-            self._support,
-        )
+        derivatives = scattered_gradient, transmittance_gradient
+        _core.march_adjoint(self._rays, self._depth, *derivatives, self._record, self._gradient, self._support)
         if self._diffuse:
             self._diffuse.pull_back(self._medium, self._gradient)
         if plan.shadows:
-            if self._scratch is None and len(self._lights) > 1:
+            if self._scratch is None and len(plan.lights) > 1:
                 self._scratch = _core.zeros((*self._medium.shape[:3], 1))
-            _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, self._lights)
+            _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, plan.lights)
         result = _core.zeros(plan.domain.resolution) if out is None else out
-        swapped = result.transpose(self._axes)
-        _core.unpack(self._gradient, self._support, plan.medium.extinction, swapped, plan.corner)
+        part = result.transpose(self._axes)[plan.box]
+        _core.unpack(self._gradient, self._support, plan.medium.extinction, part)
         return result
 
-
-def _compiled(light: ParallelSweep | PointSweep) -> _core.ParallelLight | _core.PointLight:
-    energy = np.zeros(3)
-    energy[: light.energy.size] = light.energy
-    if isinstance(light, PointSweep):
-        faces = [_core.Face(**vars(face)) for face in light.faces]
-        return _core.PointLight(position=light.position, energy=energy, voxel_size=light.voxel_size, faces=faces)
-    return _core.ParallelLight(**{**vars(light), "energy": energy})
+    def _shade(self) -> None:
+        _core.shade(self._medium, self._support, self._phase, self._plan.lights)
 
 
 def _with_y_and_z_swapped(plan: RenderPlan, lights: Sequence[ParallelSweep]) -> RenderPlan:
@@ -121,5 +105,5 @@ def _with_y_and_z_swapped(plan: RenderPlan, lights: Sequence[ParallelSweep]) -> 
         marked=np.ascontiguousarray(plan.marked.transpose(0, 2, 1)),
         rays=replace(rays, lines=lines, planes=planes),
         to_eye=plan.to_eye[:, [0, 2, 1, 3]],
-        lighting=replace(plan.lighting, lights=swapped),
+        lights=swapped,
     )

@@ -34,9 +34,9 @@ class DiffuseLight:
         albedos = plan.medium.albedos
         self._albedo = max(albedos)
         # gray smoke scatters all channels alike, whatever colors they are
-        whole = slice(0, FIELDS * plan.lighting.channels)
+        whole = slice(0, FIELDS * plan.channels)
         self._alike = [(self._albedo, whole)] if plan.medium.is_gray else _channels(albedos)
-        relative = np.ones(plan.lighting.channels) if plan.medium.is_gray else np.array(albedos) / self._albedo
+        relative = np.ones(plan.channels) if plan.medium.is_gray else np.array(albedos) / self._albedo
         self._relative_albedos = relative.astype(np.float32).repeat(FIELDS)[:, None, None, None]
         size = min(max(round(max(plan.domain.resolution) / BLOCKS), MIN_BLOCK), MAX_BLOCK)
         self._edge = size * plan.domain.voxel_size
@@ -46,8 +46,8 @@ class DiffuseLight:
         last = np.floor((corner + count - 0.5) / size - 0.5).astype(int) + 1
         shape, offset = (last - first + 1).tolist(), (corner - size * first).tolist()
         self._blocks = _core.Blocks(shape=shape, size=size, offset=offset)
-        self._means: Array | None = None
-        self._radiance: Array | None = None
+        self._means: Array
+        self._radiance: Array
 
     def add(self, medium: Array) -> None:
         """Add to the radiance that the voxels scatter what they scatter of scattered light."""
@@ -61,8 +61,6 @@ class DiffuseLight:
 
         The medium is left as it was before `add`.
         """
-        if self._means is None or self._radiance is None:
-            raise RuntimeError("No diffuse light has been added.")
         self._interpolate(self._radiance, -self._albedo, medium)
         radiance_gradient = self._relative_albedos * _core.interpolate_adjoint(
             gradient, self._support, self._albedo, self._blocks

@@ -108,44 +108,26 @@ class PointSweep:
     faces: tuple[Face, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Lighting:
-    """All lights of a scene.
-
-    Attributes
-    ----------
-    lights
-        The sweeps to do.
-    color : (channels, 3)
-        Turns the channels into colors. Light of one color needs one channel, other light three.
-    """
-
-    lights: tuple[ParallelSweep | PointSweep, ...]
-    color: Doubles
-
-    @property
-    def channels(self) -> int:
-        """How many channels of in-scattered radiance there are: 0, 1 or 3."""
-        return len(self.color)
+Sweep = ParallelSweep | PointSweep
 
 
-def lighting(
+def light_sweeps(
     lights: Sequence[FiniteLight],
     domain: Domain,
     corner: Voxel,
     shape: Shape,
     scattered: Vector = (1.0, 1.0, 1.0),
     split: bool = False,
-) -> Lighting:
-    """Lights over a box of a domain's voxels, by its first voxel and its size; those without energy are left out.
+) -> tuple[tuple[Sweep, ...], Doubles]:
+    """Lights over a box of a domain's voxels, by its first voxel and its size, and the colors (channels, 3).
 
-    The lights' energy is multiplied by a fraction of red, green and blue, the color of the smoke. With `split` each
-    color has a channel of its own, although one may do. A point light inside the domain or too far away raises a
-    SceneError.
+    Light of one color needs one channel, other light three; lights without energy are left out. The lights' energy is
+    multiplied by a fraction of red, green and blue, the color of the smoke. With `split` each color has a channel of
+    its own, although one may do. A point light inside the domain or too far away raises a SceneError.
     """
     bright = [light for light in lights if (np.array(_color(light)) * scattered).max() >= DARKEST]
     if not bright:
-        return Lighting((), np.zeros((0, 3)))
+        return (), np.zeros((0, 3))
     colors = np.array([_color(light) for light in bright], np.float64) * scattered
     color, energies = (np.eye(3), colors) if split else _channels(colors)
     sweeps = [
@@ -154,7 +136,7 @@ def lighting(
         else _parallel(light, energy, domain, corner)
         for light, energy in zip(bright, energies, strict=True)
     ]
-    return Lighting(tuple(sweeps), color)
+    return tuple(sweeps), color
 
 
 def _color(light: FiniteLight) -> tuple[float, float, float]:

@@ -10,8 +10,9 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.render.camera_rays import Rays, camera_rays
-from smokelift.render.light_sweeps import Lighting, Shape, Voxel, lighting
+from smokelift.render.light_sweeps import Shape, Sweep, Voxel, light_sweeps
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Scattering
 from smokelift.scene.domain import box_around
 
@@ -34,8 +35,10 @@ class RenderPlan:
         Of the camera, through the box.
     to_eye : (3, 4)
         Affine map from a voxel's index in the box to the direction from there to the eye, of any length.
-    lighting
-        The lights, in coordinates of the box, in the smoke's color. Without channels the smoke only absorbs.
+    lights
+        In coordinates of the box, in the smoke's color.
+    color : (channels, 3)
+        Of the radiance in each channel. Without channels the smoke only absorbs.
     shadows
         Whether light is attenuated on its way to the voxels.
     diffuse
@@ -48,7 +51,8 @@ class RenderPlan:
     medium: Medium
     rays: Rays
     to_eye: NDArray[np.float64]
-    lighting: Lighting
+    lights: tuple[Sweep, ...]
+    color: Doubles
     shadows: bool
     diffuse: bool
 
@@ -56,6 +60,17 @@ class RenderPlan:
     def shape(self) -> Shape:
         """Voxels of the box."""
         x, y, z = self.marked.shape
+        return x, y, z
+
+    @property
+    def channels(self) -> int:
+        """How many channels of in-scattered radiance there are: 0, 1 or 3."""
+        return len(self.color)
+
+    @property
+    def box(self) -> tuple[slice, slice, slice]:
+        """Where the box lies in the domain."""
+        x, y, z = (slice(first, first + count) for first, count in zip(self.corner, self.shape, strict=True))
         return x, y, z
 
     @property
@@ -88,7 +103,7 @@ def plan_render(
     scatters = () if scattering == "absorption" else lights
     # light that is scattered again takes on more of the smoke's color
     split = scattering == "multiple" and not medium.is_gray
-    found = lighting(scatters, domain, corner, box.resolution, medium.color, split)
+    sweeps, color = light_sweeps(scatters, domain, corner, box.resolution, medium.color, split)
     return RenderPlan(
         domain=domain,
         corner=corner,
@@ -96,9 +111,10 @@ def plan_render(
         medium=medium,
         rays=camera_rays(camera, box),
         to_eye=_to_eye(camera, box),
-        lighting=found,
-        shadows=scattering in SHADOWED and found.channels > 0,
-        diffuse=scattering == "multiple" and found.channels > 0,
+        lights=sweeps,
+        color=color,
+        shadows=scattering in SHADOWED and len(color) > 0,
+        diffuse=scattering == "multiple" and len(color) > 0,
     )
 
 

@@ -61,7 +61,7 @@ class Renderer:
         self.camera, self.domain, self.medium = camera, domain, medium
         plan = plan_render(camera, domain, medium, lights, scattering, support)
         self._background = np.asarray(background, np.float32)
-        sent = np.asarray(plan.lighting.color, np.float32)
+        sent = np.asarray(plan.color, np.float32)
         self._color = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
         self._backend = device.backend(plan)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)

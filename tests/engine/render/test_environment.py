@@ -88,9 +88,9 @@ def test_a_sun_stays_one_light(light_of) -> None:
         (1e5 * disc * solid_angle).sum(),
         (radiance * ~disc[..., None] * solid_angle[..., None]).sum((0, 1)),
     )
-    share_of_sky = (irradiances(lights)[near].sum(0) - of_sun) / of_sky
-    assert share_of_sky.min() >= -1e-6
-    assert share_of_sky.max() < 0.05
+    fraction_of_sky = (irradiances(lights)[near].sum(0) - of_sun) / of_sky
+    assert fraction_of_sky.min() >= -1e-6
+    assert fraction_of_sky.max() < 0.05
 
 
 def test_smooth_sums_over_the_sphere_converge(light_of) -> None:

@@ -22,9 +22,8 @@ class GpuBackend:
 
     def __init__(self, plan: RenderPlan) -> None:
         self._plan = plan
-        self._channels = plan.lighting.channels
+        self._channels = plan.channels
         x, y, z = plan.shape
-        self._box = tuple(slice(c, c + n) for c, n in zip(plan.corner, plan.shape, strict=True))
         near = ndimage.binary_dilation(plan.marked, np.ones((3, 3, 3)))
         self._marked = taichi.upload(plan.marked)
         self._near = taichi.upload(near.astype(np.int32))
@@ -48,7 +47,7 @@ class GpuBackend:
     def image(self, density: Array, keep_record: bool) -> tuple[Array, Array]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
         plan = self._plan
-        camera.pack(taichi.upload(density[self._box]), self._marked, self._medium, plan.medium.extinction)
+        camera.pack(taichi.upload(density[plan.box]), self._marked, self._medium, plan.medium.extinction)
         if plan.shadows:
             self._shade()
         if self._diffuse:  # blocks are few, so the processor follows the light among them
@@ -91,12 +90,12 @@ class GpuBackend:
         in_box = taichi.zeros(plan.shape)
         camera.unpack(self._gradient, self._marked, in_box, plan.medium.extinction)
         result = np.zeros(plan.domain.resolution, np.float32) if out is None else out
-        result[self._box] = taichi.download(in_box)
+        result[plan.box] = taichi.download(in_box)
         return result
 
     def _shade(self) -> None:
         add = 0
-        for sweep in self._plan.lighting.lights:
+        for sweep in self._plan.lights:
             if isinstance(sweep, ParallelSweep):
                 self._scatter(sweep, self._medium, self._medium, add, adjoint=False)
             else:
@@ -108,7 +107,7 @@ class GpuBackend:
     def _shade_adjoint(self) -> None:
         if self._scratch is None:
             self._scratch = taichi.zeros((*self._padded, 1))
-        for sweep in self._plan.lighting.lights:
+        for sweep in self._plan.lights:
             if isinstance(sweep, ParallelSweep):
                 self._scatter(sweep, self._gradient, self._scratch, 0, adjoint=True)
                 # the adjoint of the sweep is that of the light that travels the other way
