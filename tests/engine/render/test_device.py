@@ -48,19 +48,15 @@ def test_one_process_has_one_device():
 def test_without_taichi(monkeypatch):
     monkeypatch.setattr(device, "_running", None)
     monkeypatch.setattr(device, "find_spec", lambda name: None)
-    monkeypatch.setattr(device, "driver_installed", lambda: True)
-    with pytest.raises(DeviceError, match=r"Taichi is not installed: .*smokelift_gpu.*or choose cpu as the device\.$"):
+    with pytest.raises(DeviceError):
         device.start("gpu")
     assert device.available_gpu() is None
-    assert device.start("auto") == "cpu"
 
 
 def test_a_gpu_is_taken_by_name_alone(monkeypatch):
-    asked = []
     monkeypatch.setattr(device, "_running", None)
-    monkeypatch.setattr(device, "available_gpu", lambda: asked.append("auto"))
+    monkeypatch.setattr(device, "available_gpu", lambda: pytest.fail("a GPU is looked for"))
     assert device.start("auto") == "cpu"
-    assert asked == []
 
 
 if __name__ == "__main__":
