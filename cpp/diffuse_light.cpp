@@ -57,47 +57,9 @@ void multiply(const Fields &a, const Fields &b, Fields &result) {
 
 } // namespace
 
-// The box around the blocks that scatter: no other takes part in the equation. One block where none does.
-DiffuseLight::Part DiffuseLight::around_smoke(const float *extinction, const Shape &n) {
-    Shape low = n, high{};
-    const float *at = extinction;
-    for (int x = 0; x < n[0]; ++x)
-        for (int y = 0; y < n[1]; ++y)
-            for (int z = 0; z < n[2]; ++z)
-                if (*at++ > 0) {
-                    const Shape here{x, y, z};
-                    for (int axis = 0; axis < 3; ++axis) {
-                        low[axis] = std::min(low[axis], here[axis]);
-                        high[axis] = std::max(high[axis], here[axis] + 1);
-                    }
-                }
-    if (high[0] == 0)
-        return {Shape{0, 0, 0}, Shape{1, 1, 1}};
-    return {low, Shape{high[0] - low[0], high[1] - low[1], high[2] - low[2]}};
-}
-
-// visit(at, in_part) for the first blocks of all rows of the part: the place among all, and in the part.
-template <class Visit> void DiffuseLight::over_part(const Visit &visit) const {
-    const auto [x, y, z] = part_.first;
-    for (int i = 0; i < part_.n[0]; ++i)
-        for (int j = 0; j < part_.n[1]; ++j)
-            visit(all_.row(x + i, y + j) + z, in_part_.row(i, j));
-}
-
-Fields DiffuseLight::cut(const Fields &everywhere, int fields) const {
-    Fields result(fields * in_part_.count(), 0.0f);
-    over_part([&](std::size_t at, std::size_t in_part) {
-        for (int field = 0; field < fields; ++field)
-            std::copy_n(everywhere.data() + field * all_.count() + at, part_.n[2],
-                        result.data() + field * in_part_.count() + in_part);
-    });
-    return result;
-}
-
 DiffuseLight::DiffuseLight(const float *extinction, float albedo, const Shape &n, float edge)
-    : all_{n}, part_(around_smoke(extinction, n)), in_part_{part_.n}, albedo_(albedo),
-      scattering_(cut(with_border(extinction, 1, all_), 1)),
-      everywhere_(with_border(extinction, 1, all_), all_, edge), smoke_(scattering_, in_part_, edge) {
+    : lattice_{n}, albedo_(albedo), scattering_(with_border(extinction, 1, lattice_)),
+      transport_(scattering_, lattice_, edge) {
     for (float &value : scattering_) // the extinction so far
         value *= albedo;
 }
@@ -130,7 +92,7 @@ double DiffuseLight::product(const Fields &a, const Fields &b) const {
     return result;
 }
 
-// The mean radiance of all orders in the part, from that of the first.
+// The mean radiance of all orders, from that of the first.
 Fields DiffuseLight::all_orders(Fields residual, Workers &workers) const {
     const std::size_t size = residual.size();
     Fields phi(size, 0.0f), search = residual, moved(size), scattered(size);
@@ -138,7 +100,7 @@ Fields DiffuseLight::all_orders(Fields residual, Workers &workers) const {
     const double enough = TOLERANCE * TOLERANCE * square;
     for (int iteration = 0; iteration < MAX_ITERATIONS && square > enough; ++iteration) {
         multiply(scattering_, search, scattered);
-        smoke_.mean_radiance(scattered.data(), moved.data(), workers);
+        transport_.mean_radiance(scattered.data(), moved.data(), workers);
         for (std::size_t i = 0; i < size; ++i)
             moved[i] = search[i] - moved[i];
         const auto step = static_cast<float>(square / product(search, moved));
@@ -150,24 +112,20 @@ Fields DiffuseLight::all_orders(Fields residual, Workers &workers) const {
     return phi;
 }
 
-// Emission everywhere and what the part scatters.
-Fields DiffuseLight::with_scattered(const Fields &in_smoke, Fields emission) const {
-    over_part([&](std::size_t at, std::size_t in_part) {
-        for (int field = 0; field < FIELDS; ++field)
-            for (int i = 0; i < part_.n[2]; ++i)
-                emission[field * all_.count() + at + i] +=
-                    scattering_[in_part + i] * in_smoke[field * in_part_.count() + in_part + i];
-    });
+// Emission and what is scattered.
+Fields DiffuseLight::with_scattered(const Fields &phi, Fields emission) const {
+    Fields scattered(phi.size());
+    multiply(scattering_, phi, scattered);
+    axpy(1, scattered.data(), emission.data(), emission.size());
     return emission;
 }
 
 void DiffuseLight::solve(const float *emission, float *phi, Workers &workers) const {
-    Fields emitted = with_border(emission, FIELDS, all_), mean(emitted.size());
-    Fields first(FIELDS * in_part_.count());
-    smoke_.mean_radiance(cut(emitted, FIELDS).data(), first.data(), workers);
-    const Fields source = with_scattered(all_orders(std::move(first), workers), std::move(emitted));
-    everywhere_.mean_radiance(source.data(), mean.data(), workers);
-    without_border(mean, FIELDS, all_, phi);
+    Fields emitted = with_border(emission, FIELDS, lattice_), mean(emitted.size());
+    transport_.mean_radiance(emitted.data(), mean.data(), workers);
+    const Fields source = with_scattered(all_orders(mean, workers), std::move(emitted));
+    transport_.mean_radiance(source.data(), mean.data(), workers);
+    without_border(mean, FIELDS, lattice_, phi);
 }
 
 // G is its own adjoint in the product <,>, so with  q: phi_gradient = <q, phi>  and  mu = G (q + scattering
@@ -177,19 +135,19 @@ void DiffuseLight::solve(const float *emission, float *phi, Workers &workers) co
 void DiffuseLight::solve_adjoint(const float *emission, const float *phi, const float *phi_gradient,
                                  float *emission_gradient, float *extinction_gradient,
                                  Workers &workers) const {
-    const std::size_t count = volume(all_.n), size = FIELDS * all_.count();
-    Fields asked = with_border(phi_gradient, FIELDS, all_), mu(size);
-    for (std::size_t i = all_.count(); i < size; ++i)
+    const std::size_t count = volume(lattice_.n), size = FIELDS * lattice_.count();
+    Fields asked = with_border(phi_gradient, FIELDS, lattice_), mu(size);
+    for (std::size_t i = lattice_.count(); i < size; ++i)
         asked[i] /= SPREAD;
-    everywhere_.mean_radiance(asked.data(), mu.data(), workers); // asked where there is no smoke, too
-    const Fields weights = with_scattered(all_orders(cut(mu, FIELDS), workers), std::move(asked));
-    everywhere_.mean_radiance(weights.data(), mu.data(), workers);
+    transport_.mean_radiance(asked.data(), mu.data(), workers); // asked where there is no smoke, too
+    const Fields weights = with_scattered(all_orders(mu, workers), std::move(asked));
+    transport_.mean_radiance(weights.data(), mu.data(), workers);
     const Fields source =
-        with_scattered(cut(with_border(phi, FIELDS, all_), FIELDS), with_border(emission, FIELDS, all_));
-    Fields kappa_gradient(all_.count(), 0.0f), result(count);
-    everywhere_.add_extinction_gradient(source.data(), weights.data(), kappa_gradient.data(), workers);
-    without_border(kappa_gradient, 1, all_, result.data());
-    without_border(mu, FIELDS, all_, emission_gradient);
+        with_scattered(with_border(phi, FIELDS, lattice_), with_border(emission, FIELDS, lattice_));
+    Fields kappa_gradient(lattice_.count(), 0.0f), result(count);
+    transport_.add_extinction_gradient(source.data(), weights.data(), kappa_gradient.data(), workers);
+    without_border(kappa_gradient, 1, lattice_, result.data());
+    without_border(mu, FIELDS, lattice_, emission_gradient);
     for (int field = 0; field < FIELDS; ++field) {
         const float weight = field ? SPREAD : 1.0f;
         for (std::size_t i = 0; i < count; ++i) {

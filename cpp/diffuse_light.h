@@ -29,23 +29,14 @@ public:
 private:
     using Fields = std::vector<float>;
 
-    // A box of blocks.
-    struct Part {
-        Shape first, n;
-    };
-    static Part around_smoke(const float *extinction, const Shape &n);
-    template <class Visit> void over_part(const Visit &visit) const;
-    Fields cut(const Fields &everywhere, int fields) const;
     double product(const Fields &a, const Fields &b) const;
     Fields all_orders(Fields first, Workers &workers) const;
-    Fields with_scattered(const Fields &in_smoke, Fields emission) const;
+    Fields with_scattered(const Fields &phi, Fields emission) const;
 
-    Lattice all_;
-    Part part_;
-    Lattice in_part_;
+    Lattice lattice_;
     float albedo_;
-    Fields scattering_; // albedo x extinction, of the part
-    BlockTransport everywhere_, smoke_;
+    Fields scattering_; // albedo x extinction
+    BlockTransport transport_;
 };
 
 } // namespace smokelift

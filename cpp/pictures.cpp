@@ -179,12 +179,12 @@ void scale_evenly(const float *__restrict steps, float fraction, const float *va
 SMOKELIFT_CLONES
 void scale_unevenly(const float *__restrict steps, const RayScale &scale, const float *__restrict plausible,
                     const float *values, float *scaled, int count) {
-    const float fraction = scale.fraction, faint = scale.faint, most = scale.most;
+    const float fraction = scale.fraction, floor = scale.floor, max_gain = scale.max_gain;
     for (int n = 0; n < count; ++n) {
         const float step = steps[n], value = values[n];
-        const float wanted = plausible[n] + faint, reached = value * exponential(step) + faint;
+        const float wanted = plausible[n] + floor, reached = value * exponential(step) + floor;
         const float gain = step < 0 ? reached / wanted : wanted / reached;
-        scaled[n] = value * exponential(fraction * step * (gain < most ? gain : most));
+        scaled[n] = value * exponential(fraction * step * (gain < max_gain ? gain : max_gain));
     }
 }
 

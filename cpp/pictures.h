@@ -49,7 +49,7 @@ void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown
 struct RayScale {
     const double *logarithm; // (rows, columns): of each pixel's factor
     const float *plausible;  // smoke towards which a step leads; without it steps are even
-    float faint, most;
+    float floor, max_gain;
     float fraction; // of the step that is made
 };
 

@@ -74,22 +74,22 @@ void register_density(py::module_ &module) {
         A voxel lies at its index x scale + shift (3,) + its motion (3, count) x stretch, which is finite.)")
         .def("scale_along_rays",
              unlocked([](Workers &workers, const MarkedVoxels &self, const PictureMap &picture, Read<> values,
-                         std::optional<Read<>> plausible, Read<2, double> logarithm, float faint, float most,
-                         float fraction, Write<> out) {
+                         std::optional<Read<>> plausible, Read<2, double> logarithm, float floor,
+                         float max_gain, float fraction, Write<> out) {
                  require_size(self.count(), values, plausible.value_or(values), out);
                  require_fit(self.shape() == picture.shape() &&
                              logarithm.n == std::array<Index, 2>{picture.rows, picture.columns});
-                 const RayScale scale{logarithm.data, plausible ? plausible->data : nullptr, faint, most,
+                 const RayScale scale{logarithm.data, plausible ? plausible->data : nullptr, floor, max_gain,
                                       fraction};
                  scale_along_rays(scale, picture, self, values.data, out.data, workers);
              }),
-             "picture"_a, "values"_a, "plausible"_a, "logarithm"_a, "faint"_a, "most"_a, "fraction"_a,
+             "picture"_a, "values"_a, "plausible"_a, "logarithm"_a, "floor"_a, "max_gain"_a, "fraction"_a,
              "out"_a,
              R"(Scale values by a fraction of the logarithmic steps (rows, columns) of their pixels' rays.
 
         Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
         would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
-        some, both plus ``faint``, by ``most`` at most. The result may replace the values.)");
+        some, both plus ``floor``, by ``max_gain`` at most. The result may replace the values.)");
 }
 
 } // namespace smokelift

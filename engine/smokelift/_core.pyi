@@ -377,8 +377,8 @@ class MarkedVoxels:
         values: Reals,
         plausible: Reals | None,
         logarithm: Reals,
-        faint: float,
-        most: float,
+        floor: float,
+        max_gain: float,
         fraction: float,
         out: Array,
     ) -> None:
@@ -386,5 +386,5 @@ class MarkedVoxels:
 
         Steps are read bilinearly; what is not in the picture stays as it is. With ``plausible`` (count,) a step that
         would scale a value to v is multiplied by plausible / v where it adds smoke and by v / plausible where it takes
-        some, both plus ``faint``, by ``most`` at most. The result may replace the values.
+        some, both plus ``floor``, by ``max_gain`` at most. The result may replace the values.
         """
