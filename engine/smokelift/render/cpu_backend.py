@@ -34,10 +34,10 @@ class CpuBackend:
         x, y, z = plan.shape
         self._support = _core.Support(plan.marked)
         self._rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
-        if not plan.everywhere:  # rays go as far as voxels that may hold smoke are around them
-            mask = _core.zeros((x + 2, y + 2, z + 2, 1))
-            mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
-            self._rays.clip(self._support, mask)
+        # rays go as far as voxels that may hold smoke are around them
+        mask = _core.zeros((x + 2, y + 2, z + 2, 1))
+        mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
+        self._rays.clip(self._support, mask)
         # what no sweep touches is never given memory
         self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
         self._gradient: Array | None = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import get_args
@@ -72,11 +71,6 @@ class RenderPlan:
         """Where the box lies in the domain."""
         x, y, z = (slice(first, first + count) for first, count in zip(self.corner, self.shape, strict=True))
         return x, y, z
-
-    @property
-    def everywhere(self) -> bool:
-        """Whether all voxels of the domain may hold smoke."""
-        return int(np.count_nonzero(self.marked)) == math.prod(self.domain.resolution)
 
 
 def plan_render(
