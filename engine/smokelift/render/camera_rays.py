@@ -94,18 +94,21 @@ def _band(camera: Camera, domain: Domain, across: Doubles, up: Doubles) -> tuple
     start, direction = (np.take_along_axis(vectors, order, -1) for vectors in (start, direction))
     count = np.array(domain.resolution)[order]
     along = direction[..., 0]
-    slope = direction[..., 1:] / along[..., None]
-    offset = start[..., 1:] - slope * start[..., :1]
-    steep = np.where(np.abs(slope) < MIN_SLOPE, MIN_SLOPE, slope)
-    ends = np.sort([(INSIDE - 1 - offset) / steep, (count[..., 1:] - INSIDE - offset) / steep], axis=0)
-    first = np.ceil(np.maximum(ends[0].max(-1), 0))
-    last = np.floor(np.minimum(ends[1].min(-1), count[..., 0] - 1))
+    lines, first, last = [], np.zeros(along.shape), count[..., 0] - 1.0
+    for lateral in (1, 2):
+        slope = direction[..., lateral] / along
+        offset = start[..., lateral] - slope * start[..., 0]
+        steep = np.where(np.abs(slope) < MIN_SLOPE, MIN_SLOPE, slope)
+        ends = (INSIDE - 1 - offset) / steep, (count[..., lateral] - INSIDE - offset) / steep
+        first, last = np.maximum(first, np.minimum(*ends)), np.minimum(last, np.maximum(*ends))
+        lines += [offset, slope]
+    first, last = np.ceil(first), np.floor(last)
     if not far:  # nothing behind the eye
         first = np.where(along > 0, np.maximum(first, np.floor(start[..., 0]) + 1), first)
         last = np.where(along < 0, np.minimum(last, np.ceil(start[..., 0]) - 1), last)
     hits = first <= last
     # a ray that misses can pass at any distance
-    lines = np.where(hits[..., None], np.stack([offset, slope], -1).reshape(*hits.shape, 4), 0)
+    crossings = np.where(hits[..., None], np.stack(lines, -1), 0)
     length = np.linalg.norm(direction, axis=-1) / np.abs(along)
     planes = [axis, np.where(along > 0, 1, -1), np.where(hits, first, 0), np.where(hits, last, -1)]
-    return lines.astype(np.float32), length.astype(np.float32), np.stack(planes, -1).astype(np.int32)
+    return crossings.astype(np.float32), length.astype(np.float32), np.stack(planes, -1).astype(np.int32)
