@@ -68,8 +68,13 @@ def project_voxels(camera: Camera, domain: Domain) -> Projection:
     x, y, z = domain.offsets((0, 0, 0))
     to_pixel = world_to_pixel(camera)
     projected = _core.PictureMap(to_pixel, [axis.ravel() for axis in (x, y, z)], camera.size)
-    depth = x * to_pixel[2, 0] + y * to_pixel[2, 1] + z * to_pixel[2, 2] + to_pixel[2, 3]
-    near = np.min(depth, where=depth > 0, initial=np.inf) if camera.type == "perspective" else 1.0
+    near = 1.0
+    if camera.type == "perspective":
+        for each in ((x[[0, -1]], y[:, [0, -1]], z[..., [0, -1]]), (x, y, z)):
+            depth = sum(axis * along for axis, along in zip(each, to_pixel[2, :3], strict=True)) + to_pixel[2, 3]
+            near = np.min(depth, where=depth > 0, initial=np.inf)
+            if np.min(depth) > 0:  # at the corners, so everywhere
+                break
     # the diagonal of a voxel is its largest width from any side
     footprint = max(camera.fx, camera.fy) * domain.voxel_size * np.sqrt(3) / near
     return Projection(float(footprint), projected, camera.size)

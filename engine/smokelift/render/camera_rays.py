@@ -30,8 +30,8 @@ INSIDE = 1e-3
 MIN_SLOPE = 1e-9
 """Voxels per plane. Rays of less slope stay in one column of voxels, and dividing by this loses nothing."""
 
-BAND = 1 << 16
-"""Pixels whose rays are found together, about: what lies between takes some hundred bytes a pixel."""
+BAND = 1 << 14
+"""Pixels whose rays are found together, about: what lies between fits into a cache."""
 
 
 @dataclass(frozen=True, eq=False)
