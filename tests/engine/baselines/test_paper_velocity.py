@@ -29,4 +29,5 @@ def test_paper_mode_does_not_know_the_limits_of_the_default():
     assert found.figures["iterations"] > VelocitySettings().solver.iterations
     blurred = [ndimage.gaussian_filter(a.astype(np.float32), PAPER.blur) for a in (before, after)]
     alone = dataclasses.replace(PAPER, blur=0.0).estimate(DensityPair(*blurred, DT, VOXEL))
-    np.testing.assert_allclose(found.centres(), alone.centres(), atol=1e-5)
+    # either blur rounds in its own way, which an inner solve may answer by one step more
+    np.testing.assert_allclose(found.centres(), alone.centres(), atol=1e-3 * np.abs(alone.centres()).max())
