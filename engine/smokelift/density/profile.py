@@ -38,9 +38,10 @@ FLATNESS = 3.5
 SCALE = float(np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS)))
 """A in standard deviations."""
 
-PROFILE_CUT = 0.03
-"""Fraction of the profile's peak from which smoke is expected. The profile is 1.4 times as wide there as assumed, which
-is how far its width may be wrong (docs/experiments/every-view.md)."""
+PROFILE_CUT = 0.0056
+"""Fraction of the profile's peak from which smoke is expected. The profile is 1.6 times as wide there as assumed, which
+is how far its width may be wrong: at 1.4 lobes end in flat walls, seen from the side
+(docs/experiments/density-profile.md)."""
 
 ROOM = 0.5
 """Distance, in A, of a ray's middle from the ends of its way through the domain: about four fifths of the profile
