@@ -25,12 +25,13 @@ from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
-from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, reduced
+from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged
 from smokelift.density.turntable import Turntable, UprightSmoke
 from smokelift.density.wander import Wander
 from smokelift.render import Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import box_around
+from smokelift.transport import block_means
 
 SMOOTH_ITERATIONS = 4
 """Multiplicative iterations for the smooth answer, whose amounts the sides' rows keep."""
@@ -219,7 +220,7 @@ class EveryView:
         thickness = np.float32(self.level.views.optics.medium.extinction * table.domain.voxel_size)
         turn, degrees = azimuth
         whole, expected = (each.picture(degrees) for each in (now, smooth))
-        shown, known = (reduced(thickness * picture, scale) for picture in (whole, expected))
+        shown, known = (block_means(thickness * picture, scale) for picture in (whole, expected))
         if not shown.any():
             return
         wanted = exemplar.towards(shown, turn)

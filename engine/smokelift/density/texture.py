@@ -26,6 +26,7 @@ from smokelift.density.detail_noise import MAX_NODE_DISTANCE, MIN_NODE_DISTANCE
 from smokelift.density.observation import ObservedClip, ObservedView
 from smokelift.density.turntable import Turntable
 from smokelift.scene import Camera, Domain
+from smokelift.transport import block_means
 
 Picture = NDArray[np.float32]
 """Optical depth (columns, voxels along the axis) on the screen of a turntable, or the like."""
@@ -199,7 +200,7 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
         scale *= 2
     square = amount = 0.0
     for picture in pictures:
-        small = reduced(picture, scale)
+        small = block_means(picture, scale)
         fine, coarse = (ndimage.gaussian_filter(small, each / scale) for each in (blur / 2, blur))
         body = coarse > BODY * coarse.max()
         square += float(np.sum((fine - coarse)[body] ** 2 / coarse[body], dtype=np.float64))
@@ -249,7 +250,7 @@ class Exemplar:
         height = SIZE / 2 * float(np.mean(spread))
         shifts = range(0, scale, max(1, scale // 2))
         samples = [
-            _patches(np.log1p(reduced(each[shift:, shift:], scale) / unit), height)[0]
+            _patches(np.log1p(block_means(each[shift:, shift:], scale) / unit), height)[0]
             for picture in pictures
             for each in (picture, picture[::-1])
             for shift in shifts
@@ -295,17 +296,8 @@ def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np
     return np.concatenate([pixels, place[None].astype(np.float32)]), at + reach
 
 
-def reduced(picture: Picture, scale: int) -> Picture:
-    """Means of square blocks of a picture, which is zero beyond its ends."""
-    if scale == 1:
-        return np.ascontiguousarray(picture)
-    padded = np.pad(picture, [(0, -count % scale) for count in picture.shape])
-    blocks = padded.reshape(padded.shape[0] // scale, scale, padded.shape[1] // scale, scale)
-    return np.asarray(blocks.mean((1, 3)), np.float32)
-
-
 def enlarged(picture: Picture, scale: int, shape: tuple[int, int]) -> Picture:
-    """The inverse of `reduced`, to a shape, linear between the blocks' middles."""
+    """The inverse of `block_means`, to a shape, linear between the blocks' middles."""
     columns, voxels = shape
     large = ndimage.zoom(picture, scale, order=1, mode="nearest", grid_mode=True)
     return np.ascontiguousarray(large[:columns, :voxels])

@@ -11,9 +11,10 @@ from scipy import ndimage
 from smokelift import _core
 from smokelift.density import Observation
 from smokelift.density.observation import eight_bit_plate
-from smokelift.density.texture import SIZE, ClipTexture, Exemplar, enlarged, reduced
+from smokelift.density.texture import SIZE, ClipTexture, Exemplar, enlarged
 from smokelift.render import Optics
 from smokelift.scene import Camera, Domain, Medium
+from smokelift.transport import block_means
 
 DOMAIN = Domain((-0.8, -0.6, 0), (0.8, 0.6, 1.6), (32, 24, 32))
 CAMERA = Camera.look_at((0, -6, 0.8), (0, 0, 0.8), fov_y_degrees=16, size=(36, 36))
@@ -68,16 +69,16 @@ def test_moved_values_have_the_wanted_distribution(count, known, seed) -> None:
 
 def test_reducing_keeps_means_and_enlarging_keeps_lines() -> None:
     picture = np.random.default_rng(2).random((13, 10), np.float32)
-    assert reduced(picture, 4).sum() * 16 == pytest.approx(picture.sum(), rel=1e-5)
+    assert block_means(picture, 4).sum() * 16 == pytest.approx(picture.sum(), rel=1e-5)
     line = np.broadcast_to(np.arange(16, dtype=np.float32)[:, None], (16, 8)).copy()
-    np.testing.assert_allclose(enlarged(reduced(line, 4), 4, line.shape)[2:14], line[2:14], atol=1e-5)
+    np.testing.assert_allclose(enlarged(block_means(line, 4), 4, line.shape)[2:14], line[2:14], atol=1e-5)
 
 
 @pytest.mark.parametrize("scale", [1, 2])
 def test_a_smooth_picture_takes_over_the_detail_of_an_exemplar(scale) -> None:
     exemplar = Exemplar.of([smoke(seed, 1.5 * scale) for seed in range(4)], scale)
-    smooth = reduced(smoke(9, 12.0), scale)
-    like = reduced(smoke(8, 1.5 * scale), scale)
+    smooth = block_means(smoke(9, 12.0), scale)
+    like = block_means(smoke(8, 1.5 * scale), scale)
     found = smooth
     for turn in range(4):
         found = exemplar.towards(found, turn)
@@ -95,7 +96,7 @@ def test_smoke_along_an_edge_has_patches(line) -> None:
     for scale in (1, 2, 4):
         found = Exemplar.of([picture], scale)
         assert np.isfinite(found.quantiles).all()
-        assert np.isfinite(found.towards(reduced(picture, scale), 0)).all()
+        assert np.isfinite(found.towards(block_means(picture, scale), 0)).all()
 
 
 @dataclass(frozen=True)
