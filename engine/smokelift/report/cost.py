@@ -221,7 +221,7 @@ def peak_memory() -> int | None:
     `getrusage` will not do: in a child process its maximum starts at the parent's.
     """
     try:
-        status = Path("/proc/self/status").read_text(encoding="ascii")
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return None
     return next((1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")), None)
