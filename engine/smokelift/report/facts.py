@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
 
 from smokelift.checks import Figure, Figures, Finding, Source
 from smokelift.footage.exposure import shows_exposure, small
-from smokelift.report.cost import Cost
+from smokelift.report.cost import Cost, Preparation, Workload, estimate_cost
+from smokelift.report.views import fact
 from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
@@ -94,3 +99,19 @@ def boundaries(scene: CompleteScene) -> list[Finding]:
         entry = Finding("inlets", {"inlets": len(scene.inlets), "voxels": int(inflow.sum())})
     closed = Finding("closed sides", {"sides": ", ".join(scene.closed)}) if scene.closed else Finding("open box")
     return [entry, closed]
+
+
+def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload, prepared: Preparation) -> dict[str, Any]:
+    """Return what a program shows of a shot beside its findings, as JSON holds it.
+
+    Those are the facts, the median color of what is behind the smoke (linear), and grid and cost of each quality.
+    """
+    plate = shot.views[0].plates.at(0).image
+    return {
+        "facts": [fact(line) for line in known],
+        "background_color": [float(value) for value in np.median(plate.reshape(-1, 3), axis=0)],
+        "qualities": {
+            quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
+            for quality, grid in shot.qualities.items()
+        },
+    }

@@ -216,7 +216,7 @@ def completed(scene: Scene, camera: Camera | None = None) -> CompleteScene:
     Parameters
     ----------
     scene
-        ShotMemory a domain, and a camera unless one is given. A complete scene stays as it is, but for the camera.
+        Needs a domain, and a camera unless one is given. A complete scene stays as it is, but for the camera.
     camera
         Takes the place of the scene's.
 

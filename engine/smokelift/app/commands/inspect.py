@@ -7,9 +7,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from smokelift.app.options import Command, add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
@@ -18,11 +15,11 @@ from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
 from smokelift.report.cost import Preparation, Workload, estimate_cost, peak_memory
-from smokelift.report.facts import boundaries, facts
+from smokelift.report.facts import boundaries, facts, forecast_of
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
 from smokelift.report.result import expected_shortcomings, made_up
-from smokelift.report.views import choices, fact, origin, sentence, value
+from smokelift.report.views import choices, origin, sentence, value
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
@@ -89,22 +86,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             **asdict(cost),
         },
     )
-
-
-def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload, prepared: Preparation) -> dict[str, Any]:
-    """Return what a program shows of a shot beside its findings, as JSON holds it.
-
-    Those are the facts, the median color of what is behind the smoke (linear), and grid and cost of each quality.
-    """
-    plate = shot.views[0].plates.at(0).image
-    return {
-        "facts": [fact(line) for line in known],
-        "background_color": [float(value) for value in np.median(plate.reshape(-1, 3), axis=0)],
-        "qualities": {
-            quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
-            for quality, grid in shot.qualities.items()
-        },
-    }
 
 
 def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path, ...]:

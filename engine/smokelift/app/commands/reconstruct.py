@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from smokelift.app.commands.inspect import forecast_of
 from smokelift.app.options import (
     Command,
     add_run_options,
@@ -31,7 +30,7 @@ from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.report.cost import Preparation, Workload, estimate_cost, frames_seconds, peak_memory, require_memory
-from smokelift.report.facts import facts
+from smokelift.report.facts import facts, forecast_of
 from smokelift.report.result import count_empty, expected_shortcomings, made_up, shortcomings
 from smokelift.report.views import sentence
 from smokelift.scene import Domain
