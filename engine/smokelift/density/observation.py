@@ -185,7 +185,7 @@ class ObservedView:
         camera, plate = observation.camera, observation.plate
         if plate is BLACK:
             plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
-        probability = matte(observation.image, plate).share
+        probability = matte(observation.image, plate).probability
         if observation.element is None:
             image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
             left_out = np.zeros_like(image)

@@ -32,18 +32,18 @@ WHITE_RED = 0.9
 MIN_BRIGHTNESS_RATIO = 3.0
 """Smallest ratio of what fire adds to the background to what other smoke adds: fire lights the smoke near it."""
 
-MIN_FIRE_SHARE, MIN_SMOKE_SHARE = 0.0005, 0.1
-"""Smallest shares of smoke pixels that are fire, and that have another color."""
+MIN_FIRE_FRACTION, MIN_SMOKE_FRACTION = 0.0005, 0.1
+"""Smallest fractions of smoke pixels that are fire, and that have another color."""
 
-MIN_BRIGHT_SHARE = 0.25
-"""Smallest share of the fire that is so bright: six public clips of fire have .4 to .7, red smoke and red ink none
+MIN_BRIGHT_FRACTION = 0.25
+"""Smallest fraction of the fire that is so bright: six public clips of fire have .4 to .7, red smoke and red ink none
 (docs/experiments/fire.md)."""
 
 MIN_COLORED_VALUE = 0.01
 """Linear value of a pixel's largest channel from which on its color counts: 8 bits show none in darker ones."""
 
 GLOW = 0.01
-"""Width of the edge that still glows, as a share of the picture's longer side."""
+"""Width of the edge that still glows, as a fraction of the picture's longer side."""
 
 CLIPPED_VALUE = 0.95
 """Linear value from which on a channel may be clipped."""
@@ -56,21 +56,21 @@ COLOR_FRAMES = 8
 class HotPixels:
     """Smoke pixels that have the colors of fire and add as much light.
 
-    ``share`` is theirs of all smoke pixels, ``bright`` that of them which are brighter than light explains.
+    ``fraction`` is theirs of all smoke pixels, ``bright`` that of them which are brighter than light explains.
     """
 
-    share: float
+    fraction: float
     bright: float
 
     @property
     def burn(self) -> bool:
         """Whether they are fire."""
-        return self.share > MIN_FIRE_SHARE and self.bright >= MIN_BRIGHT_SHARE
+        return self.fraction > MIN_FIRE_FRACTION and self.bright >= MIN_BRIGHT_FRACTION
 
     @property
     def may_burn(self) -> bool:
         """Whether some of them are brighter than light explains, as many as fire has at least."""
-        return self.share * self.bright > MIN_FIRE_SHARE
+        return self.fraction * self.bright > MIN_FIRE_FRACTION
 
 
 def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
@@ -85,7 +85,7 @@ def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
     # a core clipped to yellow or white does not show its color
     other = ~_warm(colors) & (brightest > MIN_COLORED_VALUE) & (brightest < CLIPPED_VALUE)
     bright = colors[..., 0] > WHITE_RED
-    if other.mean() >= MIN_SMOKE_SHARE:
+    if other.mean() >= MIN_SMOKE_FRACTION:
         bright |= added > MIN_BRIGHTNESS_RATIO * np.percentile(added[other], 95)
     return HotPixels(float(fire.mean()), float(bright[fire].mean()))
 

@@ -46,17 +46,17 @@ that fills the picture."""
 class Matte:
     """Where a frame shows smoke, (rows, columns).
 
-    ``deviation`` is that from the plate in units of noise, smoothed: about 1 or less without smoke. ``share`` is the
-    certainty, from 0 to 1, that a pixel shows smoke.
+    ``deviation`` is that from the plate in units of noise, smoothed: about 1 or less without smoke.
+    ``probability`` is that a pixel shows smoke.
     """
 
     deviation: Picture
-    share: Picture
+    probability: Picture
 
     @property
     def mask(self) -> npt.NDArray[np.bool_]:
         """Pixels (rows, columns) that show smoke to measure on."""
-        return np.asarray((self.deviation > MEASURED_DEVIATION) & (self.share > 0))
+        return np.asarray((self.deviation > MEASURED_DEVIATION) & (self.probability > 0))
 
 
 def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
@@ -89,9 +89,9 @@ def certainty(deviation: Picture, width: float) -> Picture:
 
     ``width`` is the standard deviation, in pixels, of the Gaussian that smoothed the deviation.
     """
-    share: Picture = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
-    share[~_meaningful(deviation, 4 * np.pi * width**2)] = 0
-    return share
+    probability: Picture = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
+    probability[~_meaningful(deviation, 4 * np.pi * width**2)] = 0
+    return probability
 
 
 def _meaningful(deviation: Picture, sample: float) -> npt.NDArray[np.bool_]:

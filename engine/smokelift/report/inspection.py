@@ -129,7 +129,7 @@ def _line(
 def _matte_picture(seen: Matte) -> Tile:
     """The deviation from the background, the more orange the surer it is smoke."""
     strength = np.clip(seen.deviation / MAX_SHOWN_DEVIATION, 0, 1)[..., None]
-    return np.asarray(np.rint(strength * (255 + seen.share[..., None] * (np.array(SMOKE) - 255))), np.uint8)
+    return np.asarray(np.rint(strength * (255 + seen.probability[..., None] * (np.array(SMOKE) - 255))), np.uint8)
 
 
 def _unknown_picture(plate: Plate, unknown: NDArray[np.bool_]) -> Tile:

@@ -45,7 +45,7 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     if samples.exposure:
         said.append(Finding("exposure", {"change": samples.exposure}, about="exposure", source="measured"))
     if estimate.fire is None and hot.may_burn:
-        said.append(Finding("possible fire", {"fraction": hot.share, "bright": hot.bright}, doubt=True))
+        said.append(Finding("possible fire", {"fraction": hot.fraction, "bright": hot.bright}, doubt=True))
     return said
 
 

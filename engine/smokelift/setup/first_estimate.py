@@ -134,10 +134,10 @@ def first_estimate(
     samples = sample_smoke(found.clip, found.plates)
     exposed = evened(found.clip, found.plates, samples.gains)
     fire, hot = None, hot_pixels(samples.colors, samples.behind)
-    if hot.burn or (flame_color is not None and hot.share):
+    if hot.burn or (flame_color is not None and hot.fraction):
         doused = without_fire(exposed, found.plates)
         light = firelight(exposed, doused)
-        fire, exposed = Fire(hot.share, light, flame_color or fire_color(exposed, light)), doused
+        fire, exposed = Fire(hot.fraction, light, flame_color or fire_color(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
     plates, source = with_source(found, exposed, samples.smoky)
     if plates is not found.plates:

@@ -63,8 +63,8 @@ def test_fog_that_fills_black_is_no_noise(tmp_path: Path, how: dict[str, Any], s
             assert plate.image.max() == 0
             assert plate.noise.total.max() < 2 / 255
         picture = clip.frame(len(clip) // 2)
-        share = matte(picture, found.plates.at(len(clip) // 2)).share[..., None]
-        assert (share * picture).sum() > 0.98 * picture.sum()
+        probability = matte(picture, found.plates.at(len(clip) // 2)).probability[..., None]
+        assert (probability * picture).sum() > 0.98 * picture.sum()
 
 
 def test_faint_fog_before_one_color_is_no_noise(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def pixels(**what):
 def fire_share(*seen) -> float:
     """The share of the pixels that is fire."""
     hot = hot_pixels(*seen)
-    return hot.share * hot.burn
+    return hot.fraction * hot.burn
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_fire_of_which_little_is_bright_may_be_fire(bright: int, burns: bool, ma
     flames[:bright] *= 1.25
     seen = np.concatenate([flames, np.full((900, 3), 0.5, np.float32)])
     hot = hot_pixels(seen, np.zeros_like(seen))
-    assert (hot.share, hot.bright) == (pytest.approx(0.1), pytest.approx(bright / 100))
+    assert (hot.fraction, hot.bright) == (pytest.approx(0.1), pytest.approx(bright / 100))
     assert (hot.burn, hot.may_burn) == (burns, may_burn)
 
 

@@ -53,13 +53,13 @@ def test_a_faint_rim_counts_as_far_as_it_is_certain(noise: float) -> None:
     values = np.random.default_rng(0).normal(40 + light, noise)[..., None].repeat(3, -1)
     plate = clear_plate(np.full((120, 260, 3), srgb_to_linear(40 / 255)), noise)
     found = matte(srgb_to_linear((values / 255).astype(np.float32)), plate)
-    share = found.share.mean(0)
-    assert (found.share[found.mask] == 1).all()
+    probability = found.probability.mean(0)
+    assert (found.probability[found.mask] == 1).all()
     wanted = np.clip((light[0, :120] / noise - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
-    np.testing.assert_allclose(share[:120], wanted, atol=0.2)
-    assert np.diff(share[45:95:5]).max() < 0.02
-    assert share[204:216].mean() > 0.8
-    assert not share[105:190].any() and not share[230:].any()
+    np.testing.assert_allclose(probability[:120], wanted, atol=0.2)
+    assert np.diff(probability[45:95:5]).max() < 0.02
+    assert probability[204:216].mean() > 0.8
+    assert not probability[105:190].any() and not probability[230:].any()
 
 
 def test_noise_is_hardly_ever_smoke() -> None:
@@ -72,7 +72,7 @@ def test_noise_is_hardly_ever_smoke() -> None:
             # as neighbors share it
             shared = ndimage.gaussian_filter(random.standard_normal(size), SMOOTHING) * SMOOTHING * np.sqrt(4 * np.pi)
             noisy = encoded + np.float32(2 / 255) * shared[..., None].astype(np.float32)
-            alarms += bool(matte(srgb_to_linear(noisy), plate).share.any())
+            alarms += bool(matte(srgb_to_linear(noisy), plate).probability.any())
     assert alarms <= 1
 
 
@@ -81,4 +81,4 @@ def test_a_speck_has_to_be_stronger_than_a_veil() -> None:
     for side, codes, found in ((40, 3, True), (6, 3, False), (6, 30, True)):
         encoded = linear_to_srgb(plate.image)
         encoded[50 : 50 + side, 50 : 50 + side] += np.float32(codes / 255)
-        assert matte(srgb_to_linear(encoded), plate).share.any() == found
+        assert matte(srgb_to_linear(encoded), plate).probability.any() == found
