@@ -5,7 +5,7 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ..result.shot_check import found_lines, state
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import RequiresClip, speed_changed, sub_panels
+from .common import needs_clip, speed_changed, sub_panels
 from .layout import draw_automatic
 
 
@@ -52,4 +52,4 @@ def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smok
     layout.operator("smokelift.check", icon="VIEWZOOM")
 
 
-PANELS = sub_panels("advanced", "Advanced", _draw_advanced, RequiresClip)
+PANELS = sub_panels("advanced", "Advanced", _draw_advanced, needs_clip)

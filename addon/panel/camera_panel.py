@@ -12,7 +12,7 @@ from ..scene.floor import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ChangesScene, RequiresClip, automatic_unless, closed_sides, refuse
+from .common import ChangesScene, Needing, automatic_unless, closed_sides, needs_clip, needs_smoke, operator
 from .layout import draw_automatic, draw_closed
 
 USUAL_DISTANCE = 2.0
@@ -115,50 +115,41 @@ class ShotSettings:
     )
 
 
-class SMOKELIFT_OT_make_box(ChangesScene, bpy.types.Operator):
+def _needs_camera(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:
+    return "" if context.scene.camera else "The scene has no camera: add one where the clip was filmed from"
+
+
+@operator("Frame Box", needs_smoke, _needs_camera, base=ChangesScene)
+def make_box(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
-
-    bl_label = "Frame Box"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if active_smoke(context.scene) is None:
-            return refuse(cls, "Add smoke first")
-        if context.scene.camera is None:
-            return refuse(cls, "The scene has no camera: add one where the clip was filmed from")
-        return True
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        scene = context.scene
-        low, high = framed_box(scene)
-        box = box_of(smoke)
-        if box is None:
-            box = new_box()
-            scene.collection.objects.link(box)
-            smoke.smokelift.box = box
-        box.parent = None
-        box.rotation_euler = (0.0, 0.0, 0.0)
-        box.location = (low + high) / 2
-        box.scale = (high - low) / 2
+    low, high = framed_box(context.scene)
+    box = box_of(smoke)
+    if box is None:
+        box = smoke.smokelift.box = new_box()
+        context.scene.collection.objects.link(box)
+    box.parent = None
+    box.rotation_euler = (0.0, 0.0, 0.0)
+    box.location = (low + high) / 2
+    box.scale = (high - low) / 2
 
 
-class SMOKELIFT_OT_place(RequiresClip, bpy.types.Operator):
+def _needs_floor(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
+    known = smoke.smokelift.camera_mode == "SCENE" and box_of(smoke) is not None
+    return "" if known else "Choose Scene Camera and make a Box first: its bottom is the floor"
+
+
+def _needs_view(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:
+    in_view = context.area is not None and context.area.type == "VIEW_3D"
+    return "" if in_view else "Use the tab in a 3D View: the click is made there"
+
+
+class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
     """Click in the camera's picture on the floor of the box, right below the smoke: that gives its distance"""
 
     bl_idname = "smokelift.place"
     bl_label = "Click Where the Smoke Stands"
     bl_options = {"UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        smoke = active_smoke(context.scene)
-        if smoke.smokelift.camera_mode != "SCENE" or box_of(smoke) is None:
-            return refuse(cls, "Choose Scene Camera and make a Box first: its bottom is the floor")
-        if context.area is None or context.area.type != "VIEW_3D":
-            return refuse(cls, "Use the tab in a 3D View: the click is made there")
-        return True
+    needs = (needs_clip, _needs_floor, _needs_view)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         smoke = active_smoke(context.scene)

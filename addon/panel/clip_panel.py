@@ -21,8 +21,9 @@ from ..scene.blender import ShotError, absolute, frame_rate, relative
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
-from .common import ActsOnSmoke, ChangesScene, ChoosesFile, RequiresClip, automatic_unless, refuse
-from .editors import open_tab, show_clip
+from . import editors
+from .common import ChangesScene, ChoosesFile, automatic_unless, needs_clip, operator
+from .editors import open_tab
 from .layout import draw_text
 
 UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
@@ -143,6 +144,7 @@ class SMOKELIFT_OT_add(ChoosesFile, ChangesScene, bpy.types.Operator):
     """Add smoke that is made from a video or an image sequence"""
 
     bl_label = "Smoke from Video"
+    needs = ()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context) if self.filepath else super().invoke(context, event)  # of a video that was dropped
@@ -166,75 +168,61 @@ def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(SMOKELIFT_OT_add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
 
 
-class SMOKELIFT_OT_use_all_files(ChangesScene, RequiresClip, bpy.types.Operator):
+@operator("Use All Files", needs_clip, base=ChangesScene)
+def use_all_files(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
-
-    bl_label = "Use All Files"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        settings = smoke.smokelift
-        settings.last = frame_count(settings.clip)
+    smoke.smokelift.last = frame_count(smoke.smokelift.clip)
 
 
-class SMOKELIFT_OT_match_clip(ChangesScene, RequiresClip, bpy.types.Operator):
+@operator("Match Scene to Clip", needs_clip, base=ChangesScene)
+def match_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Set the scene's resolution and frame rate to the clip's, and its length to the result's or its part in use"""
-
-    bl_label = "Match Scene to Clip"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        shot_setup.match_clip(smoke)
+    shot_setup.match_clip(smoke)
 
 
-class SMOKELIFT_OT_undistort(ChangesScene, bpy.types.Operator):
+def _needs_distortion(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
+    distorted = is_distorted(smoke.smokelift.clip)
+    return "" if distorted else "The clip's lens has no distortion: calibrate it in the Movie Clip Editor"
+
+
+@operator("Undistort Clip", needs_clip, _needs_distortion, base=ChangesScene)
+def undistort(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Write the clip without its lens's distortion, and use that. Blender waits meanwhile"""
-
-    bl_label = "Undistort Clip"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        if smoke is None or smoke.smokelift.clip is None or not is_distorted(smoke.smokelift.clip):
-            return refuse(cls, "The clip's lens has no distortion: calibrate it in the Movie Clip Editor")
-        return True
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        settings = smoke.smokelift
-        if settings.plate_mode == "FILE":
-            raise ShotError("The clean plate is distorted too: choose Background: From the Clip first.")
-        if settings.mask or settings.drawn_mask is not None:
-            raise ShotError("The mask is distorted too: clear it, and draw one over the undistorted clip.")
-        if settings.strokes is not None:
-            raise ShotError("The strokes are distorted too: clear them, and paint new ones afterwards.")
-        clip, unchanged = settings.clip, {name: getattr(settings, name) for name in UNCHANGED}
-        folder = smoke_takes.output_folder(smoke) / "undistorted"
-        try:
-            settings.clip = undistorted(clip, folder)
-        except RuntimeError:
-            raise ShotError(rpt_("{:s} cannot be written to: choose another Output.").format(str(folder))) from None
-        if clip.source == "MOVIE" and not unchanged["fps"]:
-            unchanged["fps"] = clip.fps  # pictures have no rate of their own
-        for name, value in unchanged.items():
-            setattr(settings, name, value)
+    settings = smoke.smokelift
+    if settings.plate_mode == "FILE":
+        raise ShotError("The clean plate is distorted too: choose Background: From the Clip first.")
+    if settings.mask or settings.drawn_mask is not None:
+        raise ShotError("The mask is distorted too: clear it, and draw one over the undistorted clip.")
+    if settings.strokes is not None:
+        raise ShotError("The strokes are distorted too: clear them, and paint new ones afterwards.")
+    clip, unchanged = settings.clip, {name: getattr(settings, name) for name in UNCHANGED}
+    folder = smoke_takes.output_folder(smoke) / "undistorted"
+    try:
+        settings.clip = undistorted(clip, folder)
+    except RuntimeError:
+        raise ShotError(rpt_("{:s} cannot be written to: choose another Output.").format(str(folder))) from None
+    if clip.source == "MOVIE" and not unchanged["fps"]:
+        unchanged["fps"] = clip.fps  # pictures have no rate of their own
+    for name, value in unchanged.items():
+        setattr(settings, name, value)
 
 
-class SMOKELIFT_OT_plate_from_frame(ChangesScene, RequiresClip, bpy.types.Operator):
+@operator("Plate from This Frame", needs_clip, base=ChangesScene)
+def plate_from_frame(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Take this frame of the clip, in which there is no smoke, as the clean plate. More frames lessen the noise"""
-
-    bl_label = "Plate from This Frame"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        settings = smoke.smokelift
-        number = shown_frame(smoke)
-        chosen = settings.plate_frames.replace(",", " ").split() if settings.plate_mode == "FRAMES" else []
-        if str(number) not in chosen:
-            chosen.append(str(number))
-        settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
+    settings = smoke.smokelift
+    number = shown_frame(smoke)
+    chosen = settings.plate_frames.replace(",", " ").split() if settings.plate_mode == "FRAMES" else []
+    if str(number) not in chosen:
+        chosen.append(str(number))
+    settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
 
 
-class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, bpy.types.Operator):
     """Choose a picture or a video; those of the clip's folder come first"""
 
     bl_label = "Choose Picture"
+    needs = (needs_clip,)
 
     setting: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
@@ -248,43 +236,33 @@ class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, RequiresClip, bpy.t
         setattr(smoke.smokelift, self.setting, relative(absolute(self.filepath)))
 
 
-class SMOKELIFT_OT_clear_plate_frames(ChangesScene, RequiresClip, bpy.types.Operator):
+@operator("Clear Frames", needs_clip, base=ChangesScene)
+def clear_plate_frames(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Take none of these frames as the clean plate"""
-
-    bl_label = "Clear Frames"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        settings = smoke.smokelift
-        settings.plate_frames, settings.plate_mode = "", "ESTIMATE"
+    smoke.smokelift.plate_frames, smoke.smokelift.plate_mode = "", "ESTIMATE"
 
 
-class SMOKELIFT_OT_new_mask(ChangesScene, RequiresClip, bpy.types.Operator):
+@operator("New Mask", needs_clip, base=ChangesScene)
+def new_mask(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Draw over the clip, in the Clip Editor, where smoke may be. Where the mask is black there is none"""
-
-    bl_label = "New Mask"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        settings = smoke.smokelift
-        if settings.drawn_mask is None:
-            mask = bpy.data.masks.new(smoke.name)
-            mask.layers.new(name="Smoke")
-            mask.frame_start, mask.frame_end = context.scene.frame_start, context.scene.frame_end
-            settings.drawn_mask = mask
-        first, last = used_range(settings)
-        if not first <= context.scene.frame_current <= last:
-            context.scene.frame_set(first)  # what is drawn on a frame that is not used helps little
-        if not bpy.app.background:
-            open_tab(show_clip(settings.clip, settings.drawn_mask))
+    settings = smoke.smokelift
+    if settings.drawn_mask is None:
+        mask = bpy.data.masks.new(smoke.name)
+        mask.layers.new(name="Smoke")
+        mask.frame_start, mask.frame_end = context.scene.frame_start, context.scene.frame_end
+        settings.drawn_mask = mask
+    first, last = used_range(settings)
+    if not first <= context.scene.frame_current <= last:
+        context.scene.frame_set(first)  # what is drawn on a frame that is not used helps little
+    if not bpy.app.background:
+        open_tab(editors.show_clip(settings.clip, settings.drawn_mask))
 
 
-class SMOKELIFT_OT_show_clip(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+@operator("Show Clip", needs_clip)
+def show_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Open the clip in the Clip Editor, to choose its frames, track its camera, or stabilize it (Stabilization)"""
-
-    bl_label = "Show Clip"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        if not bpy.app.background:
-            open_tab(show_clip(smoke.smokelift.clip))
+    if not bpy.app.background:
+        open_tab(editors.show_clip(smoke.smokelift.clip))
 
 
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

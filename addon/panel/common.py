@@ -1,6 +1,6 @@
 """What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import bpy
@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..core.contract import SIDES
 from ..core.job import EngineMissingError
 from ..core.take import TakeError
-from ..result.side_job import Request, writing_job
+from ..result.side_job import writing_job
 from ..scene import volume
 from ..scene.blender import ShotError
 from ..scene.smoke import active_smoke
@@ -18,43 +18,48 @@ EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
 """The editors that have the tab in their sidebar."""
 
 
-def refuse(cls: type, why: str) -> bool:
-    """Have Blender say why an operator cannot be used; False, for its `poll`. A panel is left out in silence."""
-    if issubclass(cls, bpy.types.Operator):
-        cls.poll_message_set(why)
-    return False
+Act = Callable[[bpy.types.Context, bpy.types.Object], None]
+"""Does something with the active smoke; ShotError, TakeError or EngineMissingError if something is in the way."""
+
+Need = Callable[[bpy.types.Context, bpy.types.Object | None], str]
+"""Why something cannot be done now with the active smoke, or without one; empty where it can."""
 
 
-class RequiresClip:
-    """For what reads the clip."""
+def needs_smoke(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
+    return "" if smoke is not None else "Add smoke first"
+
+
+def needs_clip(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
+    return "" if smoke is not None and smoke.smokelift.clip is not None else "Choose a clip first"
+
+
+def needs_result(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
+    return "" if smoke is not None and volume.shown_take(smoke) is not None else "Make smoke first"
+
+
+def needs_rest(_context: bpy.types.Context, _smoke: bpy.types.Object | None) -> str:
+    return "Other files are being written: wait for them, or cancel that" if writing_job.writing else ""
+
+
+class Needing:
+    """What Blender offers only where its needs are met, of which each counts after those before it."""
+
+    needs: Sequence[Need] = ()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         smoke = active_smoke(context.scene)
-        return (smoke is not None and smoke.smokelift.clip is not None) or refuse(cls, "Choose a clip first")
+        why = next((why for need in cls.needs if (why := need(context, smoke))), "")
+        if why and issubclass(cls, bpy.types.Operator):  # a panel is left out in silence
+            cls.poll_message_set(why)
+        return not why
 
 
-class RequiresResult:
-    """For what does something with the result on show."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return (smoke is not None and volume.shown_take(smoke) is not None) or refuse(cls, "Make smoke first")
-
-
-class RequiresClipAndResult(RequiresClip, RequiresResult):
-    """For what brings the two together."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return super().poll(context) and super(RequiresClip, cls).poll(context)
-
-
-class ActsOnSmoke:
+class ActsOnSmoke(Needing):
     """An operator on the active smoke, which reports what is in the way. Its identifier is that of its class."""
 
     bl_idname: str
+    needs: Sequence[Need] = (needs_smoke,)
 
     def __init_subclass__(cls) -> None:
         cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
@@ -76,6 +81,27 @@ class ChangesScene(ActsOnSmoke):
     """One that can be undone, and adjusted."""
 
     bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+
+def operator(label: str, *needs: Need, base: type = ActsOnSmoke, **attributes: Any) -> Callable[[Act], type]:
+    """Make an operator of what it does: the class SMOKELIFT_OT_NAME, with the function's name and docstring.
+
+    Parameters
+    ----------
+    label
+        What its button says.
+    needs, base
+        When it can be used, and what it is besides.
+    attributes
+        Further ones of the class.
+    """
+
+    def made(act: Act) -> type:
+        own = {"__module__": act.__module__, "__doc__": act.__doc__, "bl_label": label, "needs": needs, **attributes}
+        own["act"] = lambda _operator, context, smoke: act(context, smoke)
+        return type(f"SMOKELIFT_OT_{act.__name__}", (base, bpy.types.Operator), own)
+
+    return made
 
 
 class _OpensFileBrowser:
@@ -100,33 +126,11 @@ class ChoosesFolder(_OpensFileBrowser):
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
 
 
-class WritesFiles(ActsOnSmoke):
-    """An operator that has the engine write files; without a window it waits for them."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if writing_job.writing:
-            return refuse(cls, "Other files are being written: wait for them, or cancel that")
-        return super().poll(context)
-
-    def request(self, smoke: bpy.types.Object) -> Request:
-        """The engine's arguments, and what is done at the end; ShotError or TakeError if something is in the way."""
-        raise NotImplementedError
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        writing_job.start(smoke, self.request(smoke), type(self).bl_idname)
-        if bpy.app.background:
-            job = writing_job.job
-            writing_job.wait()
-            if job.outcome != "done":
-                raise ShotError(job.sentence)
-
-
 Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]
 """Draws a part of the tab for the active smoke."""
 
 
-def sub_panels(name: str, label: str, draw: Draw, requires: type) -> tuple[type, ...]:
+def sub_panels(name: str, label: str, draw: Draw, *needs: Need) -> tuple[type, ...]:
     """The panels SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME of a part of the tab, closed at first.
 
     Parameters
@@ -135,8 +139,8 @@ def sub_panels(name: str, label: str, draw: Draw, requires: type) -> tuple[type,
         Of the part, for Blender and for the user.
     draw
         Draws it, with the names of settings on their left.
-    requires
-        A class with the `poll` that says when it is shown.
+    needs
+        When it is shown.
     """
 
     def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
@@ -150,11 +154,12 @@ def sub_panels(name: str, label: str, draw: Draw, requires: type) -> tuple[type,
         "bl_region_type": "UI",
         "bl_options": {"DEFAULT_CLOSED"},
         "bl_label": label,
+        "needs": needs,
     }
     return tuple(
         type(
             f"SMOKELIFT_PT_{editor}_{name}",
-            (requires, bpy.types.Panel),
+            (Needing, bpy.types.Panel),
             {**both, "bl_space_type": space, "bl_parent_id": f"SMOKELIFT_PT_{editor}", "draw": draw_panel},
         )
         for editor, space in EDITORS.items()

@@ -10,15 +10,13 @@ from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from ..scene.smoke import active_smoke
 from .common import (
-    ActsOnSmoke,
     ChangesScene,
-    RequiresClipAndResult,
-    RequiresResult,
     automatic_unless,
     closed_sides,
-    refuse,
+    needs_clip,
+    needs_result,
+    operator,
     speed_changed,
     sub_panels,
 )
@@ -157,44 +155,32 @@ class DirectSettings:
         return (self.speed, self.speed_middle, self.speed_end) if self.use_ramp else (self.speed,)
 
 
-class SMOKELIFT_OT_direct(ActsOnSmoke, RequiresClipAndResult, bpy.types.Operator):
+@operator("Direct Smoke", needs_clip, needs_result, bl_options={"UNDO"})
+def direct(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Make a new result of the one on show: longer, at another speed, or repeating. The one on show stays"""
-
-    bl_label = "Direct Smoke"
-    bl_options = {"UNDO"}
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = smoke_takes.write_directed(smoke)
-        run_queue.enqueue(context, smoke, take)
+    run_queue.enqueue(context, smoke, smoke_takes.write_directed(smoke))
 
 
-class SMOKELIFT_OT_add_effectors(ChangesScene, RequiresResult, bpy.types.Operator):
-    """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
-
-    bl_label = "Add Selected to Effectors"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if not _may_act(context):
-            return refuse(cls, "Select a mesh, a Wind or Turbulence force field, or an Empty")
-        return True
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        settings = smoke.smokelift.directing
-        if settings.effectors is None:
-            settings.effectors = bpy.data.collections.new(EFFECTORS)
-            context.scene.collection.children.link(settings.effectors)
-        for obj in _may_act(context):
-            if obj.name not in settings.effectors.objects:
-                settings.effectors.objects.link(obj)
-
-
-def _may_act(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected objects that may act on the active smoke."""
-    box = active_smoke(context.scene).smokelift.box
+def _may_act(context: bpy.types.Context, smoke: bpy.types.Object) -> list[bpy.types.Object]:
+    """The selected objects that may act on the smoke."""
+    box = smoke.smokelift.box
     return [obj for obj in context.selected_objects if obj != box and obj.type in {*MESHES, "EMPTY"}]
+
+
+def _needs_effector(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
+    return "" if _may_act(context, smoke) else "Select a mesh, a Wind or Turbulence force field, or an Empty"
+
+
+@operator("Add Selected to Effectors", needs_result, _needs_effector, base=ChangesScene)
+def add_effectors(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
+    settings = smoke.smokelift.directing
+    if settings.effectors is None:
+        settings.effectors = bpy.data.collections.new(EFFECTORS)
+        context.scene.collection.children.link(settings.effectors)
+    for obj in _may_act(context, smoke):
+        if obj.name not in settings.effectors.objects:
+            settings.effectors.objects.link(obj)
 
 
 def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -255,4 +241,4 @@ def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
 
 
-PANELS = sub_panels("direct", "Direct", _draw_direct, RequiresResult)
+PANELS = sub_panels("direct", "Direct", _draw_direct, needs_result)

@@ -11,8 +11,7 @@ from bpy.props import StringProperty
 from ..core.take import Take
 from ..result.shot_check import state
 from ..scene.blender import ShotError
-from ..scene.smoke import active_smoke
-from .common import ActsOnSmoke, RequiresClip, refuse
+from .common import ActsOnSmoke, needs_clip, operator
 
 DRAWN_SECONDS = 0.3
 """After which a new window has been drawn."""
@@ -41,24 +40,17 @@ class SMOKELIFT_OT_open_log(ActsOnSmoke, bpy.types.Operator):
             space.text, space.top = text, 0
 
 
-class SMOKELIFT_OT_show_page(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+def _needs_page(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
+    return "" if state.fits(smoke) and state.done and Path(state.page).is_file() else "Check the shot first"
+
+
+@operator("Report", needs_clip, _needs_page)
+def show_page(_context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
     """Show on a page all that was found in the clip and assumed: box and light, background, smoke, doubts"""
-
-    bl_label = "Report"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if not (state.fits(active_smoke(context.scene)) and state.done and Path(state.page).is_file()):
-            return refuse(cls, "Check the shot first")
-        return True
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        page = bpy.data.images.load(state.page, check_existing=True)
-        page.reload()
-        if not bpy.app.background:
-            show_image(page)
+    page = bpy.data.images.load(state.page, check_existing=True)
+    page.reload()
+    if not bpy.app.background:
+        show_image(page)
 
 
 def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:

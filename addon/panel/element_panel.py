@@ -10,17 +10,16 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 
-from ..core.job import Job
 from ..core.take import Take
 from ..result import smoke_takes
-from ..result.side_job import Request, writing_job
+from ..result.side_job import write_files
 from ..scene.blender import ShotError, relative
 from ..scene.clip import number_in_file, shown_frame
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
-from .common import ChangesScene, ChoosesFolder, RequiresClip, WritesFiles, sub_panels
+from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, sub_panels
 from .editors import open_tab, show_image
 from .layout import draw_text, draw_work
 
@@ -34,27 +33,22 @@ PICTURES = "element_####.exr"
 """Names of the pictures, numbered as the frames of the clip's file."""
 
 
-class SMOKELIFT_OT_paint_strokes(ChangesScene, RequiresClip, bpy.types.Operator):
+@operator("Paint Strokes", needs_clip, base=ChangesScene)
+def paint_strokes(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
-
-    bl_label = "Paint Strokes"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        now = context.scene.frame_current
-        settings = smoke.smokelift
-        try:
-            shown_frame(smoke)
-            if settings.strokes is None:
-                settings.strokes = _strokes(smoke)
-            saved_strokes(settings.strokes, settings.clip)
-            lay_below(
-                settings.strokes, write_pictures(settings.clip, now, now, Path(bpy.app.tempdir) / "smokelift_frame_")
-            )
-        except (ShotError, RuntimeError, OSError) as error:
-            raise ShotError(str(error)) from error
-        if not bpy.app.background:
-            open_tab(show_image(settings.strokes, "PAINT"))
-            _choose_color(context, "SMOKE")
+    now, settings = context.scene.frame_current, smoke.smokelift
+    try:
+        shown_frame(smoke)
+        if settings.strokes is None:
+            settings.strokes = _strokes(smoke)
+        saved_strokes(settings.strokes, settings.clip)
+        picture = write_pictures(settings.clip, now, now, Path(bpy.app.tempdir) / "smokelift_frame_")
+        lay_below(settings.strokes, picture)
+    except (RuntimeError, OSError) as error:
+        raise ShotError(str(error)) from error
+    if not bpy.app.background:
+        open_tab(show_image(settings.strokes, "PAINT"))
+        _choose_color(context, "SMOKE")
 
 
 def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
@@ -134,41 +128,34 @@ def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
     return ["extract", str(take.scene_file), "--out", str(folder / PICTURES)]
 
 
-class SMOKELIFT_OT_extract(WritesFiles, RequiresClip, bpy.types.Operator):
+@operator("Extract", needs_rest, needs_clip)
+def extract(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Show the smoke of this frame by itself, with alpha, as Render Element would write it"""
+    folder, frame = smoke_takes.output_folder(smoke) / "element", shown_frame(smoke)
+    number = number_in_file(smoke.smokelift.clip, frame)
+    picture = folder / PICTURES.replace("####", f"{number:04d}")
 
-    bl_label = "Extract"
+    def show(_smoke: bpy.types.Object) -> str:
+        image = bpy.data.images.load(str(picture), check_existing=True)
+        image.reload()
+        if not bpy.app.background:
+            show_image(image)
+        return rpt_("Frame {:d} of the clip is in {:s}.").format(frame, str(picture))
 
-    def request(self, smoke: bpy.types.Object) -> Request:
-        folder, frame = smoke_takes.output_folder(smoke) / "element", shown_frame(smoke)
-        number = number_in_file(smoke.smokelift.clip, frame)
-        picture = folder / PICTURES.replace("####", f"{number:04d}")
-
-        def show(_smoke: bpy.types.Object, job: Job) -> None:
-            if job.outcome != "done":
-                return
-            writing_job.sentence = rpt_("Frame {:d} of the clip is in {:s}.").format(frame, str(picture))
-            image = bpy.data.images.load(str(picture), check_existing=True)
-            image.reload()
-            if not bpy.app.background:
-                show_image(image)
-
-        return [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"], show
+    words = [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"]
+    write_files(smoke, "smokelift.extract", words, show)
 
 
-class SMOKELIFT_OT_render_element(ChoosesFolder, WritesFiles, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_render_element(ChoosesFolder, ActsOnSmoke, bpy.types.Operator):
     """Write the smoke of all frames by itself, with alpha, as an image sequence (OpenEXR, linear, premultiplied)"""
 
     bl_label = "Render Element"
+    needs = (needs_rest, needs_clip)
 
-    def request(self, smoke: bpy.types.Object) -> Request:
+    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         folder = Path(self.directory)
-
-        def say(_smoke: bpy.types.Object, job: Job) -> None:
-            if job.outcome == "done":
-                writing_job.sentence = rpt_("The element is in {:s}.").format(str(folder))
-
-        return _extract_request(smoke, folder), say
+        said = rpt_("The element is in {:s}.").format(str(folder))
+        write_files(smoke, self.bl_idname, _extract_request(smoke, folder), lambda _smoke: said)
 
 
 def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -176,11 +163,8 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row = layout.row(align=True)
     row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
     row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
-    for operator, icon in (
-        ("smokelift.extract", "IMAGE_RGB_ALPHA"),
-        ("smokelift.render_element", "RENDER_ANIMATION"),
-    ):
-        draw_work(layout, context, smoke, operator, icon)
+    draw_work(layout, context, smoke, "smokelift.extract", "IMAGE_RGB_ALPHA")
+    draw_work(layout, context, smoke, "smokelift.render_element", "RENDER_ANIMATION")
 
 
-PANELS = sub_panels("element", "Element", _draw_element, RequiresClip)
+PANELS = sub_panels("element", "Element", _draw_element, needs_clip)

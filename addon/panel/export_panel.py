@@ -3,12 +3,11 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..core.job import Job
 from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
-from ..result.side_job import Request
+from ..result.side_job import write_files
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import RequiresResult, WritesFiles, refuse, sub_panels
+from .common import Needing, needs_rest, needs_result, operator, sub_panels
 from .layout import draw_text, draw_work
 
 
@@ -52,32 +51,25 @@ class ExportSettings:
     )
 
 
-class SMOKELIFT_OT_export(WritesFiles, RequiresResult, bpy.types.Operator):
+@operator("Export Smoke", needs_rest, needs_result)
+def export(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
 
-    bl_label = "Export Smoke"
+    def add_asset(smoke: bpy.types.Object) -> None:
+        if smoke.smokelift_export.host == "blender":
+            write_asset(smoke, folder_of(smoke))
 
-    def request(self, smoke: bpy.types.Object) -> Request:
-        return arguments(smoke), _complete
-
-
-def _complete(smoke: bpy.types.Object, job: Job) -> None:
-    if job.outcome == "done" and smoke.smokelift_export.host == "blender":
-        write_asset(smoke, folder_of(smoke))
+    write_files(smoke, "smokelift.export", arguments(smoke), add_asset)
 
 
-class SMOKELIFT_OT_make_proxy(WritesFiles, RequiresResult, bpy.types.Operator):
+@operator("Make Proxy", needs_rest, needs_result)
+def make_proxy(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
 
-    bl_label = "Make Proxy"
-
-    def request(self, smoke: bpy.types.Object) -> Request:
-        return ["proxy", str(volume.shown_take(smoke).directory)], _show_proxy
-
-
-def _show_proxy(smoke: bpy.types.Object, job: Job) -> None:
-    if job.outcome == "done":
+    def show_proxy(smoke: bpy.types.Object) -> None:
         volume.show(smoke, volume.shown_take(smoke))
+
+    write_files(smoke, "smokelift.make_proxy", ["proxy", str(volume.shown_take(smoke).directory)], show_proxy)
 
 
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -86,30 +78,30 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     for name in ("host", "precision", "use_velocity", "proxy"):
         layout.prop(settings, name)
     draw_text(layout, context, size_estimate.size(smoke), "DISK_DRIVE")
-    draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
+    draw_work(layout, context, smoke, "smokelift.export", "EXPORT")
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 
-class SMOKELIFT_OT_add_instance(bpy.types.Operator):
+def _needs_sequence(context: bpy.types.Context, _smoke: bpy.types.Object | None) -> str:
+    obj = context.object
+    if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
+        return "Select a Volume that plays a sequence"
+    driven = obj.data.animation_data is not None and obj.data.animation_data.drivers
+    return "Set Speed to Frame by Frame first" if driven else ""
+
+
+class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
     """Add another object that plays the active Volume's files later or earlier. The material is shared"""
 
     bl_idname = "smokelift.add_instance"
     bl_label = "Instance in Time"
     bl_options = {"REGISTER", "UNDO"}
+    needs = (_needs_sequence,)
 
     offset: IntProperty(
         name="Time Offset", description="Frames by which the new object plays later; below 0 earlier", default=12
     )
     repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        obj = context.object
-        if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
-            return refuse(cls, "Select a Volume that plays a sequence")
-        if obj.data.animation_data is not None and obj.data.animation_data.drivers:
-            return refuse(cls, "Set Speed to Frame by Frame first")
-        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = context.object
@@ -122,4 +114,4 @@ class SMOKELIFT_OT_add_instance(bpy.types.Operator):
         return {"FINISHED"}
 
 
-PANELS = sub_panels("export", "Export", _draw_export, RequiresResult)
+PANELS = sub_panels("export", "Export", _draw_export, needs_result)

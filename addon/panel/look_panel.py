@@ -7,25 +7,23 @@ from ..scene import look, volume
 from ..scene.blender import ShotError
 from ..scene.modifiers import in_viewport, proxy_modifier
 from ..scene.smoke import is_override, smoke_with_look
-from .common import ChangesScene, RequiresResult, sub_panels
+from .common import ChangesScene, needs_result, sub_panels
 from .layout import draw_text, draw_work
 
 SHORT = {"Absorption Color": "Absorption"}
 """Names of inputs that the sidebar would cut off."""
 
 
-class RequiresLook(RequiresResult):
-    """For what changes the look of a smoke, also of one that another file is linked for."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return is_override(smoke_with_look(context.scene)) or super().poll(context)
+def _needs_look(context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
+    """A smoke that has a look, also one that another file is linked for."""
+    return "" if is_override(smoke_with_look(context.scene)) else needs_result(context, smoke)
 
 
-class SMOKELIFT_OT_use_look(ChangesScene, RequiresLook, bpy.types.Operator):
+class SMOKELIFT_OT_use_look(ChangesScene, bpy.types.Operator):
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
 
     bl_label = "Use Look"
+    needs = (_needs_look,)
 
     preset: EnumProperty(
         name="Preset",
@@ -85,4 +83,4 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
         draw_text(column, context, text, "INFO")
 
 
-PANELS = sub_panels("look", "Look", _draw_look, RequiresLook)
+PANELS = sub_panels("look", "Look", _draw_look, _needs_look)

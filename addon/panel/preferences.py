@@ -10,7 +10,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from ..core.contract import QUALITIES
 from ..scene.blender import PACKAGE
 from ..scene.smoke import is_smoke
-from .common import automatic_unless, refuse
+from .common import Needing, automatic_unless
 from .layout import draw_automatic
 
 MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
@@ -93,22 +93,17 @@ class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = "smokelift.add_preset"
 
 
-class SMOKELIFT_OT_add_preset(AddPresetBase, bpy.types.Operator):
+class SMOKELIFT_OT_add_preset(Needing, AddPresetBase, bpy.types.Operator):
     """Keep the settings of the active smoke as a preset, or remove one"""
 
     bl_idname = "smokelift.add_preset"
     bl_label = "Add Smoke Preset"
+    needs = (lambda context, _smoke: "" if is_smoke(context.object) else "Select the smoke first",)
     preset_menu = "SMOKELIFT_PT_presets"
     preset_subdir = FOLDER
     # a preset is a script of Blender's, which knows the active object but not this add-on
     preset_defines = ("settings = bpy.context.object.smokelift",)
     preset_values = tuple(f"settings.{name}" for name in SETTINGS)
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not is_smoke(context.object):
-            return refuse(cls, "Select the smoke first")
-        return True
 
 
 def draw_header(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

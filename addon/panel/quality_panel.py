@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty
 from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
-from .common import ActsOnSmoke, RequiresClip, automatic_unless
+from .common import automatic_unless, needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_text
 
 SEEDS = 2**31
@@ -69,24 +69,16 @@ class QualitySettings:
     )
 
 
-class SMOKELIFT_OT_check(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+@operator("Check Shot", needs_clip, bl_options={"INTERNAL"})
+def check(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Estimate time, memory and disk space of the run, and list its assumptions"""
-
-    bl_label = "Check Shot"
-    bl_options = {"INTERNAL"}
-
-    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        shot_check.check(smoke)
+    shot_check.check(smoke)
 
 
-class SMOKELIFT_OT_stop_check(ActsOnSmoke, bpy.types.Operator):
+@operator("Stop Reading", needs_clip, bl_options={"INTERNAL"})
+def stop_check(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Stop reading the clip; Make Smoke and all settings work without the estimate"""
-
-    bl_label = "Stop Reading"
-    bl_options = {"INTERNAL"}
-
-    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        shot_check.stop(smoke)
+    shot_check.stop(smoke)
 
 
 def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

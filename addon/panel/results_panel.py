@@ -13,7 +13,7 @@ from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import ShotError, absolute, redraw
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, RequiresClip, RequiresResult, sub_panels
+from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, sub_panels
 from .layout import draw_text
 
 
@@ -30,28 +30,31 @@ class _OnResult:
         return take
 
 
-class SMOKELIFT_OT_show_take(_OnResult, ChangesScene, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_show_take(_OnResult, ChangesScene, bpy.types.Operator):
     """Show this result in the smoke. Its place and its material stay as they are"""
 
     bl_label = "Show Result"
+    needs = (needs_clip,)
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         smoke_takes.choose(smoke, self.result())
 
 
-class SMOKELIFT_OT_show_beside(_OnResult, ChangesScene, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_show_beside(_OnResult, ChangesScene, bpy.types.Operator):
     """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
 
     bl_label = "Show Beside"
+    needs = (needs_result,)
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         volume.show_beside(smoke, self.result())
 
 
-class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, RequiresResult, bpy.types.Operator):
+class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, bpy.types.Operator):
     """Choose the folder that the smoke's results were moved to"""
 
     bl_label = "Choose Moved Folder"
+    needs = (needs_result,)
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         smoke_takes.move_results(smoke, absolute(self.directory))
@@ -89,7 +92,7 @@ class SMOKELIFT_OT_remove_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
         take.remove()
 
 
-class SMOKELIFT_OT_remove_takes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+class SMOKELIFT_OT_remove_takes(ActsOnSmoke, bpy.types.Operator):
     """Delete results that nothing needs."""
 
     bl_description = (
@@ -97,6 +100,7 @@ class SMOKELIFT_OT_remove_takes(ActsOnSmoke, RequiresClip, bpy.types.Operator):
         "was made of and what other files may show stays"
     )
     bl_label = "Delete Earlier Results?"
+    needs = (needs_clip,)
 
     asked: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
@@ -150,4 +154,4 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row.operator("smokelift.remove_takes", text=text, translate=False)
 
 
-PANELS = sub_panels("results", "Results", _draw_results, RequiresClip)
+PANELS = sub_panels("results", "Results", _draw_results, needs_clip)

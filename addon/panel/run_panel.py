@@ -13,58 +13,44 @@ from ..result.smoke_takes import Run, runs
 from ..scene import volume
 from ..scene.blender import ShotError
 from ..scene.modifiers import lacks_proxy
-from ..scene.smoke import active_smoke, find_smoke
-from .common import ActsOnSmoke, RequiresClip, refuse
+from ..scene.smoke import find_smoke
+from .common import needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_progress, draw_text
 from .quality_panel import SEEDS, draw_check
 
 
-class SMOKELIFT_OT_run(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+@operator("Make Smoke", needs_clip, bl_options={"UNDO"})
+def run(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
-
-    bl_label = "Make Smoke"
-    bl_options = {"UNDO"}
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        run_queue.enqueue(context, smoke, smoke_takes.write_take(smoke), settings_text(smoke))
+    run_queue.enqueue(context, smoke, smoke_takes.write_take(smoke), settings_text(smoke))
 
 
-class SMOKELIFT_OT_vary(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+def _needs_detail(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
+    only_one = smoke.smokelift.detail == 0.0
+    return "Without detail in depth there is only one smoke: raise Depth Detail first" if only_one else ""
+
+
+@operator("Another Variation", needs_clip, _needs_detail, bl_options={"UNDO"})
+def vary(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Make the smoke again with the next variation: it looks the same from the camera, and different from the side"""
-
-    bl_label = "Another Variation"
-    bl_options = {"UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if active_smoke(context.scene).smokelift.detail == 0.0:
-            return refuse(cls, "Without detail in depth there is only one smoke: raise Depth Detail first")
-        return True
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        before = smoke.smokelift.seed
-        smoke.smokelift.seed = (before + 1) % SEEDS
-        try:
-            take = smoke_takes.write_take(smoke)
-        except (ShotError, TakeError):
-            smoke.smokelift.seed = before
-            raise
-        run_queue.enqueue(context, smoke, take, settings_text(smoke))
+    before = smoke.smokelift.seed
+    smoke.smokelift.seed = (before + 1) % SEEDS
+    try:
+        take = smoke_takes.write_take(smoke)
+    except (ShotError, TakeError):
+        smoke.smokelift.seed = before
+        raise
+    run_queue.enqueue(context, smoke, take, settings_text(smoke))
 
 
-class SMOKELIFT_OT_resume(ActsOnSmoke, RequiresClip, bpy.types.Operator):
+@operator("Resume", needs_clip)
+def resume(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Resume the stopped run after its last finished frame, with its own settings"""
-
-    bl_label = "Resume"
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = smoke_takes.unfinished(smoke)
-        if take is None or smoke_takes.busy(take):
-            raise ShotError("No stopped run to resume: press Make Smoke.")
-        smoke_takes.update_moved_files(smoke, take)
-        run_queue.enqueue(context, smoke, take)
+    take = smoke_takes.unfinished(smoke)
+    if take is None or smoke_takes.busy(take):
+        raise ShotError("No stopped run to resume: press Make Smoke.")
+    smoke_takes.update_moved_files(smoke, take)
+    run_queue.enqueue(context, smoke, take)
 
 
 class SMOKELIFT_OT_cancel(bpy.types.Operator):

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty
 from ..scene import shot_setup, volume
 from ..scene.blender import ShotError
 from ..scene.plate import clip_behind
-from .common import ChangesScene, RequiresClip, RequiresClipAndResult, sub_panels
+from .common import ChangesScene, needs_clip, needs_result, sub_panels
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
 """Names of the settings."""
@@ -69,7 +69,7 @@ class SetUpSettings:
     )
 
 
-class SMOKELIFT_OT_set_up(ChangesScene, RequiresClipAndResult, bpy.types.Operator):
+class SMOKELIFT_OT_set_up(ChangesScene, bpy.types.Operator):
     """Make a render from the camera match the clip."""
 
     bl_description = (
@@ -77,6 +77,7 @@ class SMOKELIFT_OT_set_up(ChangesScene, RequiresClipAndResult, bpy.types.Operato
         "and colors, with samples for about a minute in a new file. The old world stays in the file"
     )
     bl_label = "Set Up Shot"
+    needs = (needs_clip, needs_result)
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         take = volume.shown_take(smoke)
@@ -111,4 +112,4 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
-PANELS = sub_panels("set_up", "Shot Set-Up", _draw_set_up, RequiresClip)
+PANELS = sub_panels("set_up", "Shot Set-Up", _draw_set_up, needs_clip)

@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.job import Job, engine_command
-from ..scene.blender import call_later, redraw, thread_options
+from ..scene.blender import ShotError, call_later, redraw, thread_options
 from ..scene.smoke import find_smoke
 
 TICK_SECONDS = 0.1
@@ -108,7 +108,39 @@ class SideJob:
 
 
 writing_job = SideJob()
-"""WritesFiles files, or estimates how large they will be."""
+"""Writes files, or estimates how large they will be."""
+
+
+def write_files(
+    smoke: bpy.types.Object, operator: str, words: list[str], complete: Callable[[bpy.types.Object], str | None]
+) -> None:
+    """Have the engine write files; without a window, wait for them.
+
+    Parameters
+    ----------
+    smoke, operator
+        What they are of, and the identifier of the operator that asks for them.
+    words
+        The engine's arguments.
+    complete
+        Called with the smoke when they are written; may return what is said of them in place of the engine's words.
+
+    Raises
+    ------
+    EngineMissingError, ShotError
+        If there is no engine, or, without a window, if it failed.
+    """
+
+    def end(smoke: bpy.types.Object, job: Job) -> None:
+        if job.outcome == "done":
+            writing_job.sentence = complete(smoke) or job.sentence
+
+    writing_job.start(smoke, (words, end), operator)
+    job = writing_job.job
+    if bpy.app.background:
+        writing_job.wait()
+        if job.outcome != "done":
+            raise ShotError(job.sentence)
 
 
 class SMOKELIFT_OT_stop_writing(bpy.types.Operator):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ADDON = Path(__file__).parents[2] / "addon"
-SAYING = {"label", "draw_text", "report", "operator", "progress", "poll_message_set", "refuse"}
+SAYING = {"label", "draw_text", "report", "operator", "progress", "poll_message_set"}
 TRANSLATING = {"iface_", "rpt_"}
 
 

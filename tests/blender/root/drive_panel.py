@@ -137,6 +137,7 @@ def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float
                 "bl_region_type": "UI",
                 "bl_category": "Smokelift",
                 "bl_label": of_smoke.bl_label,
+                "needs": of_smoke.needs,
                 "draw": of_smoke.draw,
             },
         )
