@@ -11,7 +11,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .box import engine_to_world
-from .nodes import Input, feed, file_group
+from .nodes import color, feed, file_group, number
 from .plate import plate_image, shown_background, synchronize_plate
 from .smoke import scene_of
 from .volume import shown_index
@@ -41,18 +41,11 @@ LARGEST_DIFFERENCE = 0.05
 """Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
 
 _INPUTS = (
-    Input("Render", "NodeSocketColor", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
-    Input(
-        "Plate",
-        "NodeSocketColor",
-        "What is behind the smoke: the clean plate, or another clip",
-        (0.0, 0.0, 0.0, 1.0),
-    ),
-    Input(
-        "Clip", "NodeSocketColor", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)
-    ),
-    Input("Foreground", "NodeSocketFloat", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
-    Input("Grain", "NodeSocketFloat", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
+    color("Render", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
+    color("Plate", "What is behind the smoke: the clean plate, or another clip", (0.0, 0.0, 0.0, 1.0)),
+    color("Clip", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)),
+    number("Foreground", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
+    number("Grain", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
 )
 
 SINCE_5 = bpy.app.version >= (5, 0, 0)

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from .blender import set_and_remember, set_unless_changed
-from .nodes import Input, add_node, file_group, math_node, scaled_vector, vector_node
+from .nodes import add_node, color, file_group, math_node, number, scaled_vector, vector_node
 
 NODE = "Smokelift"
 """Name of the node that holds the values; a material without it is the artist's own."""
@@ -27,65 +27,41 @@ MIN_RATIO = 1e-3
 """Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
 
 _INPUTS = (
-    Input("Density", "NodeSocketFloat", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
-    Input(
+    number("Density", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
+    number(
         "Brightness",
-        "NodeSocketFloat",
         "Below 1 darker; above 1 the fraction of light that the smoke absorbs is divided by this",
         1.0,
         0.0,
         1e3,
     ),
-    Input("Color", "NodeSocketColor", "Times the albedo: the color of the smoke in white light", (1.0, 1.0, 1.0, 1.0)),
-    Input("Edge Contrast", "NodeSocketFloat", "Above 1 thin smoke gets thinner, below 1 thicker", 1.0, 0.0, 10.0),
-    Input(
-        "Absorption Color", "NodeSocketColor", "Color of the light that gets through the smoke", (0.0, 0.0, 0.0, 1.0)
-    ),
-    Input(
+    color("Color", "Times the albedo: the color of the smoke in white light", (1.0, 1.0, 1.0, 1.0)),
+    number("Edge Contrast", "Above 1 thin smoke gets thinner, below 1 thicker", 1.0, 0.0, 10.0),
+    color("Absorption Color", "Color of the light that gets through the smoke", (0.0, 0.0, 0.0, 1.0)),
+    number(
         "Evaporation",
-        "NodeSocketFloat",
         "Smoke that is gone at the top of the clip's box, in Edge Densities: the higher it is the more of it, from its "
         "edges inwards",
         0.0,
         0.0,
         1e3,
     ),
-    Input("Anisotropy", "NodeSocketFloat", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
-    Input("Extinction", "NodeSocketFloat", "Per meter of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
-    Input("Albedo", "NodeSocketColor", "Scattered fraction of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
-    Input(
-        "Edge Density",
-        "NodeSocketFloat",
-        "Density below which smoke counts as thin: where Edge Contrast changes it",
-        0.1,
-        1e-9,
-        1e9,
-    ),
-    Input("Floor", "NodeSocketFloat", "Height in the smoke where evaporation begins; fitted", 0.0, -1e6, 1e6),
-    Input("Height", "NodeSocketFloat", "From there to where all of it counts; fitted", 1.0, 1e-6, 1e6),
-    Input(
+    number("Anisotropy", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
+    number("Extinction", "Per meter of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
+    color("Albedo", "Scattered fraction of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
+    number("Edge Density", "Density below which smoke counts as thin: where Edge Contrast changes it", 0.1, 1e-9, 1e9),
+    number("Floor", "Height in the smoke where evaporation begins; fitted", 0.0, -1e6, 1e6),
+    number("Height", "From there to where all of it counts; fitted", 1.0, 1e-6, 1e6),
+    number(
         "Flame Strength",
-        "NodeSocketFloat",
         "Times the light of the grid flame, if there is one; 1 is as bright as in the clip",
         1.0,
         0.0,
         1e6,
     ),
-    Input(
-        "Flame Color",
-        "NodeSocketColor",
-        "Color of the light of the grid flame; fitted to the clip",
-        (1.0, 0.35, 0.08, 1.0),
-    ),
-    Input("Blackbody Intensity", "NodeSocketFloat", "Glow of the grid temperature, if there is one", 1.0, 0.0, 1.0),
-    Input(
-        "Temperature",
-        "NodeSocketFloat",
-        "Kelvin that a value of 1 in the grid temperature stands for",
-        BLACKBODY_KELVIN,
-        0.0,
-        1e5,
-    ),
+    color("Flame Color", "Color of the light of the grid flame; fitted to the clip", (1.0, 0.35, 0.08, 1.0)),
+    number("Blackbody Intensity", "Glow of the grid temperature, if there is one", 1.0, 0.0, 1.0),
+    number("Temperature", "Kelvin that a value of 1 in the grid temperature stands for", BLACKBODY_KELVIN, 0.0, 1e5),
 )
 
 CONTROLS = tuple(item.name for item in _INPUTS[:7])

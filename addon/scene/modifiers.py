@@ -16,7 +16,7 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, add_node, file_group, get_input, input_path, math_node, set_input
+from .nodes import Input, add_node, file_group, get_input, input_path, math_node, number, set_input
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ GRIDS = ("density", "flame")
 _INTERPOLATION_INPUTS = (
     Input("Smoke", "NodeSocketGeometry", "The frame before"),
     Input("Next Frame", "NodeSocketObject", "Volume that plays the same files a frame earlier"),
-    Input("Part", "NodeSocketFloat", "How far it is from the frame before, 0, to the frame after, 1", 0.0, 0.0, 1.0),
-    Input("Seconds", "NodeSocketFloat", "From the frame before to the frame after", 1.0, 0.0),
+    number("Part", "How far it is from the frame before, 0, to the frame after, 1", 0.0, 0.0, 1.0),
+    number("Seconds", "From the frame before to the frame after", 1.0, 0.0),
 )
 
 
@@ -199,11 +199,11 @@ def _build_interpolation(tree: bpy.types.NodeTree) -> None:
     forth = math_node(tree, "MULTIPLY", 2, 8, given["Part"], given["Seconds"])
     back = math_node(tree, "MULTIPLY", 3, 9, math_node(tree, "MULTIPLY", 2, 9, rest, given["Seconds"]), -1.0)
     result = given["Smoke"]
-    for number, name in enumerate(GRIDS):
-        row = 4 * number
+    for place, name in enumerate(GRIDS):
+        row = 4 * place
         before = moved(given["Smoke"], name, row, forth, rest)
         mixed = math_node(tree, "ADD", 6, row, before, moved(later, name, row + 2, back, given["Part"]))
-        result = add_node(tree, "GeometryNodeStoreNamedGrid", 7 + number, row, result, name, mixed).outputs[0]
+        result = add_node(tree, "GeometryNodeStoreNamedGrid", 7 + place, row, result, name, mixed).outputs[0]
     add_node(tree, "NodeGroupOutput", 7 + len(GRIDS), 0, result)
 
 

@@ -20,6 +20,18 @@ class Input(NamedTuple):
     high: float | None = None
 
 
+def number(
+    name: str, description: str, default: float = 0.0, low: float | None = None, high: float | None = None
+) -> Input:
+    """An input that is a number."""
+    return Input(name, "NodeSocketFloat", description, default, low, high)
+
+
+def color(name: str, description: str, default: tuple[float, float, float, float]) -> Input:
+    """An input that is a color with alpha."""
+    return Input(name, "NodeSocketColor", description, default)
+
+
 def file_group(
     name: str,
     kind: str,

@@ -11,7 +11,7 @@ from mathutils import Matrix, Vector
 
 from .blender import set_unless_changed
 from .box import engine_to_world
-from .nodes import Input, add_node, file_group, math_node, vector_node
+from .nodes import Input, add_node, file_group, math_node, number, vector_node
 from .plate import show_plate
 from .smoke import scene_of
 from .volume import frames_before, shown_index
@@ -32,7 +32,7 @@ _INPUTS = (
     Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
     Input("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
     Input("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
-    Input("Perspective", "NodeSocketFloat", "1 for a perspective camera, 0 for an orthographic one"),
+    number("Perspective", "1 for a perspective camera, 0 for an orthographic one"),
 )
 
 CARD_BEHIND = 1.1
