@@ -13,8 +13,7 @@ Every take has the next free number, so no run overwrites another:
 One that is made of another take, which goes on after its clip, has another speed or repeats, has no scene file:
 
     take_0004.json    what is done, the other take, and the engine's further options
-    take_0004.stl     the meshes that are obstacles, if there are any
-    take_0004_####.stl  the same where they move, for every frame
+    take_0004_####.stl  the meshes that are obstacles, if there are any: for every frame as long as they move
 """
 
 from __future__ import annotations
@@ -78,19 +77,6 @@ class Take:
         """The thumbnail of the last frame."""
         return self.directory.with_suffix(".png")
 
-    @property
-    def mesh_file(self) -> Path:
-        """The obstacles of a take that is made of another one."""
-        return self.directory.with_suffix(".stl")
-
-    @property
-    def moving_mesh(self) -> Path:
-        """Obstacles that move: the pattern of numbered files."""
-        return self.directory.with_name(f"{self.directory.name}_####.stl")
-
-    def _moving_files(self) -> list[Path]:
-        return sorted(self.directory.parent.glob(f"{self.directory.name}_{'[0-9]' * 4}*.stl"))
-
     def copy_mask(self, drawn: Path) -> str:
         """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
 
@@ -138,10 +124,8 @@ class Take:
             If the folder cannot be written to.
         """
         request = _request(options, direction=direction, source=_relative_path(self.directory.parent, source.directory))
-        name = self.moving_mesh.name.replace("####", "{:04d}")
-        files = {self.directory.with_name(name.format(n)): content for n, content in enumerate(meshes)}
-        if len(meshes) == 1:
-            files = {self.mesh_file: meshes[0]}
+        name = self.directory.name
+        files = {self.directory.with_name(f"{name}_{n:04d}.stl"): content for n, content in enumerate(meshes)}
         self._write({**files, self.request_file: request})
 
     def _write(self, files: Mapping[Path, bytes]) -> None:
@@ -207,9 +191,10 @@ class Take:
         run = ["--out", str(self.directory), "--resume", "--progress", "json", *options]
         if direction is None or source is None:
             return ["reconstruct", str(self.scene_file), "--thumbnail", str(self.thumbnail_file), *run]
-        there = [(self.mesh_file, self.mesh_file.is_file()), (self.moving_mesh, bool(self._moving_files()))]
-        meshes = [word for mesh, is_there in there if is_there for word in ("--mesh", str(mesh))]
-        return [direction, str(source.directory), *run, *meshes]
+        for end in ("_####.stl", ".stl"):  # the second of an earlier version
+            if self._has(f"{self.directory.name}{end}"):
+                run += ["--mesh", f"{self.directory}{end}"]
+        return [direction, str(source.directory), *run]
 
     def give_title(self, title: str) -> None:
         """Give it a name; TakeError if its files are missing or damaged, or the name cannot be written."""

@@ -76,35 +76,26 @@ def test_a_redraw_reads_no_file_that_has_not_changed(tmp_path, monkeypatch) -> N
     assert take.size() > before[2]
 
 
-def test_what_is_made_of_a_take(tmp_path) -> None:
-    """It knows the other take, also after both were moved, and its obstacles; numbers may be below zero."""
+@pytest.mark.parametrize("meshes", [[b"mesh"], [b"one", b"two", b"three"]])
+def test_what_is_made_of_a_take(tmp_path, meshes) -> None:
+    """It knows the other take, also after both were moved, and its obstacles, still or moving."""
     source = begun(tmp_path / "old" / "first")
     take = new_take(tmp_path / "old" / "second")
     assert (take.read().direction, take.read().source) == (None, None)
-    take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], [b"mesh"])
+    take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], meshes)
     (tmp_path / "old").rename(tmp_path / "new")
     take, source = (Take(tmp_path / "new" / t.directory.relative_to(tmp_path / "old")) for t in (take, source))
     assert (take.read().direction, take.read().source, take.read().title) == ("continue", source, "Continued 1")
     arguments = take.arguments()
     assert arguments[:2] == ["continue", str(source.directory)]
-    assert arguments[arguments.index("--mesh") + 1] == str(take.mesh_file)
+    assert arguments[arguments.index("--mesh") + 1 :] == [str(take.directory) + "_####.stl"]
+    assert [path.read_bytes() for path in sorted(take.directory.parent.glob("*.stl"))] == meshes
+    assert new_take(take.directory.parent).directory.name == "take_0002"
     assert arguments[arguments.index("--wind") + 1] == "-1.5"
     assert "--resume" in arguments
     assert take.read().resumable
     take.give_title("Windy")
     assert (take.read().title, take.read().direction) == ("Windy", "continue")
-    take.remove()
-    assert list(take.directory.parent.iterdir()) == []
-
-
-def test_obstacles_that_move(tmp_path) -> None:
-    source = begun(tmp_path / "first")
-    take = new_take(tmp_path / "second")
-    take.write_directed("continue", source, ["--frames", "2"], [b"one", b"two", b"three"])
-    arguments = take.arguments()
-    assert arguments[arguments.index("--mesh") + 1 :] == [str(take.directory) + "_####.stl"]
-    assert [path.read_bytes() for path in sorted(take.directory.parent.glob("*.stl"))] == [b"one", b"two", b"three"]
-    assert new_take(take.directory.parent).directory.name == "take_0002"
     take.remove()
     assert list(take.directory.parent.iterdir()) == []
 
