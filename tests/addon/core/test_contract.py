@@ -31,10 +31,6 @@ from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 from smokelift_command import BAD_INPUT, CANCELLED, DONE
 
 
-def test_the_refusal_of_a_camera_that_travels_is_the_engines() -> None:
-    assert MOVING_CAMERA.startswith(contract.MOVING_CAMERA)
-
-
 def test_names_are_the_engines() -> None:
     """Exit statuses, files of a sequence and of an export, and the words of settings and provenance."""
     assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (DONE, BAD_INPUT, CANCELLED)
@@ -46,6 +42,7 @@ def test_names_are_the_engines() -> None:
     assert contract.MADE_UP in get_args(Source)
     assert contract.QUALITIES == QUALITIES
     assert sorted(contract.SIDES) == sorted(SIDES)
+    assert MOVING_CAMERA.startswith(contract.MOVING_CAMERA)
 
 
 def test_zips_are_called_as_they_are_built() -> None:

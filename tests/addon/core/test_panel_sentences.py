@@ -95,13 +95,9 @@ def test_a_match_before_a_background_that_may_hold_smoke_is_not_praised() -> Non
     assert "very good" in sentence(message, doubts=["cut"])
 
 
-def test_times_and_matches_in_words() -> None:
+def test_times_matches_and_frames_in_words() -> None:
+    assert "0" not in stopped(0)
     times = {0.2: "1 s", 59.4: "59 s", 59.6: "1 min 0 s", 387: "6 min 27 s", 7380: "2 h 3 min"}
     assert {seconds: spent(seconds) for seconds in times} == times
     matches = {41.0: "very good", 34.0: "very good", 33.9: "good", 9.0: "poor"}
     assert {psnr: match(psnr) for psnr in matches} == matches
-
-
-def test_what_a_cancelled_run_leaves_is_said() -> None:
-    assert stopped(7) == "Cancelled; finished frames stay: 7."
-    assert "0" not in stopped(0)

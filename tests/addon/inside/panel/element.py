@@ -67,14 +67,6 @@ def test_extract_shows_the_element_of_this_frame(shot, asked, tmp_path) -> None:
     assert [image.name for image in bpy.data.images if "element" in image.name] == [picture.name]
 
 
-def test_a_frame_without_the_clip_has_no_element(shot, asked) -> None:
-    clip = smoke(shot).smokelift.clip
-    clip.frame_start = 11
-    shot.frame_set(10)
-    with pytest.raises(RuntimeError, match=f"not seen in frame 10: go to one from 11 to {10 + clip.frame_duration}"):
-        bpy.ops.smokelift.extract()
-
-
 def test_render_element_writes_all_frames_that_are_used(shot, asked, tmp_path) -> None:
     settings = smoke(shot).smokelift
     settings.first, settings.last = 21, 32

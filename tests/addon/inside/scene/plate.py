@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from mathutils import Color
 
-from addon.core.take import Take
 from addon.panel import element_panel
 from addon.result.smoke_takes import output_folder
 from addon.scene import volume
 from addon.scene.blender import ShotError
-from addon.scene.scene_file import footage_tables, shot_tables
+from addon.scene.scene_file import footage_tables
 from conftest import changed, made, pixels, pixels_of, save_image
-from smokelift.scene import Background, Scene
+from smokelift.scene import Background
 from tests.addon.inside.panel.tab import drawn, know
 from tests.example_shot import EXAMPLE, smoke
 
@@ -28,7 +27,7 @@ def test_frames_without_smoke_are_the_plate(shot, tmp_path) -> None:
         shot.frame_set(frame)
         assert bpy.ops.smokelift.plate_from_frame() == {"FINISHED"}
     assert (settings.plate_mode, settings.plate_frames) == ("FRAMES", "3, 1")
-    assert footage_tables(smoke(shot))["background"] == {"frame": [3, 5]}
+    assert Background(**footage_tables(smoke(shot))["background"]).frame == (3, 5)
     assert bpy.ops.smokelift.clear_plate_frames() == {"FINISHED"}
     assert (settings.plate_mode, settings.plate_frames) == ("ESTIMATE", "")
     assert "background" not in footage_tables(smoke(shot))
@@ -41,9 +40,11 @@ def test_frames_that_the_clip_does_not_have_are_refused(shot) -> None:
         settings.plate_frames = text
         with pytest.raises(ShotError, match=said):
             footage_tables(smoke(shot))
-    shot.frame_set(-5)
-    with pytest.raises(RuntimeError, match="not seen in frame -5"):
-        bpy.ops.smokelift.plate_from_frame()
+    settings.clip.frame_start = 11
+    shot.frame_set(10)
+    for operator in (bpy.ops.smokelift.plate_from_frame, bpy.ops.smokelift.extract):
+        with pytest.raises(RuntimeError, match="not seen in frame 10: go to one from 11 to 58"):
+            operator()
     settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
     assert settings.plate_frames == ""
 
@@ -158,19 +159,8 @@ def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
 def test_other_images_are_strokes_too(shot, tmp_path) -> None:
     image = smoke(shot).smokelift.strokes = save_image(tmp_path / "mine.png", smoke(shot).smokelift.clip.size)
     paint(image, (0.3, 0.6, 0.3), 1.0, slice(4))
-    assert footage_tables(smoke(shot))["background"]["strokes"] == str(tmp_path / "mine.png")
+    assert Background(**footage_tables(smoke(shot))["background"]).strokes == tmp_path / "mine.png"
     assert pixels(tmp_path / "mine.png")[:4, :, 1] == pytest.approx(0.6, abs=0.01)
-
-
-def test_the_engine_reads_frames_and_strokes(shot, tmp_path) -> None:
-    smoke(shot).smokelift.output = str(tmp_path / "out")
-    bpy.ops.smokelift.paint_strokes()
-    bpy.ops.smokelift.plate_from_frame()
-    take = Take(tmp_path / "take_0001")
-    take.write(shot_tables(smoke(shot)), [])
-    background = Scene.load(take.scene_file).background
-    assert background.frame == (0,)
-    assert background.strokes == tmp_path / "out" / "strokes.png"
 
 
 def test_strokes_that_cannot_be_written_are_named(shot, tmp_path) -> None:

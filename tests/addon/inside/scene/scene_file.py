@@ -73,15 +73,11 @@ def test_points_fall_where_blender_sees_them(picture, tmp_path, size, fit, lens)
 
 
 @pytest.mark.parametrize("aspect", [(2.0, 1.0), (1.0, 1.5)])
-def test_pixels_that_are_not_square(picture, tmp_path, aspect) -> None:
+def test_pixels_that_are_not_square_and_a_camera_that_is_turned_scaled_and_parented(picture, tmp_path, aspect) -> None:
     scene = picture(320, 240)
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect
     scene.camera.data.shift_x = 0.1
     agree(scene, tmp_path)
-
-
-def test_a_camera_that_is_turned_scaled_and_parented(picture, tmp_path) -> None:
-    scene = picture(320, 240)
     parent = add(scene, "Parent", None)
     parent.location, parent.rotation_euler, parent.scale = (1.0, 2.0, 0.5), (0.0, 0.0, 0.3), (2.0, 2.0, 2.0)
     scene.camera.parent = parent
@@ -361,15 +357,10 @@ def panorama(shot, tmp_path):
     return node
 
 
-def test_a_world_picture(shot, panorama, tmp_path) -> None:
-    table = lights(shot)[-1]
-    rotation = pytest.approx(0.0)
-    image = str(tmp_path / "sky.exr")
-    assert table == {"type": "environment", "image": image, "rotation_degrees": rotation, "strength": 1.5}
-
-
-def test_a_world_picture_that_is_turned(shot, panorama) -> None:
+def test_a_world_picture_that_is_turned(shot, panorama, tmp_path) -> None:
     """The Mapping node's rotation is applied to the direction that is looked up; the box's comes before it."""
+    table = {"type": "environment", "image": str(tmp_path / "sky.exr"), "strength": 1.5}
+    assert lights(shot)[-1] == table | {"rotation_degrees": pytest.approx(0.0)}
     tree = shot.world.node_tree
     mapping = tree.nodes.new("ShaderNodeMapping")
     mapping.inputs["Rotation"].default_value[2] = math.radians(30.0)

@@ -172,9 +172,7 @@ def test_smoke_that_was_moved_stays_where_it_was_put(shot, tmp_path) -> None:
 def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     """Extinction, albedo and anisotropy that were fitted; clipping and velocity as the files need them."""
     obj = volume.show(smoke(shot), made(tmp_path))
-    (material,) = obj.data.materials
-    output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
-    inputs = output.inputs["Volume"].links[0].from_node.inputs
+    inputs = look.node_of(obj).inputs
     values = {name: inputs[name].default_value for name in ("Extinction", "Anisotropy", "Density", "Brightness")}
     assert values == {"Extinction": 4.0, "Anisotropy": pytest.approx(0.3), "Density": 1.0, "Brightness": 1.0}
     assert list(inputs["Albedo"].default_value) == pytest.approx([0.8, 0.8, 0.8, 1.0])
@@ -221,24 +219,16 @@ def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     assert volume.provenance_note(smoke(shot)) == ""
 
 
-def test_a_new_result_replaces_the_old_one_in_the_same_object(shot, tmp_path) -> None:
-    volume.show(smoke(shot), made(tmp_path))
-    before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
-    obj = volume.show(smoke(shot), made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
-    assert [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)] == before
-    assert "take_0002" in obj.data.filepath
-    assert obj.data.frame_duration == 3
-    shader = obj.data.materials[0].node_tree.nodes[look.NODE]
-    assert shader.inputs["Extinction"].default_value == 9.0
-
-
-def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
-    """What was changed of it and of the view, when the smoke is made anew; the rest is the new medium's."""
+def test_a_new_result_replaces_the_old_one_and_what_was_changed_of_its_material_stays(shot, tmp_path) -> None:
+    """Also what was changed of the view; the rest is the new medium's."""
     obj = volume.show(smoke(shot), made(tmp_path))
-    inputs = obj.data.materials[0].node_tree.nodes[look.NODE].inputs
+    inputs = look.node_of(obj).inputs
     inputs["Density"].default_value, inputs["Albedo"].default_value = 3.0, (1.0, 0.5, 0.2, 1.0)
     obj.data.display.density = 1.5
-    volume.show(smoke(shot), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
+    before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
+    volume.show(smoke(shot), made(tmp_path, frames=3, medium=Medium(9.0, 0.5, -0.2), number=2))
+    assert [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)] == before
+    assert "take_0002" in obj.data.filepath and obj.data.frame_duration == 3
     assert (inputs["Density"].default_value, inputs["Extinction"].default_value) == (3.0, 9.0)
     assert list(inputs["Albedo"].default_value) == pytest.approx([1.0, 0.5, 0.2, 1.0])
     assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
@@ -266,7 +256,7 @@ def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
     assert volume.shown_take(smoke(scene)) == Take(moved / "out" / "take_0001")
     assert plays(scene, 5) == 1
     assert plays(scene, 7) == 2
-    assert smoke(scene).data.materials[0].node_tree.nodes[look.NODE].inputs["Extinction"].default_value == 4.0
+    assert look.node_of(smoke(scene)).inputs["Extinction"].default_value == 4.0
 
 
 def reopened(folder: Path) -> bpy.types.Scene:
