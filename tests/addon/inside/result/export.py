@@ -5,7 +5,6 @@ import shutil
 from pathlib import Path
 
 import bpy
-import numpy as np
 import pytest
 
 from addon.core.take import Take
@@ -13,8 +12,7 @@ from addon.result import export, smoke_takes
 from addon.scene import look, volume
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.sequence import Sequence
-from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Camera, ClipSource, Domain, Medium, Scene, completed
+from tests.engine.direct.rising import SCENE, write_plume
 from tests.example_shot import EXAMPLE, smoke
 
 FRAMES = 3
@@ -26,22 +24,8 @@ def made(scene, tmp_path) -> bpy.types.Object:
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     obj = smoke(bpy.context.scene)
     obj.smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    described = completed(
-        Scene(
-            clip=ClipSource(EXAMPLE / "clip.mp4", 24.0),
-            camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(32, 48)),
-            domain=Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12)),
-            medium=Medium(3.0),
-            scattering="unshadowed",
-        )
-    )
-    rho = np.zeros((8, 8, 12), np.float32)
-    rho[2:6, 2:6, 1:8] = 0.7
-    faces = [np.full(shape, 0.1, np.float32) for shape in ((9, 8, 12), (8, 9, 12), (8, 8, 13))]
     take = Take(smoke_takes.output_folder(obj) / "take_0001")
-    with SequenceWriter(take.directory, described, {"quality": "draft"}) as writer:
-        for number in range(1, FRAMES + 1):
-            writer.write(number, rho, faces)
+    write_plume(take.directory, FRAMES)
     smoke_takes.present(obj, take)
     return obj
 
@@ -87,7 +71,7 @@ def test_blender_reads_the_usd_file(made, host, velocity) -> None:
     assert (data.is_sequence, data.frame_start, data.frame_duration) == (True, 1, FRAMES)
     assert grids(data, 2) == ("smoke_0002.vdb", {"density", velocity})
     assert (data.velocity_unit, data.velocity_grid) == ("SECOND", velocity)
-    assert look.node_of(obj).inputs["Extinction"].default_value == pytest.approx(3.0)
+    assert look.node_of(obj).inputs["Extinction"].default_value == pytest.approx(SCENE.medium.extinction)
     assert look.material_of(obj) != look.material_of(made)
 
 

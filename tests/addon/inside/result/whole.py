@@ -117,15 +117,6 @@ def test_a_shot_of_which_everything_is_given_is_made(shot, kept, tmp_path) -> No
     assert within > WANTED_DB
 
 
-def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
-    smoke(shot).smokelift.light_mode, smoke(shot).smokelift.plate_mode = "ESTIMATE", "ESTIMATE"
-    bpy.data.objects.remove(bpy.data.objects["Sun"])
-    make(shot, tmp_path / "out")
-    whole, within = look_alike(shot, tmp_path)
-    assert whole > WANTED_DB + 2
-    assert within > WANTED_DB - 3  # four frames of a standing plume say little about what is behind it
-
-
 def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None:
     """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead goes to it."""
     bpy.ops.mesh.primitive_cube_add(size=2.0)
@@ -134,7 +125,6 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     scene.frame_set(7)
     activate(smoke(scene), scene)
     smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    smoke(scene).smokelift.plate_mode, smoke(scene).smokelift.plate = "FILE", str(EXAMPLE / "plate.png")
     smoke(scene).smokelift.quality = "draft"
     job = make(scene, tmp_path / "out")
     assert job.outcome == "done"
@@ -147,8 +137,8 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     whole, within = look_alike(scene, tmp_path)
     assert lamp.hide_render and lamp.hide_viewport
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
-    assert whole > WANTED_DB + 5
-    assert within > WANTED_DB
+    assert whole > WANTED_DB + 2
+    assert within > WANTED_DB - 3  # four frames of a standing plume say little about what is behind it
     assert scene.camera.name == "Smokelift Camera"
 
 
