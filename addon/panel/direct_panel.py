@@ -156,9 +156,9 @@ class DirectSettings:
 
 
 @operator("Direct Smoke", needs_clip, needs_result, bl_options={"UNDO"})
-def direct(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def direct(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Make a new result of the one on show: longer, at another speed, or repeating. The one on show stays"""
-    run_queue.enqueue(context, smoke, smoke_takes.write_directed(smoke))
+    run_queue.enqueue(smoke, smoke_takes.write_directed(smoke))
 
 
 def _may_act(context: bpy.types.Context, smoke: bpy.types.Object) -> list[bpy.types.Object]:

@@ -4,7 +4,6 @@ from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.props import StringProperty
 
 from ..core.take import Take, TakeError
 from ..result import run_queue, smoke_takes
@@ -20,9 +19,9 @@ from .quality_panel import SEEDS, draw_check
 
 
 @operator("Make Smoke", needs_clip, bl_options={"UNDO"})
-def run(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def run(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
-    run_queue.enqueue(context, smoke, smoke_takes.write_take(smoke), settings_text(smoke))
+    run_queue.enqueue(smoke, smoke_takes.write_take(smoke), settings_text(smoke))
 
 
 def _needs_detail(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
@@ -31,7 +30,7 @@ def _needs_detail(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
 
 
 @operator("Another Variation", needs_clip, _needs_detail, bl_options={"UNDO"})
-def vary(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def vary(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Make the smoke again with the next variation: it looks the same from the camera, and different from the side"""
     before = smoke.smokelift.seed
     smoke.smokelift.seed = (before + 1) % SEEDS
@@ -40,43 +39,17 @@ def vary(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     except (ShotError, TakeError):
         smoke.smokelift.seed = before
         raise
-    run_queue.enqueue(context, smoke, take, settings_text(smoke))
+    run_queue.enqueue(smoke, take, settings_text(smoke))
 
 
 @operator("Resume", needs_clip)
-def resume(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def resume(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Resume the stopped run after its last finished frame, with its own settings"""
     take = smoke_takes.unfinished(smoke)
     if take is None or smoke_takes.busy(take):
         raise ShotError("No stopped run to resume: press Make Smoke.")
     smoke_takes.update_moved_files(smoke, take)
-    run_queue.enqueue(context, smoke, take)
-
-
-class SMOKELIFT_OT_cancel(bpy.types.Operator):
-    """Stop the run. Finished frames stay, and Resume continues after them"""
-
-    bl_idname = "smokelift.cancel"
-    bl_label = "Stop Making Smoke?"
-    bl_options = {"INTERNAL"}
-
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self.take:
-            return self.execute(context)
-        return context.window_manager.invoke_confirm(self, event)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        for run in list(runs):
-            if str(run.take.directory) != self.take and (self.take or run.job.outcome != "running"):
-                continue
-            if run.job.outcome == "waiting":  # it leaves nothing behind
-                run.take.remove_unless_begun()
-                runs.remove(run)
-            else:
-                run.job.cancel()
-        return {"FINISHED"}
+    run_queue.enqueue(smoke, take)
 
 
 def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -1,30 +1,30 @@
-"""The engine beside Blender: an operator that works through the queue of takes and shows their progress."""
+"""The engine beside Blender: a timer that works through the queue of takes and shows their progress."""
 
-import functools
 import time
 
 import bpy
 import bpy.utils.previews
 from bpy.app.handlers import persistent
+from bpy.props import BoolProperty, StringProperty
 
 from ..core.job import EngineMissingError, Job, engine_command
 from ..core.take import Take, TakeError
 from ..scene import volume
-from ..scene.blender import call_later, redraw, thread_options
+from ..scene.blender import call_later, cancel_call, redraw, thread_options
 from ..scene.smoke import active_smoke, find_smoke, scene_of
 from . import shot_check
 from .side_job import TICK_SECONDS
 from .smoke_takes import Run, runs, show_while_made
 
 
-def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
+def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
     """Append a take to the queue; without a window, wait for its end.
 
     EngineMissingError, TakeError if it cannot be made.
 
     Parameters
     ----------
-    context, smoke, take
+    smoke, take
         What is made.
     settings
         Those that it is made with, as `shot_check.settings_text` has them; empty if they are not the smoke's own.
@@ -39,169 +39,122 @@ def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take, set
     job = Job(words, take.log_file, volume.frames_before_take(smoke, take), done)
     runs[:] = [run for run in runs if run.smoke != uid or not run.job.ended]
     runs.append(Run(take, uid, job, (done, False), settings))
-    work(context)
+    work()
 
 
-def work(context: bpy.types.Context) -> None:
-    """Start the worker unless it runs."""
-    if bpy.app.background:
-        bpy.ops.smokelift.work("EXEC_DEFAULT")
+def work() -> None:
+    """Work through the queue; without a window, to its end."""
+    if not bpy.app.background:
+        call_later(_timer, 0.0)
         return
-    manager = context.window_manager
-    if _has_unregistered(manager):
-        call_later(_work_later, TICK_SECONDS)
-    elif not workers(manager):
-        # the first window exists as long as Blender does
-        with context.temp_override(window=manager.windows[0]):
-            bpy.ops.smokelift.work("INVOKE_DEFAULT")
+    while _tick():
+        time.sleep(TICK_SECONDS)
 
 
-def _work_later() -> None:
-    work(bpy.context)
+def _timer() -> float | None:
+    """Go on in the first window, which exists as long as Blender does: a timer has none."""
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        return TICK_SECONDS if _tick() else None
 
 
-def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
-    """The running worker, if any."""
-    running = [operator for window in manager.windows for operator in window.modal_operators]
-    return [operator for operator in running if _operator_name(operator) == SMOKELIFT_OT_work.__name__]
+def _tick() -> bool:
+    """Poll once; returns whether work remains."""
+    for run in runs:
+        if not run.job.ended and find_smoke(run.smoke) is None:
+            run.job.cancel()  # it has nowhere to go; undo brings the smoke back, and Resume goes on
+    run = running()
+    waiting = next((run for run in runs if run.job.outcome == "waiting"), None)
+    changed = run is not None and run.job.poll()
+    if changed and run.settings and run.job.forecast is not None and (smoke := find_smoke(run.smoke)) is not None:
+        shot_check.learn(smoke, run.settings, run.job)
+        run.settings = ""
+    if run is None and waiting is not None:
+        waiting.job.start()
+        changed = True
+    new = [run for run in runs if (run.job.done, run.job.ended) != run.shown]
+    if new and not bpy.app.is_job_running("RENDER"):  # its data must stay
+        for run in new:
+            _show(run)
+        new = []
+    if changed:
+        redraw()
+    remains = bool(new) or any(not run.job.ended for run in runs)
+    if not remains:
+        _remove_thumbnails()
+    return remains
 
 
-def _has_unregistered(manager: bpy.types.WindowManager) -> bool:
-    """Whether a window still lists an operator that was unregistered while it ran.
+def _show(run: Run) -> None:
+    """Show a run's frames in the viewport, and its end."""
+    smoke, job = find_smoke(run.smoke), run.job
+    created, said = 0, ""
+    if smoke is not None:
+        count = _datablocks()
+        if run.first:
+            run.before, run.first = volume.shown_take(smoke), False
+        if not run.left:
+            said = show_while_made(smoke, run.take, run.before, job.outcome)
+        created = _datablocks() - count
+        in_tab = smoke == active_smoke(scene_of(smoke))  # of another the artist sees nothing now
+        if run.before is None and in_tab and not run.seen:  # the artist may leave it afterwards
+            run.seen = _playing(bpy.context) or volume.go_to_smoke(smoke)
+    run.shown = job.done, job.ended
+    if not bpy.app.background:
+        run.icon = _thumbnail(run.take)
+        if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
+            # an undo to a step before new objects leaves Blender with dangling pointers
+            bpy.ops.ed.undo_push(message="Make Smoke")
+        if words := " ".join(filter(None, (said, job.sentence if job.ended else ""))):
+            bpy.ops.smokelift.tell("INVOKE_DEFAULT", words=words, failed=job.outcome == "failed")
 
-    It drops it with its next event. Blender crashes if another modal operator starts before that.
-    """
-    return any(_operator_name(operator) is None for window in manager.windows for operator in window.modal_operators)
 
+class SMOKELIFT_OT_tell(bpy.types.Operator):
+    """Say how a run goes as Blender does: only an operator that waits for an event can, and no timer"""
 
-def _operator_name(operator: bpy.types.Operator) -> str | None:
-    """The operator's name; None of one that was unregistered."""
-    try:
-        return str(operator.bl_idname)
-    except ValueError:
-        return None
-
-
-def _wait_for_unregistered(timer: bpy.types.Timer) -> float | None:
-    """Keep a timer that gives the first window events until no window lists an unregistered operator any more."""
-    manager = bpy.context.window_manager
-    if _has_unregistered(manager):
-        return TICK_SECONDS
-    manager.event_timer_remove(timer)
-    return None
-
-
-class SMOKELIFT_OT_work(bpy.types.Operator):
-    """Poll the engine ten times a second until the queue is empty"""
-
-    bl_idname = "smokelift.work"
+    bl_idname = "smokelift.tell"
     bl_label = "Smokelift"
     bl_options = {"INTERNAL"}
 
+    words: StringProperty()
+    failed: BoolProperty()
+
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Start the timer."""
-        self._thumbnails = bpy.utils.previews.new()
         self._timer = context.window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Poll on the timer, pass other events on; Esc asks whether to stop."""
-        if event.type == "ESC" and event.value == "PRESS" and running() and not _playing(context):
-            bpy.ops.smokelift.cancel("INVOKE_DEFAULT")
-            return {"RUNNING_MODAL"}
-        if event.type == "TIMER" and not self._tick(context):
-            self._end(context)
-            return {"FINISHED"}
-        return {"PASS_THROUGH"}
+    def modal(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.event_timer_remove(self._timer)
+        self.report({"ERROR" if self.failed else "INFO"}, self.words)
+        return {"FINISHED", "PASS_THROUGH"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Without a window: poll to the end."""
-        self._thumbnails = bpy.utils.previews.new()
-        self._timer = None
-        try:
-            while self._tick(context):
-                time.sleep(TICK_SECONDS)
-        finally:
-            self._end(context)
-        return {"FINISHED"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Blender quits or loads another file: end the engine; finished frames stay."""
-        self._end(context)
+_thumbnails: list[bpy.utils.previews.ImagePreviewCollection] = []
+"""The pictures of the runs while the queue is worked through: one collection, or none."""
 
-    def _end(self, context: bpy.types.Context) -> None:
-        for run in runs:
-            run.icon = 0
-            waits = run.job.outcome == "waiting"
-            run.job.kill()
-            if waits and find_smoke(run.smoke) is not None:  # a deleted one may come back
-                run.take.remove_unless_begun()
-        bpy.utils.previews.remove(self._thumbnails)
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
 
-    def _tick(self, context: bpy.types.Context) -> bool:
-        """Poll once; returns whether work remains."""
-        for run in runs:
-            if not run.job.ended and find_smoke(run.smoke) is None:
-                run.job.cancel()  # it has nowhere to go; undo brings the smoke back, and Resume goes on
-        run = running()
-        waiting = next((run for run in runs if run.job.outcome == "waiting"), None)
-        changed = run is not None and run.job.poll()
-        if changed and run.settings and run.job.forecast is not None and (smoke := find_smoke(run.smoke)) is not None:
-            shot_check.learn(smoke, run.settings, run.job)
-            run.settings = ""
-        if run is None and waiting is not None:
-            waiting.job.start()
-            changed = True
-        new = [run for run in runs if (run.job.done, run.job.ended) != run.shown]
-        if new and not bpy.app.is_job_running("RENDER"):  # its data must stay
-            for run in new:
-                self._show(run)
-            new = []
-        if changed:
-            redraw()
-        return bool(new) or any(not run.job.ended for run in runs)
+def _thumbnail(take: Take) -> int:
+    """The icon of the take's thumbnail; 0 if there is none."""
+    if not take.thumbnail_file.is_file():
+        return 0
+    if not _thumbnails:
+        _thumbnails.append(bpy.utils.previews.new())
+    image = bpy.data.images.load(str(take.thumbnail_file))
+    try:
+        name = str(take.directory)
+        preview = _thumbnails[0].get(name) or _thumbnails[0].new(name)
+        preview.image_size = image.size
+        preview.image_pixels_float = image.pixels[:]
+    finally:
+        bpy.data.images.remove(image)
+    return preview.icon_id
 
-    def _show(self, run: Run) -> None:
-        """Show a run's frames in the viewport, and its end."""
-        smoke, job = find_smoke(run.smoke), run.job
-        created, said = 0, ""
-        if smoke is not None:
-            count = _datablocks()
-            if run.first:
-                run.before, run.first = volume.shown_take(smoke), False
-            if not run.left:
-                said = show_while_made(smoke, run.take, run.before, job.outcome)
-            created = _datablocks() - count
-            in_tab = smoke == active_smoke(scene_of(smoke))  # of another the artist sees nothing now
-            if run.before is None and in_tab and not run.seen:  # the artist may leave it afterwards
-                run.seen = _playing(bpy.context) or volume.go_to_smoke(smoke)
-        run.shown = job.done, job.ended
-        if not bpy.app.background:
-            run.icon = self._thumbnail(run.take)
-            if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
-                # an undo to a step before new objects leaves Blender with dangling pointers
-                bpy.ops.ed.undo_push(message="Make Smoke")
-            if said:
-                self.report({"INFO"}, said)
-            if job.ended:
-                self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
 
-    def _thumbnail(self, take: Take) -> int:
-        """The icon of the take's thumbnail; 0 if there is none."""
-        if not take.thumbnail_file.is_file():
-            return 0
-        image = bpy.data.images.load(str(take.thumbnail_file))
-        try:
-            name = str(take.directory)
-            preview = self._thumbnails.get(name) or self._thumbnails.new(name)
-            preview.image_size = image.size
-            preview.image_pixels_float = image.pixels[:]
-        finally:
-            bpy.data.images.remove(image)
-        return preview.icon_id
+def _remove_thumbnails() -> None:
+    for run in runs:
+        run.icon = 0
+    while _thumbnails:
+        bpy.utils.previews.remove(_thumbnails.pop())
 
 
 def running() -> Run | None:
@@ -218,21 +171,59 @@ def _playing(context: bpy.types.Context) -> bool:
 
 
 @persistent
-def _forget_all(_file: str = "") -> None:
-    """Forget the runs of the file that was open before."""
+def _stop_all(_file: str = "") -> None:
+    """End the engine, as another file is loaded; finished frames stay."""
+    cancel_call(_timer)
+    for run in runs:
+        waits = run.job.outcome == "waiting"
+        run.job.kill()
+        if waits and find_smoke(run.smoke) is not None:  # a deleted one may come back
+            run.take.remove_unless_begun()
+    _remove_thumbnails()
     runs.clear()
 
 
-HANDLERS = ((bpy.app.handlers.load_post, _forget_all),)
+class SMOKELIFT_OT_cancel(bpy.types.Operator):
+    """Stop the run. Finished frames stay, and Resume continues after them"""
+
+    bl_idname = "smokelift.cancel"
+    bl_label = "Stop Making Smoke?"
+    bl_options = {"INTERNAL"}
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Without a take, as Esc has none, ask whether to stop; Esc ends an animation that plays first."""
+        if self.take:
+            return self.execute(context)
+        if running() is None or _playing(context):
+            return {"CANCELLED", "PASS_THROUGH"}
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for run in list(runs):
+            if str(run.take.directory) != self.take and (self.take or run.job.outcome != "running"):
+                continue
+            if run.job.outcome == "waiting":  # it leaves nothing behind
+                run.take.remove_unless_begun()
+                runs.remove(run)
+            else:
+                run.job.cancel()
+        return {"FINISHED"}
+
+
+HANDLERS = ((bpy.app.handlers.load_pre, _stop_all),)
+
+
+def register() -> None:
+    """Give Esc to the operator that asks, where nothing else takes it; without a window there are no keys."""
+    keys = bpy.context.window_manager.keyconfigs.addon
+    if keys is not None:
+        keymap = keys.keymaps.new("Window")
+        register.key = keymap, keymap.keymap_items.new(SMOKELIFT_OT_cancel.bl_idname, "ESC", "PRESS")
 
 
 def unregister() -> None:
-    """End the worker and its jobs."""
-    manager = bpy.context.window_manager
-    running = workers(manager)
-    for worker in running:
-        worker.cancel(bpy.context)
-    runs.clear()
-    if running:
-        timer = manager.event_timer_add(TICK_SECONDS, window=manager.windows[0])
-        bpy.app.timers.register(functools.partial(_wait_for_unregistered, timer), first_interval=TICK_SECONDS)
+    _stop_all()
+    if key := register.__dict__.pop("key", None):
+        key[0].keymap_items.remove(key[1])

@@ -60,7 +60,7 @@ def test_the_frame_stays_where_another_smoke_gets_its_first_result(scene, clip, 
         made(take.directory.parent)
         obj.smokelift.camera_mode = "SCENE"  # of which these files have none
         scene.frame_set(40)
-        run_queue.work(bpy.context)
+        run_queue.work()
         assert volume.shown_take(obj) == take
         assert scene.frame_current in ((frame,) if frame == 40 else (1, 2))
 
@@ -76,7 +76,7 @@ def obj(scene, clip, tmp_path) -> bpy.types.Object:
 def test_runs_follow_one_another_and_a_failed_one_stops_none(obj, tmp_path) -> None:
     journal = tmp_path / "journal"
     written = queued(obj, 3, ENGINE, str(journal))
-    run_queue.work(bpy.context)
+    run_queue.work()
     found = [(run.job.outcome, run.job.sentence) for run in runs]
     assert found == [("done", "Done."), ("failed", "No clip."), ("done", "Done.")]
     first, second, third = (take.directory for take in written)
@@ -89,7 +89,7 @@ def test_a_deleted_smoke_is_made_no_more(scene, obj) -> None:
     assert find_smoke(obj.session_uid) == obj
     scene.collection.objects.unlink(obj)
     assert find_smoke(obj.session_uid) is None
-    run_queue.work(bpy.context)
+    run_queue.work()
     assert runs[0].job.outcome == "cancelled"
     assert take.read().resumable
 
