@@ -26,7 +26,7 @@ from types import ModuleType
 def register() -> None:
     """Register all classes, properties and handlers.
 
-    EngineMissingError if the zip is for another Blender, which its preferences show when they enable the add-on.
+    ShotError if the zip is for another Blender, which its preferences show when they enable the add-on.
     """
     from .core.job import require_fitting_zip
 

@@ -23,6 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from . import ShotError
 from .contract import BLENDERS, CANCELLED, PLATFORMS, ZIP_FILE
 from .sentences import REPLACED, advice, sentence, stopped
 
@@ -56,14 +57,10 @@ runpy.run_module("smokelift_command.tethered", run_name="__main__", alter_sys=Tr
 """
 
 
-class EngineMissingError(RuntimeError):
-    """The engine is not installed."""
-
-
 def engine_command(arguments: Sequence[str]) -> list[str]:
     """The command that runs the engine with this Python, isolated from the user's Python environment.
 
-    EngineMissingError if the engine is not installed, or another Python's.
+    ShotError if the engine is not installed, or another Python's.
     """
     require_fitting_zip()
     shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
@@ -73,7 +70,7 @@ def engine_command(arguments: Sequence[str]) -> list[str]:
     elif found is not None and found.origin is not None:
         folders = [Path(found.origin).parents[1]]
     else:
-        raise EngineMissingError("Smokelift's engine is missing: install the extension again.")
+        raise ShotError("Smokelift's engine is missing: install the extension again.")
     return [sys.executable, "-I", "-c", _START, os.pathsep.join(map(str, folders)), *arguments]
 
 
@@ -82,7 +79,7 @@ def require_fitting_zip() -> None:
 
     Raises
     ------
-    EngineMissingError
+    ShotError
         With the name of the zip that fits.
     """
     pythons = sorted(folder.name.removeprefix("python") for folder in HOME.glob("python3.*"))
@@ -99,10 +96,10 @@ def require_fitting_zip() -> None:
     zip_is = " ".join([*platforms, *(f"with Python {python}" for python in pythons)])
     this = f"{own_platform} with Python {own_python}"
     if own_python not in BLENDERS or system not in PLATFORMS:
-        raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}, for which there is none.")
+        raise ShotError(f"This zip is for {zip_is}, and this Blender is {this}, for which there is none.")
     names = {"blenders": BLENDERS[own_python], "platform": own_platform.replace("-", "_")}
     name = ZIP_FILE.format(version=manifest.get("version", "*"), **names)
-    raise EngineMissingError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
+    raise ShotError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
 
 
 def _processor() -> str:

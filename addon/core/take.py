@@ -30,6 +30,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from . import ShotError
 from .contract import DIRECTIONS, INDEX_FILE
 
 OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance")
@@ -45,10 +46,6 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
 """A number or a range of frames; never an option."""
 
 _NAME = re.compile(r"take_(\d{4,})")
-
-
-class TakeError(ValueError):
-    """A take whose files cannot be written or read; says why in one sentence."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ class Take:
 
         Raises
         ------
-        TakeError
+        ShotError
             If the folder cannot be written to.
         """
         beside = self.directory.name
@@ -98,7 +95,7 @@ class Take:
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options.
 
-        TakeError if the folder cannot be written to.
+        ShotError if the folder cannot be written to.
         """
         self._write({self.scene_file: toml_text(tables).encode(), self.request_file: _request(options)})
 
@@ -120,7 +117,7 @@ class Take:
 
         Raises
         ------
-        TakeError
+        ShotError
             If the folder cannot be written to.
         """
         request = _request(options, direction=direction, source=_relative_path(self.directory.parent, source.directory))
@@ -134,7 +131,7 @@ class Take:
             for file, content in files.items():
                 file.write_bytes(content)
         except OSError as error:
-            raise TakeError(
+            raise ShotError(
                 f"{self.directory.parent} cannot be written to ({error.strerror}): choose another output folder."
             ) from error
 
@@ -153,7 +150,7 @@ class Take:
 
         Raises
         ------
-        TakeError
+        ShotError
             If the scene file is damaged or cannot be written.
         """
         try:
@@ -165,7 +162,7 @@ class Take:
                     tables[table][key] = str(path)
                     moved = True
         except (OSError, ValueError, AttributeError) as error:
-            raise TakeError(f"{self.scene_file} is missing or damaged: make the smoke again.") from error
+            raise ShotError(f"{self.scene_file} is missing or damaged: make the smoke again.") from error
         if moved:
             self._write({self.scene_file: toml_text(tables).encode()})
 
@@ -177,17 +174,17 @@ class Take:
     def arguments(self) -> list[str]:
         """The engine's arguments, which start this take or resume it.
 
-        TakeError if its files are missing or damaged, or hold an option that does not decide its result.
+        ShotError if its files are missing or damaged, or hold an option that does not decide its result.
         """
         now = self.read()
         direction, source, options = now.direction, now.source, now.options
         if options is None:
-            raise TakeError(f"{self.request_file} is missing or damaged: make the smoke again.")
+            raise ShotError(f"{self.request_file} is missing or damaged: make the smoke again.")
         known = OPTIONS if direction is None else DIRECTIONS[direction]
         for word in options:
             # the file may come with somebody else's project, and must not choose what is written where
             if word.startswith("-") and word.partition("=")[0] not in known and not _NUMBER.fullmatch(word):
-                raise TakeError(f"{self.request_file} asks for {word!r}, which no shot does: make the smoke again.")
+                raise ShotError(f"{self.request_file} asks for {word!r}, which no shot does: make the smoke again.")
         run = ["--out", str(self.directory), "--resume", "--progress", "json", *options]
         if direction is None or source is None:
             return ["reconstruct", str(self.scene_file), "--thumbnail", str(self.thumbnail_file), *run]
@@ -197,11 +194,11 @@ class Take:
         return [direction, str(source.directory), *run]
 
     def give_title(self, title: str) -> None:
-        """Give it a name; TakeError if its files are missing or damaged, or the name cannot be written."""
+        """Give it a name; ShotError if its files are missing or damaged, or the name cannot be written."""
         try:
             self._change_request("title", title)
         except (OSError, ValueError, TypeError, RecursionError) as error:
-            raise TakeError(f"{self.request_file} cannot be changed, so the result keeps its name.") from error
+            raise ShotError(f"{self.request_file} cannot be changed, so the result keeps its name.") from error
 
     def note_file(self, blend: Path) -> None:
         """Keep in mind that a .blend may show it, where it can be written; one of an earlier version knows of none."""

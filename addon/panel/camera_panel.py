@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
-from ..scene.blender import ShotError
+from ..core import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
 from ..scene.floor import Floor
 from ..scene.plate import show_clip_behind

@@ -14,10 +14,11 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core import ShotError
 from ..result import smoke_takes
 from ..result.shot_check import state
 from ..scene import shot_setup
-from ..scene.blender import ShotError, absolute, frame_rate, relative
+from ..scene.blender import absolute, frame_rate, relative
 from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke

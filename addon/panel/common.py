@@ -6,12 +6,10 @@ from typing import Any, ClassVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from ..core import ShotError
 from ..core.contract import SIDES
-from ..core.job import EngineMissingError
-from ..core.take import TakeError
 from ..result.side_job import writing_job
 from ..scene import volume
-from ..scene.blender import ShotError
 from ..scene.smoke import active_smoke
 
 EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
@@ -19,7 +17,7 @@ EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
 
 
 Act = Callable[[bpy.types.Context, bpy.types.Object], None]
-"""Does something with the active smoke; ShotError, TakeError or EngineMissingError if something is in the way."""
+"""Does something with the active smoke; ShotError if something is in the way."""
 
 Need = Callable[[bpy.types.Context, bpy.types.Object | None], str]
 """Why something cannot be done now with the active smoke, or without one; empty where it can."""
@@ -65,13 +63,13 @@ class ActsOnSmoke(Needing):
         cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        """Do it; ShotError or TakeError if something is in the way."""
+        """Do it; ShotError if something is in the way."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             self.act(context, active_smoke(context.scene))
-        except (ShotError, TakeError, EngineMissingError) as error:
+        except ShotError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}

@@ -8,9 +8,9 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
+from ..core import ShotError
 from ..core.take import Take
 from ..result.shot_check import state
-from ..scene.blender import ShotError
 from .common import ActsOnSmoke, needs_clip, operator
 
 DRAWN_SECONDS = 0.3

@@ -10,10 +10,11 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 
+from ..core import ShotError
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.side_job import write_files
-from ..scene.blender import ShotError, relative
+from ..scene.blender import relative
 from ..scene.clip import number_in_file, shown_frame
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables

@@ -3,8 +3,8 @@
 import bpy
 from bpy.props import EnumProperty
 
+from ..core import ShotError
 from ..scene import look, volume
-from ..scene.blender import ShotError
 from ..scene.modifiers import in_viewport, proxy_modifier
 from ..scene.smoke import is_override, smoke_with_look
 from .common import ChangesScene, needs_result, sub_panels

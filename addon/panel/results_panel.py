@@ -7,12 +7,13 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
+from ..core import ShotError
 from ..core.sentences import disk_size
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
-from ..scene.blender import ShotError, absolute, redraw
+from ..scene.blender import absolute, redraw
 from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, sub_panels
 from .layout import draw_text
 

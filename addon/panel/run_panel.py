@@ -5,12 +5,12 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.take import Take, TakeError
+from ..core import ShotError
+from ..core.take import Take
 from ..result import run_queue, smoke_takes
 from ..result.shot_check import settings_text
 from ..result.smoke_takes import Run, runs
 from ..scene import volume
-from ..scene.blender import ShotError
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import find_smoke
 from .common import needs_clip, operator
@@ -36,7 +36,7 @@ def vary(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     smoke.smokelift.seed = (before + 1) % SEEDS
     try:
         take = smoke_takes.write_take(smoke)
-    except (ShotError, TakeError):
+    except ShotError:
         smoke.smokelift.seed = before
         raise
     run_queue.enqueue(smoke, take, settings_text(smoke))

@@ -4,8 +4,8 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, PointerProperty
 
+from ..core import ShotError
 from ..scene import shot_setup, volume
-from ..scene.blender import ShotError
 from ..scene.plate import clip_behind
 from .common import ChangesScene, needs_clip, needs_result, sub_panels
 

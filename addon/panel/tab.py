@@ -4,8 +4,8 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
+from ..core import ShotError
 from ..result import smoke_takes
-from ..scene.blender import ShotError
 from ..scene.smoke import activate, active_smoke, smokes
 from . import preferences
 from .camera_panel import draw_shot

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import bpy
 
+from ..core import ShotError
 from ..core.contract import BAD_INPUT, CANCELLED, DONE
-from ..core.job import EngineMissingError, Job, engine_command
-from ..core.take import TakeError
+from ..core.job import Job, engine_command
 from ..scene import volume
-from ..scene.blender import ShotError, thread_options
+from ..scene.blender import thread_options
 from ..scene.clip import number_in_file, unseen_pictures, use_frames
 from ..scene.shot_setup import has_denoiser
 from ..scene.smoke import activate, active_smoke, new_smoke, smokes
@@ -46,7 +46,7 @@ def main(words: Sequence[str]) -> int:
         before = volume.frames_before_take(smoke, take)
         words = engine_command(take.arguments() + thread_options())
         job = Job(words, take.log_file, before, take.read().frames)
-    except (ShotError, TakeError, EngineMissingError) as error:
+    except ShotError as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT
     _wait(job)

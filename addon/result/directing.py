@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from mathutils import Matrix, Vector
 
+from ..core import ShotError
 from ..core.contract import SHORTEST, SIDES
 from ..scene import volume
-from ..scene.blender import ShotError, at_frame
+from ..scene.blender import at_frame
 from ..scene.smoke import scene_of
 
 BLOWING = ("WIND", "FORCE")

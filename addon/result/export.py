@@ -11,8 +11,9 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ..core import ShotError
 from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
-from ..core.job import EngineMissingError, Job
+from ..core.job import Job
 from ..core.sentences import disk_size
 from ..scene import volume
 from ..scene.blender import absolute, call_later, relative
@@ -44,7 +45,7 @@ class SizeEstimate:
             return
         try:
             writing_job.start(smoke, ([*arguments(smoke), "--size"], self._store))
-        except EngineMissingError as error:
+        except ShotError as error:
             self._size = str(error)
 
     def _store(self, _smoke: bpy.types.Object, job: Job) -> None:

@@ -7,8 +7,9 @@ import bpy.utils.previews
 from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, StringProperty
 
-from ..core.job import EngineMissingError, Job, engine_command
-from ..core.take import Take, TakeError
+from ..core import ShotError
+from ..core.job import Job, engine_command
+from ..core.take import Take
 from ..scene import volume
 from ..scene.blender import call_later, cancel_call, redraw, thread_options
 from ..scene.smoke import active_smoke, find_smoke, scene_of
@@ -20,7 +21,7 @@ from .smoke_takes import Run, runs, show_while_made
 def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
     """Append a take to the queue; without a window, wait for its end.
 
-    EngineMissingError, TakeError if it cannot be made.
+    ShotError if it cannot be made.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
     """
     try:
         words = engine_command(take.arguments() + thread_options())
-    except (EngineMissingError, TakeError):
+    except ShotError:
         take.remove_unless_begun()
         raise
     shot_check.make_way()

@@ -15,9 +15,10 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core.job import EngineMissingError, Job
-from ..core.take import Take, TakeError
-from ..scene.blender import ShotError, absolute, call_later, cancel_call, redraw, thread_options
+from ..core import ShotError
+from ..core.job import Job
+from ..core.take import Take
+from ..scene.blender import absolute, call_later, cancel_call, redraw, thread_options
 from ..scene.box import box_corners, box_of
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
@@ -213,7 +214,7 @@ def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
                 state.error = job.sentence
 
         check_job.start(smoke, (["inspect", str(take.scene_file), "--page", str(page), *words], store))
-    except (ShotError, TakeError, EngineMissingError) as error:
+    except ShotError as error:
         check_job.stop()
         state.error = str(error)
 

@@ -11,8 +11,9 @@ from typing import ClassVar
 import bpy
 from bpy.app.handlers import persistent
 
+from ..core import ShotError
 from ..core.job import Job, engine_command
-from ..scene.blender import ShotError, call_later, redraw, thread_options
+from ..scene.blender import call_later, redraw, thread_options
 from ..scene.smoke import find_smoke
 
 TICK_SECONDS = 0.1
@@ -67,7 +68,7 @@ class SideJob:
         return self.job is not None and bool(self.operator)
 
     def start(self, smoke: bpy.types.Object, request: Request, operator: str = "") -> None:
-        """Start the engine; EngineMissingError if there is none."""
+        """Start the engine; ShotError if there is none."""
         self.stop()
         words, self._end = request
         self.smoke, self.operator, self.sentence, self.doubts = smoke.session_uid, operator, "", []
@@ -127,7 +128,7 @@ def write_files(
 
     Raises
     ------
-    EngineMissingError, ShotError
+    ShotError
         If there is no engine, or, without a window, if it failed.
     """
 

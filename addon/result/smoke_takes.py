@@ -10,10 +10,11 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..core import ShotError
 from ..core.job import Job, Outcome
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import ShotError, absolute, preferred_output_folder, relative
+from ..scene.blender import absolute, preferred_output_folder, relative
 from ..scene.clip import clip_path
 from ..scene.scene_file import options as engine_options
 from ..scene.scene_file import shot_tables
@@ -122,7 +123,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
 
     Raises
     ------
-    ShotError, TakeError
+    ShotError
         If the shot is unusable, or the folder cannot be written to.
     """
     tables = shot_tables(smoke)
@@ -137,7 +138,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
 def write_directed(smoke: bpy.types.Object) -> Take:
     """Write the files of a new take that is made of the one on show.
 
-    ShotError, TakeError if a setting or an object cannot be used, or the folder cannot be written to.
+    ShotError if a setting or an object cannot be used, or the folder cannot be written to.
     """
     source = volume.shown_take(smoke)
     if source is None:
@@ -210,7 +211,7 @@ def _note_file(*used: Take) -> None:
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
     """Write today's paths of clip, mask, plate and strokes into a resumed take's scene file, if the project was moved.
 
-    TakeError if its files are damaged.
+    ShotError if its files are damaged.
     """
     settings = smoke.smokelift
     if take.read().direction is None:

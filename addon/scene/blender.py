@@ -63,10 +63,6 @@ _drawn_at = 0.0
 """When the tab was drawn last because something counted in it (s)."""
 
 
-class ShotError(ValueError):
-    """A shot that the engine cannot run; says in one sentence what to do."""
-
-
 @contextmanager
 def at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
     """The scene evaluated in a frame; restores the current frame afterwards."""

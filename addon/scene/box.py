@@ -7,8 +7,8 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from ..core import ShotError
 from ..core.contract import BOX_VOXELS, MIN_VOXELS
-from .blender import ShotError
 from .smoke import scene_of
 
 ROUNDING = 1e-5

@@ -7,7 +7,8 @@ import bpy
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix, Vector
 
-from .blender import ShotError, at_frame
+from ..core import ShotError
+from .blender import at_frame
 from .clip import start_frame
 from .smoke import scene_of
 

@@ -5,9 +5,10 @@ from typing import Any
 
 import bpy
 
+from ..core import ShotError
 from ..core.contract import PANORAMA_SUFFIXES
 from ..core.image_sequence import ImageSequence, image_sequence_from
-from .blender import ShotError, absolute, frame_rate
+from .blender import absolute, frame_rate
 from .smoke import scene_of
 
 TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Matrix, Vector
 
-from .blender import ShotError, at_frame
+from ..core import ShotError
+from .blender import at_frame
 from .box import box_of, sides_of
 from .camera import camera_table, scene_camera
 from .clip import start_frame

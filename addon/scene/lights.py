@@ -6,8 +6,9 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from ..core import ShotError
 from ..core.contract import PANORAMA_SUFFIXES
-from .blender import ShotError, absolute
+from .blender import absolute
 
 
 def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> list[dict[str, Any]]:

@@ -11,7 +11,8 @@ from typing import Any
 
 import bpy
 
-from .blender import ShotError, absolute
+from ..core import ShotError
+from .blender import absolute
 from .clip import frame_count
 from .pictures import picture_scene
 from .smoke import scene_of

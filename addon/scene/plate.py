@@ -8,8 +8,9 @@ from typing import Any
 import bpy
 from mathutils import Color, Vector
 
+from ..core import ShotError
 from . import volume
-from .blender import ShotError, absolute, relative
+from .blender import absolute, relative
 from .clip import frame_count, number_in_file
 from .strokes import saved_strokes
 

@@ -11,8 +11,9 @@ from typing import Any
 import bpy
 from mathutils import Matrix
 
+from ..core import ShotError
 from ..core.contract import IMAGE_SUFFIXES, SIDES
-from .blender import ShotError, at_frame
+from .blender import at_frame
 from .box import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, keep_camera_outside
 from .camera import camera_over_frames
 from .clip import clip_table, start_frame

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 import numpy.typing as npt
 
-from .blender import ShotError, absolute
+from ..core import ShotError
+from .blender import absolute
 
 SATURATION = 0.25
 """Fraction of the frame's saturation that is kept below the strokes."""

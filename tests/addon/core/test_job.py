@@ -15,8 +15,9 @@ import pytest
 
 import addon
 import smokelift_command
+from addon.core import ShotError
 from addon.core import job as module
-from addon.core.job import EngineMissingError, Job, engine_command
+from addon.core.job import Job, engine_command
 
 PATIENCE = 30.0
 
@@ -285,7 +286,7 @@ def test_the_engine_gets_its_arguments_and_its_own_folder(own_engine, log, monke
 
 def test_no_engine(monkeypatch) -> None:
     monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(EngineMissingError, match="missing"):
+    with pytest.raises(ShotError, match="missing"):
         engine_command([])
 
 
@@ -322,7 +323,7 @@ def test_the_zip_for_another_blender_is_not_enabled(tmp_path, monkeypatch, folde
         assert str(tmp_path / folder) in engine_command([])
         return
     for ask in (addon.register, lambda: engine_command([])):
-        with pytest.raises(EngineMissingError, match=said):
+        with pytest.raises(ShotError, match=said):
             ask()
 
 

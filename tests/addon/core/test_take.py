@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from addon.core.take import Take, TakeError, new_take, takes
+from addon.core import ShotError
+from addon.core.take import Take, new_take, takes
 
 TABLES = {"clip": {"path": "/a b/clip.mp4", "frames": [0, 9]}}
 
@@ -115,7 +116,7 @@ def test_what_is_made_of_a_take(tmp_path, meshes) -> None:
 def test_nothing_but_what_decides_the_result_reaches_the_engine(tmp_path, request_, said) -> None:
     take = begun(tmp_path)
     take.request_file.write_text(request_ if isinstance(request_, str) else json.dumps(request_))
-    with pytest.raises(TakeError, match=said):
+    with pytest.raises(ShotError, match=said):
         take.arguments()
 
 
@@ -137,13 +138,13 @@ def test_a_scene_file_is_told_where_its_files_went(tmp_path) -> None:
     tables["clip"] = {"path": str(tmp_path / "clip.mp4"), "mask": str(tmp_path / "mask.png")}
     assert tomllib.loads(take.scene_file.read_text()) == tables
     take.scene_file.write_text("[clip")
-    with pytest.raises(TakeError, match="smoke again"):
+    with pytest.raises(ShotError, match="smoke again"):
         take.update_moved_files(files)
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(TakeError, match="cannot be written to"):
+    with pytest.raises(ShotError, match="cannot be written to"):
         Take(tmp_path / "file" / "take_0001").write(TABLES, [])
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from addon.core import ShotError
 from addon.core.take import Take, takes
 from addon.result import directing, smoke_takes
 from addon.scene import volume
-from addon.scene.blender import ShotError
 from addon.scene.smoke import activate, smokes
 from conftest import changed, known_run
 from smokelift.direct import BoxObstacle, Mesh

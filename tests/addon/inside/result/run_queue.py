@@ -6,7 +6,8 @@ from unittest.mock import Mock
 import bpy
 import pytest
 
-from addon.core.job import EngineMissingError, Job
+from addon.core import ShotError
+from addon.core.job import Job
 from addon.core.take import Take, takes
 from addon.result import run_queue, smoke_takes
 from addon.result.smoke_takes import Run, runs
@@ -106,7 +107,7 @@ def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(obj, tmp_path) -> N
 
 
 def test_what_cannot_be_started_is_not_queued(obj, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(run_queue, "engine_command", Mock(side_effect=EngineMissingError("It is missing.")))
+    monkeypatch.setattr(run_queue, "engine_command", Mock(side_effect=ShotError("It is missing.")))
     with pytest.raises(RuntimeError, match="missing"):
         bpy.ops.smokelift.run()
     assert runs == takes(tmp_path / "takes") == []

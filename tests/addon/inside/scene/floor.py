@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from addon.scene.blender import ShotError
+from addon.core import ShotError
 from addon.scene.floor import Floor
 from addon.scene.scene_file import shot_tables
 from smokelift.density.axis import depth_at

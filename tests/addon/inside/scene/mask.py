@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.core import ShotError
 from addon.core.take import Take
 from addon.result import shot_check, smoke_takes
-from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables, shot_tables
 from conftest import pixels
 from smokelift.footage.clip import Clip

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from mathutils import Color
 
+from addon.core import ShotError
 from addon.panel import element_panel
 from addon.result.smoke_takes import output_folder
 from addon.scene import volume
-from addon.scene.blender import ShotError
 from addon.scene.scene_file import footage_tables
 from conftest import changed, made, pixels, pixels_of, save_image
 from smokelift.scene import Background

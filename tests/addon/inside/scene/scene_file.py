@@ -9,9 +9,9 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Euler, Matrix, Vector
 
+from addon.core import ShotError
 from addon.core.contract import BOX_VOXELS
 from addon.core.take import Take
-from addon.scene.blender import ShotError
 from addon.scene.box import box_corners, engine_to_world
 from addon.scene.scene_file import options, shot_tables
 from conftest import save_image
