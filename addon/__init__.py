@@ -14,8 +14,8 @@ It knows nothing of the engine but its command line and its files. Its folders i
   result), `shot_check` (the forecast of a run), `directing` (what acts on the smoke after its clip), `export`, `follow`
   (paths of a .blend that is saved elsewhere), `command_line`.
 - `panel`: `tab`, whose parts are `clip_panel`, `camera_panel`, `quality_panel` and `run_panel`; the sub-panels in files
-  of their names; `properties` (the settings), `layout` (what the panels share), `editors` (what is shown elsewhere in
-  Blender), and `preferences`, which Blender calls so.
+  of their names; `properties` (the settings) with `settings` (how they are declared), `common` (what operators and
+  panels need) and `layout` (rows that are drawn alike), `editors` (what is shown elsewhere in Blender), `preferences`.
 
 ``batch.py`` is the command line as a script.
 """

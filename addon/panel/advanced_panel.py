@@ -1,30 +1,30 @@
 """The sub-panel Advanced: settings that most shots leave as they are, and what was assumed."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty
 
 from ..result.shot_check import found_lines, state
 from ..scene.modifiers import CAN_INTERPOLATE
 from .common import needs_clip, speed_changed, sub_panels
-from .layout import draw_automatic
+from .layout import draw_automatic, draw_settings
+from .settings import choice, tick
 
 
 class PlaybackSettings:
     """How a result is played."""
 
-    speed: EnumProperty(
-        name="Speed",
-        description="Speed of the smoke if clip and scene differ in frame rate",
-        items=[
+    speed: choice(
+        "Speed",
+        "Speed of the smoke if clip and scene differ in frame rate",
+        [
             ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
             ("REAL", "Real Time", "As fast as in reality"),
         ],
         update=speed_changed,
     )
-    between: BoolProperty(
-        name="Frames Between",
-        description="At another speed than the clip's, compute what lies between two frames with their velocity, while "
-        "it is shown and rendered. Blender can do so since 5.0",
+    between: tick(
+        "Frames Between",
+        "At another speed than the clip's, compute what lies between two frames with their velocity, while it is "
+        "shown and rendered. Blender can do so since 5.0",
         update=speed_changed,
     )
 
@@ -35,16 +35,9 @@ def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smok
     row.active = settings.camera_mode == "SCENE"
     draw_automatic(row, settings, "longest_side")
     draw_automatic(layout, settings, "fps")
-    for name in ("transfer", "speed"):
-        layout.prop(settings, name)
-    if CAN_INTERPOLATE:
-        layout.prop(settings, "between")
-    for name in ("device", "use_medium"):
-        layout.prop(settings, name)
-    column = layout.column()
-    column.active = settings.use_medium
-    for name in ("extinction", "albedo", "anisotropy"):
-        column.prop(settings, name)
+    draw_settings(layout, settings, "transfer", "speed", *(["between"] if CAN_INTERPOLATE else []))
+    draw_settings(layout, settings, "device", "use_medium")
+    draw_settings(layout, settings, "extinction", "albedo", "anisotropy", active=settings.use_medium)
     if state.fits(smoke) and state.done:
         for line in found_lines(state.details.get("facts", ())):
             layout.label(text=line, translate=False)

@@ -2,7 +2,6 @@
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
@@ -12,8 +11,9 @@ from ..scene.floor import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ChangesScene, Needing, automatic_unless, closed_sides, needs_clip, needs_smoke, operator
+from .common import ChangesScene, Needing, needs_clip, needs_smoke, operator
 from .layout import draw_automatic, draw_closed
+from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
 USUAL_DISTANCE = 2.0
 """Meters from which a distance is given by hand where there is no box."""
@@ -34,21 +34,13 @@ def _middle_of_box(settings: bpy.types.PropertyGroup) -> float:
     return max(0.0, -(box.matrix_world.translation - pose.translation).dot(pose.col[2].to_3d())) or USUAL_DISTANCE
 
 
-def _is_mesh(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    return obj.type == "MESH"
-
-
-def _is_empty(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    return obj.type == "EMPTY"
-
-
 class ShotSettings:
     """Where the clip was filmed from, the box of its smoke, and what lights it."""
 
-    camera_mode: EnumProperty(
-        name="Camera",
-        description="Where the clip was filmed from",
-        items=[
+    camera_mode: choice(
+        "Camera",
+        "Where the clip was filmed from",
+        [
             (
                 "ESTIMATE",
                 "From the Clip",
@@ -57,62 +49,55 @@ class ShotSettings:
             ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
         ],
     )
-    box: PointerProperty(
-        name="Box",
-        description="Box that holds all of the smoke. A smaller box gives a finer result",
-        type=bpy.types.Object,
-        poll=_is_mesh,
+    box: link(
+        "Box",
+        "Box that holds all of the smoke. A smaller box gives a finer result",
+        bpy.types.Object,
+        poll=lambda _settings, obj: obj.type == "MESH",
         update=_box_chosen,
     )
-    inlet: PointerProperty(
-        name="Inlet",
-        description=("Empty at the smoke's source, as large as the opening. Without one, sources are estimated"),
-        type=bpy.types.Object,
-        poll=_is_empty,
+    inlet: link(
+        "Inlet",
+        "Empty at the smoke's source, as large as the opening. Without one, sources are estimated",
+        bpy.types.Object,
+        poll=lambda _settings, obj: obj.type == "EMPTY",
     )
-    distance: FloatProperty(
-        name="Distance",
-        description="Distance from the camera to the lower end of the smoke, level and straight ahead; automatic is "
-        "estimated. With Camera From the Clip it sets the scale",
+    distance: number(
+        "Distance",
+        "Distance from the camera to the lower end of the smoke, level and straight ahead; automatic is estimated. "
+        "With Camera From the Clip it sets the scale",
         subtype="DISTANCE",
-        default=0.0,
         min=0.0,
     )
     use_distance: automatic_unless("distance", "Distance", _middle_of_box)
     closed: closed_sides(
         "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
     )
-    light_mode: EnumProperty(
-        name="Light",
-        description="What lights the smoke in the clip",
-        items=[
+    light_mode: choice(
+        "Light",
+        "What lights the smoke in the clip",
+        [
             ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
             ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
         ],
     )
-    use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties")
-    extinction: FloatProperty(
-        name="Extinction",
-        description="Extinction coefficient per meter of smoke of density 1",
+    use_medium: tick("Smoke Material", "Set the smoke's optical properties")
+    extinction: number(
+        "Extinction",
+        "Extinction coefficient per meter of smoke of density 1",
         default=5.0,
         min=0.001,
         max=1e9,
         soft_max=50.0,
     )
-    albedo: FloatProperty(
-        name="Albedo",
-        description="Scattered fraction of the extinction: 1 is white steam, 0 is black soot",
+    albedo: number(
+        "Albedo",
+        "Scattered fraction of the extinction: 1 is white steam, 0 is black soot",
         default=0.9,
         min=0.0,
         max=1.0,
     )
-    anisotropy: FloatProperty(
-        name="Anisotropy",
-        description="Forward scattering above 0, backward scattering below",
-        default=0.0,
-        min=-0.95,
-        max=0.95,
-    )
+    anisotropy: number("Anisotropy", "Forward scattering above 0, backward scattering below", min=-0.95, max=0.95)
 
 
 def _needs_camera(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:

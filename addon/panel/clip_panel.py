@@ -5,14 +5,7 @@ import os
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import (
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..result import smoke_takes
@@ -23,9 +16,10 @@ from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, u
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
-from .common import ChangesScene, ChoosesFile, automatic_unless, needs_clip, operator
+from .common import ChangesScene, ChoosesFile, needs_clip, operator
 from .editors import open_tab
 from .layout import draw_text
+from .settings import automatic_unless, choice, link, number, string, vector, whole
 
 UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
 """Settings that a clip of the same frames keeps."""
@@ -51,89 +45,67 @@ def _background_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Co
 class ClipSettings:
     """The clip, what is behind its smoke, and where its smoke may be."""
 
-    clip: PointerProperty(
-        name="Clip",
-        description="Footage of smoke: a video or an image sequence",
-        type=bpy.types.MovieClip,
-        update=_clip_chosen,
-    )
-    first: IntProperty(
-        name="First",
-        description="First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
+    clip: link("Clip", "Footage of smoke: a video or an image sequence", bpy.types.MovieClip, update=_clip_chosen)
+    first: whole(
+        "First",
+        "First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
         default=1,
         min=1,
     )
-    last: IntProperty(
-        name="Last",
-        description="Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
+    last: whole(
+        "Last",
+        "Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
         default=1,
         min=1,
     )
-    plate_mode: EnumProperty(
-        name="Background",
-        description="The picture without smoke",
-        items=[
+    plate_mode: choice(
+        "Background",
+        "The picture without smoke",
+        [
             ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
-            (
-                "FILE",
-                "Clean Plate",
-                "Picture of the same view without smoke; for a moving camera, one for each frame",
-            ),
+            ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
             ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
             ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
         ],
         update=_background_chosen,
     )
-    plate_color: FloatVectorProperty(
-        name="Background Color",
-        description="Color of all that is behind the smoke",
-        subtype="COLOR",
-        default=(0.0, 0.0, 0.0),
-        min=0.0,
-        soft_max=1.0,
+    plate_color: vector(
+        "Background Color", "Color of all that is behind the smoke", subtype="COLOR", min=0.0, soft_max=1.0
     )
-    plate: StringProperty(
-        name="Clean Plate",
-        description=(
-            "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, "
-            "with one image for each frame of the clip"
-        ),
+    plate: string(
+        "Clean Plate",
+        "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, with "
+        "one image for each frame of the clip",
     )
-    plate_frames: StringProperty(
-        name="Frames",
-        description="Frames of the clip without smoke, counted from 1 and separated by commas",
+    plate_frames: string("Frames", "Frames of the clip without smoke, counted from 1 and separated by commas")
+    strokes: link(
+        "Strokes",
+        "Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel shows the "
+        "background. Nothing is said of the rest, which is transparent",
+        bpy.types.Image,
     )
-    strokes: PointerProperty(
-        name="Strokes",
-        description="Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel "
-        "shows the background. Nothing is said of the rest, which is transparent",
-        type=bpy.types.Image,
+    drawn_mask: link(
+        "Mask",
+        "Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is inverted, and "
+        "nowhere else, whatever moves there",
+        bpy.types.Mask,
     )
-    drawn_mask: PointerProperty(
-        name="Mask",
-        description="Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is "
-        "inverted, and nowhere else, whatever moves there",
-        type=bpy.types.Mask,
+    mask: string(
+        "Mask File",
+        "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
+        "mask_####.png, with one for each frame of the clip",
     )
-    mask: StringProperty(
-        name="Mask File",
-        description=(
-            "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
-            "mask_####.png, with one for each frame of the clip"
-        ),
-    )
-    fps: FloatProperty(
-        name="Frame Rate",
-        description="Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",
-        default=0.0,
+    fps: number(
+        "Frame Rate",
+        "Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",
         min=0.0,
         soft_max=1000.0,
     )
     use_fps: automatic_unless("fps", "Frame Rate", 120.0)
-    transfer: EnumProperty(
-        name="Color Space",
-        description="Color space of the clip",
-        items=[
+    transfer: choice(
+        "Color Space",
+        "Color space of the clip",
+        [
             ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
             ("srgb", "sRGB", "Ordinary video and pictures"),
             ("linear", "Linear Rec.709", "Proportional to light"),

@@ -4,10 +4,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..core import ShotError
-from ..core.contract import SIDES
 from ..result.side_job import writing_job
 from ..scene import volume
 from ..scene.smoke import active_smoke
@@ -40,7 +39,7 @@ def needs_rest(_context: bpy.types.Context, _smoke: bpy.types.Object | None) -> 
 
 
 class Needing:
-    """What Blender offers only where its needs are met, of which each counts after those before it."""
+    """What Blender offers only where nothing that it needs is missing; the first that is says so."""
 
     needs: Sequence[Need] = ()
 
@@ -161,27 +160,6 @@ def sub_panels(name: str, label: str, draw: Draw, *needs: Need) -> tuple[type, .
             {**both, "bl_space_type": space, "bl_parent_id": f"SMOKELIFT_PT_{editor}", "draw": draw_panel},
         )
         for editor, space in EDITORS.items()
-    )
-
-
-def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
-    """A tick for a number that is chosen automatically where it is 0; ticked, the number begins with ``start``.
-
-    It keeps nothing of its own, so it cannot contradict the number.
-    """
-    return BoolProperty(
-        name=label,
-        description=f"Choose {label} by hand; otherwise it is automatic",
-        get=lambda settings: getattr(settings, name) > 0,
-        set=lambda settings, on: setattr(settings, name, (start(settings) if callable(start) else start) if on else 0),
-    )
-
-
-def closed_sides(description: str, **options: Any) -> Any:
-    """A row of buttons, one for each side of the box."""
-    items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
-    return EnumProperty(
-        name="Closed Sides", description=description, items=items, options={"ANIMATABLE", "ENUM_FLAG"}, **options
     )
 
 

@@ -4,23 +4,14 @@ from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
 from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import (
-    ChangesScene,
-    automatic_unless,
-    closed_sides,
-    needs_clip,
-    needs_result,
-    operator,
-    speed_changed,
-    sub_panels,
-)
-from .layout import draw_automatic, draw_closed, draw_progress, draw_ticked
+from .common import ChangesScene, needs_clip, needs_result, operator, speed_changed, sub_panels
+from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
+from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
 LINES = 11
 """Lines of the longest direction: the others are as high, or the panel's buttons would move under the pointer."""
@@ -46,107 +37,84 @@ def _part_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context)
 def _speed(name: str, description: str, default: float) -> Any:
     """A speed, of which 1 is the clip's own."""
     limits = {"min": SLOWEST, "max": FASTEST, "soft_max": 4.0}
-    return FloatProperty(name=name, description=description, default=default, update=speed_changed, **limits)
+    return number(name, description, default=default, update=speed_changed, **limits)
 
 
 class DirectSettings:
     """What is made of the result on show."""
 
-    direction: EnumProperty(
-        name="Direction",
-        description="What is made of the result on show",
-        items=[
+    direction: choice(
+        "Direction",
+        "What is made of the result on show",
+        [
             ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
             ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
             ("loop", "Loop", "Repeat the smoke without a seam"),
         ],
     )
-    frames: IntProperty(name="Frames", description="Number of frames to add", default=48, min=1, max=100_000)
-    fade: IntProperty(name="Fade", description="Frames at the end in which the smoke fades to nothing", min=0)
-    use_start: BoolProperty(
-        name="Start",
-        description="Simulate from a frame of the clip on, in place of the frames that follow it",
-        update=_start_chosen,
+    frames: whole("Frames", "Number of frames to add", default=48, min=1, max=100_000)
+    fade: whole("Fade", "Frames at the end in which the smoke fades to nothing", min=0)
+    use_start: tick(
+        "Start", "Simulate from a frame of the clip on, in place of the frames that follow it", update=_start_chosen
     )
-    start: IntProperty(
-        name="Start", description="Last frame that stays as it is, counted as Frames of the clip", default=1
-    )
+    start: whole("Start", "Last frame that stays as it is, counted as Frames of the clip", default=1)
     closed: closed_sides("Sides of the result's box, along its own axes, that are walls for the frames that are added")
-    room: FloatProperty(
-        name="Room",
-        description="How many times as large as the result's box the smoke may become. Its box grows where smoke goes; "
-        "smoke that would need more dissolves before the box ends. 1 keeps the box",
+    room: number(
+        "Room",
+        "How many times as large as the result's box the smoke may become. Its box grows where smoke goes; smoke that "
+        "would need more dissolves before the box ends. 1 keeps the box",
         default=8.0,
         min=1.0,
         soft_max=64.0,
         max=4096.0,
         precision=1,
     )
-    use_buoyancy: BoolProperty(
-        name="Buoyancy", description="Choose Buoyancy by hand; otherwise it is that of the clip's smoke"
-    )
-    buoyancy: FloatProperty(
-        name="Buoyancy",
-        description="Upward acceleration of smoke of density 1 in the clip's own scale; below zero it sinks",
+    use_buoyancy: tick("Buoyancy", "Choose Buoyancy by hand; otherwise it is that of the clip's smoke")
+    buoyancy: number(
+        "Buoyancy",
+        "Upward acceleration of smoke of density 1 in the clip's own scale; below zero it sinks",
         unit="ACCELERATION",
         default=1.0,
         soft_min=-10.0,
         soft_max=10.0,
     )
-    use_dissipation: BoolProperty(
-        name="Dissipation", description="Choose Dissipation by hand; otherwise it is that of the clip's smoke"
-    )
-    dissipation: FloatProperty(
-        name="Dissipation",
-        description="How fast smoke dissolves, per second: 0 keeps it, at 1 a third is left after a second",
-        default=0.0,
+    use_dissipation: tick("Dissipation", "Choose Dissipation by hand; otherwise it is that of the clip's smoke")
+    dissipation: number(
+        "Dissipation",
+        "How fast smoke dissolves, per second: 0 keeps it, at 1 a third is left after a second",
         min=0.0,
         soft_max=5.0,
     )
-    effectors: PointerProperty(
-        name="Effectors",
-        description=(
-            "Collection of what acts on the smoke: closed meshes, which may be animated, are obstacles; Wind "
-            "and Turbulence force fields are wind and turbulence. An Empty, a Force field or a Wind field with "
-            "Max Distance is a fan, which blows along its Z axis. Strength is m/s"
-        ),
-        type=bpy.types.Collection,
+    effectors: link(
+        "Effectors",
+        "Collection of what acts on the smoke: closed meshes, which may be animated, are obstacles; Wind and "
+        "Turbulence force fields are wind and turbulence. An Empty, a Force field or a Wind field with Max Distance "
+        "is a fan, which blows along its Z axis. Strength is m/s",
+        bpy.types.Collection,
     )
-    fan_speed: FloatProperty(
-        name="Fan Speed",
-        description="Velocity of the air in Empties that have no force field",
+    fan_speed: number(
+        "Fan Speed",
+        "Velocity of the air in Empties that have no force field",
         unit="VELOCITY",
         default=1.0,
         soft_min=-10.0,
         soft_max=10.0,
     )
     speed: _speed("Speed", "Speed of the smoke: 0.5 is half as fast", 0.5)
-    use_ramp: BoolProperty(
-        name="Ramp",
-        description="Change the speed from the first frame to the middle and to the last",
-        update=speed_changed,
-    )
+    use_ramp: tick("Ramp", "Change the speed from the first frame to the middle and to the last", update=speed_changed)
     speed_middle: _speed("Middle", "Speed in the middle of the result", 0.5)
     speed_end: _speed("End", "Speed at the last frame", 1.0)
-    live: BoolProperty(
-        name="Preview",
-        description="Play the result on show at this speed now. Retime Smoke, or Frames Between in Advanced, makes the "
-        "frames in between",
+    live: tick(
+        "Preview",
+        "Play the result on show at this speed now. Retime Smoke, or Frames Between in Advanced, makes the frames in "
+        "between",
         update=speed_changed,
     )
-    use_part: BoolProperty(
-        name="Part",
-        description="Loop a part of the result, in which the smoke is steady",
-        update=_part_chosen,
-    )
-    part_first: IntProperty(
-        name="First", description="First frame of the part, counted as Frames of the clip", default=1
-    )
-    part_last: IntProperty(name="Last", description="Last frame of the part, counted as Frames of the clip", default=48)
-    overlap: IntProperty(
-        name="Overlap",
-        description="Frames in which the end becomes the start; automatic is a third of the loop, 24 at most",
-        min=0,
+    use_part: tick("Part", "Loop a part of the result, in which the smoke is steady", update=_part_chosen)
+    part_first: whole("First", "First frame of the part, counted as Frames of the clip", default=1)
+    part_last: whole("Last", "Last frame of the part, counted as Frames of the clip", default=48)
+    overlap: whole(
+        "Overlap", "Frames in which the end becomes the start; automatic is a third of the loop, 24 at most", min=0
     )
     use_overlap: automatic_unless("overlap", "Overlap", 12)
 
@@ -202,8 +170,7 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
 
 def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
     """The settings of a direction; returns the number of their lines."""
-    layout.prop(settings, "frames")
-    layout.prop(settings, "fade")
+    draw_settings(layout, settings, "frames", "fade")
     draw_ticked(layout, settings, "use_start", "start")
     draw_automatic(layout, settings, "buoyancy")
     draw_automatic(layout, settings, "dissipation")
@@ -211,24 +178,16 @@ def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     draw_closed(layout, settings)
     layout.prop(settings, "effectors")
     layout.operator("smokelift.add_effectors", icon="ADD")
-    row = layout.row()
-    row.active = settings.effectors is not None
-    row.prop(settings, "fan_speed")
+    draw_settings(layout, settings, "fan_speed", active=settings.effectors is not None)
     return LINES
 
 
 def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
-    layout.prop(settings, "speed")
-    layout.prop(settings, "use_ramp")
-    column = layout.column()
-    column.active = settings.use_ramp
-    column.prop(settings, "speed_middle")
-    column.prop(settings, "speed_end")
+    draw_settings(layout, settings, "speed", "use_ramp")
+    draw_settings(layout, settings, "speed_middle", "speed_end", active=settings.use_ramp)
     layout.prop(settings, "live")
     if CAN_INTERPOLATE:
-        row = layout.row()
-        row.active = settings.live
-        row.prop(settings.id_data.smokelift, "between")
+        draw_settings(layout, settings.id_data.smokelift, "between", active=settings.live)
     return 6 if CAN_INTERPOLATE else 5
 
 

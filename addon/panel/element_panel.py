@@ -8,7 +8,6 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty
 
 from ..core import ShotError
 from ..core.take import Take
@@ -23,6 +22,7 @@ from ..scene.strokes import lay_below, new_strokes, saved_strokes
 from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, sub_panels
 from .editors import open_tab, show_image
 from .layout import draw_text, draw_work
+from .settings import choice
 
 STROKES_FILE = "strokes.png"
 """Name of the image in the folder of the smoke's results."""
@@ -70,10 +70,10 @@ class SMOKELIFT_OT_stroke(bpy.types.Operator):
     bl_label = "Stroke"
     bl_options = {"INTERNAL"}
 
-    means: EnumProperty(
-        name="Means",
-        description="What is painted",
-        items=[
+    means: choice(
+        "Means",
+        "What is painted",
+        [
             ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
             ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
             ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),

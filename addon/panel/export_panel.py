@@ -1,49 +1,47 @@
 """The sub-panel Export: the settings of an export, and the buttons for that, for a proxy and for a copy in time."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
 from ..result.side_job import write_files
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
 from .common import Needing, needs_rest, needs_result, operator, sub_panels
-from .layout import draw_text, draw_work
+from .layout import draw_settings, draw_text, draw_work
+from .settings import choice, string, tick, whole
 
 
 class ExportSettings:
     """What is exported of a smoke."""
 
-    folder: StringProperty(
-        name="Folder",
-        description="Folder for the export; by default export_ and the program's name, beside the results",
+    folder: string(
+        "Folder",
+        "Folder for the export; by default export_ and the program's name, beside the results",
         subtype="DIR_PATH",
         options=PATH_OPTIONS,
     )
-    host: EnumProperty(
-        name="For",
-        description="Program that reads the files",
-        items=[
+    host: choice(
+        "For",
+        "Program that reads the files",
+        [
             ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
             ("houdini", "Houdini", "Y up, grids density and vel"),
             ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
         ],
     )
-    precision: EnumProperty(
-        name="Precision",
-        description="Bits of each value. Smoke too thin to be seen is left out either way",
-        items=[
+    precision: choice(
+        "Precision",
+        "Bits of each value. Smoke too thin to be seen is left out either way",
+        [
             ("half", "Half", "Floats of 16 bits"),
             ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
         ],
     )
-    use_velocity: BoolProperty(
-        name="Velocity", description="Export the velocity, which motion blur needs", default=True
-    )
-    proxy: EnumProperty(
-        name="Proxy",
-        description="Second, coarser sequence for the viewports of those who get the export",
-        items=[
+    use_velocity: tick("Velocity", "Export the velocity, which motion blur needs", default=True)
+    proxy: choice(
+        "Proxy",
+        "Second, coarser sequence for the viewports of those who get the export",
+        [
             ("1", "None", "No proxy"),
             ("2", "1/2", "Half the resolution, an eighth of the voxels"),
             ("4", "1/4", "A quarter of the resolution"),
@@ -75,8 +73,7 @@ def make_proxy(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift_export
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
-    for name in ("host", "precision", "use_velocity", "proxy"):
-        layout.prop(settings, name)
+    draw_settings(layout, settings, "host", "precision", "use_velocity", "proxy")
     draw_text(layout, context, size_estimate.size(smoke), "DISK_DRIVE")
     draw_work(layout, context, smoke, "smokelift.export", "EXPORT")
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
@@ -98,10 +95,8 @@ class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = (_needs_sequence,)
 
-    offset: IntProperty(
-        name="Time Offset", description="Frames by which the new object plays later; below 0 earlier", default=12
-    )
-    repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
+    offset: whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12)
+    repeat: tick("Repeat", "Play the frames again and again, as for a loop")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = context.object

@@ -27,6 +27,14 @@ def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, n
     return row
 
 
+def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, *names: str, active: bool = True) -> None:
+    """Settings one below the other, gray where they count for nothing."""
+    column = layout.column()
+    column.active = active
+    for name in names:
+        column.prop(settings, name)
+
+
 def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """A button for each side of the box, below the name of the row: beside it their names would be cut off."""
     column = layout.column(align=True)

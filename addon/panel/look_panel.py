@@ -1,7 +1,6 @@
 """The sub-panel Look: presets, the artist's inputs of the material, and how the viewport shows the smoke."""
 
 import bpy
-from bpy.props import EnumProperty
 
 from ..core import ShotError
 from ..scene import look, volume
@@ -9,13 +8,14 @@ from ..scene.modifiers import in_viewport, proxy_modifier
 from ..scene.smoke import is_override, smoke_with_look
 from .common import ChangesScene, needs_result, sub_panels
 from .layout import draw_text, draw_work
+from .settings import choice
 
 SHORT = {"Absorption Color": "Absorption"}
 """Names of inputs that the sidebar would cut off."""
 
 
 def _needs_look(context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    """A smoke that has a look, also one that another file is linked for."""
+    """Also a smoke that is linked from another file can be changed so."""
     return "" if is_override(smoke_with_look(context.scene)) else needs_result(context, smoke)
 
 
@@ -25,10 +25,8 @@ class SMOKELIFT_OT_use_look(ChangesScene, bpy.types.Operator):
     bl_label = "Use Look"
     needs = (_needs_look,)
 
-    preset: EnumProperty(
-        name="Preset",
-        description="Kind of smoke",
-        items=[(key, name, description) for key, (name, description, _) in look.PRESETS.items()],
+    preset: choice(
+        "Preset", "Kind of smoke", [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
     )
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
-from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ..core.contract import QUALITIES
 from ..scene.blender import PACKAGE
 from ..scene.smoke import is_smoke
-from .common import Needing, automatic_unless
-from .layout import draw_automatic
+from .common import Needing
+from .layout import draw_automatic, draw_settings
+from .settings import automatic_unless, choice, string, whole
 
 MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
 """The manual, which the extension brings along."""
@@ -41,21 +41,17 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    output: StringProperty(
-        name="Output",
-        description="Folder in which every smoke gets one for its results; by default that is beside the .blend file",
+    output: string(
+        "Output",
+        "Folder in which every smoke gets one for its results; by default that is beside the .blend file",
         subtype="DIR_PATH",
     )
-    quality: EnumProperty(
-        name="Quality",
-        description="Quality of new smokes",
-        items=[(name, name.capitalize(), "") for name in QUALITIES],
-        default="balanced",
+    quality: choice(
+        "Quality", "Quality of new smokes", [(name, name.capitalize(), "") for name in QUALITIES], default="balanced"
     )
-    threads: IntProperty(
-        name="Threads",
-        description="Processor threads that make smoke; automatic is all, fewer leave some for Blender",
-        default=0,
+    threads: whole(
+        "Threads",
+        "Processor threads that make smoke; automatic is all, fewer leave some for Blender",
         min=0,
         soft_max=64,
         max=1024,
@@ -65,8 +61,7 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for name in ("output", "quality"):
-            layout.prop(self, name)
+        draw_settings(layout, self, "output", "quality")
         draw_automatic(layout, self, "threads")
         layout.operator("smokelift.open_manual", icon="HELP")
 

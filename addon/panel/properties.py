@@ -1,11 +1,7 @@
 """Settings of a smoke, saved with its object."""
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import PointerProperty
 
 from ..scene.blender import PATH_OPTIONS
 from .advanced_panel import PlaybackSettings
@@ -14,6 +10,7 @@ from .clip_panel import ClipSettings
 from .direct_panel import DirectSettings
 from .export_panel import ExportSettings
 from .quality_panel import QualitySettings
+from .settings import link, string, tick
 from .setup_panel import SetUpSettings
 
 
@@ -30,23 +27,23 @@ class SmokeliftSettings(
 ):
     """Settings of one smoke, on its Volume object."""
 
-    is_smoke: BoolProperty(name="Smoke", description="The object is made from a clip", options={"HIDDEN"})
-    folder: StringProperty(name="Folder", description="Name of the folder for the results", options={"HIDDEN"})
-    results: StringProperty(
-        name="Results",
-        description="Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend",
+    is_smoke: tick("Smoke", "The object is made from a clip", options={"HIDDEN"})
+    folder: string("Folder", "Name of the folder for the results", options={"HIDDEN"})
+    results: string(
+        "Results",
+        "Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend",
         options={"HIDDEN"},
     )
-    saved_as: StringProperty(
-        name="Saved As",
-        description="The .blend as it was last saved or opened, which may have been copied or renamed meanwhile",
+    saved_as: string(
+        "Saved As",
+        "The .blend as it was last saved or opened, which may have been copied or renamed meanwhile",
         options={"HIDDEN"},
     )
-    before: StringProperty(name="Before", description="The result that was shown before", options={"HIDDEN"})
-    directing: PointerProperty(name="Direct", description="What is made of the result", type=SmokeliftDirecting)
-    output: StringProperty(
-        name="Output",
-        description="Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved",
+    before: string("Before", "The result that was shown before", options={"HIDDEN"})
+    directing: link("Direct", "What is made of the result", SmokeliftDirecting)
+    output: string(
+        "Output",
+        "Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved",
         subtype="DIR_PATH",
         options=PATH_OPTIONS,
     )

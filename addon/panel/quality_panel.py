@@ -2,13 +2,13 @@
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
-from .common import automatic_unless, needs_clip, operator
+from .common import needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_text
+from .settings import automatic_unless, choice, number, whole
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -20,11 +20,11 @@ CELLS = 0.245, 0.215, 0.18, 0.18
 class QualitySettings:
     """How fine the smoke is made, and on what."""
 
-    quality: EnumProperty(
-        name="Quality",
-        description="More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the "
-        "smoke's contrast in the clip that is finer than the voxels",
-        items=[
+    quality: choice(
+        "Quality",
+        "More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the smoke's contrast "
+        "in the clip that is finer than the voxels",
+        [
             ("draft", "Draft", "A quick preview"),
             ("balanced", "Balanced", "Good for most shots"),
             ("fine", "Fine", "More of the clip's detail, several times slower"),
@@ -32,36 +32,32 @@ class QualitySettings:
         ],
         default="balanced",
     )
-    detail: FloatProperty(
-        name="Depth Detail",
-        description=(
-            "How much fine structure in depth is made up in the clip's texture, since no camera shows it. "
-            "At 0 the smoke is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip"
-        ),
+    detail: number(
+        "Depth Detail",
+        "How much fine structure in depth is made up in the clip's texture, since no camera shows it. At 0 the smoke "
+        "is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip",
         subtype="FACTOR",
         default=1.0,
         min=0.0,
         max=1.0,
     )
-    seed: IntProperty(
-        name="Variation",
-        description="Number of the plausible smoke: all look alike from the camera, and differ from the side",
-        default=0,
+    seed: whole(
+        "Variation",
+        "Number of the plausible smoke: all look alike from the camera, and differ from the side",
         min=0,
         max=SEEDS - 1,
     )
-    longest_side: IntProperty(
-        name="Resolution",
-        description="Voxels along the box's longest side; automatic is by the detail that is measured in the clip",
-        default=0,
+    longest_side: whole(
+        "Resolution",
+        "Voxels along the box's longest side; automatic is by the detail that is measured in the clip",
         min=0,
         max=1024,
     )
     use_longest_side: automatic_unless("longest_side", "Resolution", BOX_VOXELS)
-    device: EnumProperty(
-        name="Device",
-        description="Device that renders",
-        items=[
+    device: choice(
+        "Device",
+        "Device that renders",
+        [
             ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
             ("cpu", "CPU", "The CPU only"),
             ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),

@@ -2,12 +2,13 @@
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, PointerProperty
 
 from ..core import ShotError
 from ..scene import shot_setup, volume
 from ..scene.plate import clip_behind
 from .common import ChangesScene, needs_clip, needs_result, sub_panels
+from .layout import draw_settings
+from .settings import choice, link, tick
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
 """Names of the settings."""
@@ -16,37 +17,31 @@ TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_
 class SetUpSettings:
     """What Set Up Shot sets up."""
 
-    set_up_range: BoolProperty(
-        name="Size, Rate and Range",
-        description="Give the scene the clip's resolution and frame rate, and the length of the result",
+    set_up_range: tick(
+        "Size, Rate and Range",
+        "Give the scene the clip's resolution and frame rate, and the length of the result",
         default=True,
     )
-    set_up_camera: BoolProperty(
-        name="Camera",
-        description="Look through the camera of the clip, with the background behind it that the render has, and the "
-        "clip at a switch",
+    set_up_camera: tick(
+        "Camera",
+        "Look through the camera of the clip, with the background behind it that the render has, and the clip at a "
+        "switch",
         default=True,
     )
-    set_up_light: BoolProperty(
-        name="Light",
-        description="Render with Cycles, scatter light in smoke as often as the engine did, and add the light that was "
-        "estimated from the clip",
+    set_up_light: tick(
+        "Light",
+        "Render with Cycles, scatter light in smoke as often as the engine did, and add the light that was estimated "
+        "from the clip",
         default=True,
     )
-    set_up_plate: BoolProperty(
-        name="Background",
-        description="Show the clean plate behind the smoke",
-        default=True,
+    set_up_plate: tick("Background", "Show the clean plate behind the smoke", default=True)
+    set_up_colors: tick(
+        "Color Management", "Set the view transform to Standard, in which the clip looks as it was filmed", default=True
     )
-    set_up_colors: BoolProperty(
-        name="Color Management",
-        description="Set the view transform to Standard, in which the clip looks as it was filmed",
-        default=True,
-    )
-    plate_place: EnumProperty(
-        name="Place",
-        description="Where the background is put behind the smoke",
-        items=[
+    plate_place: choice(
+        "Place",
+        "Where the background is put behind the smoke",
+        [
             ("WORLD", "World", "In the world, seen by the camera only"),
             (
                 "COMPOSITE",
@@ -62,10 +57,8 @@ class SetUpSettings:
             ),
         ],
     )
-    assumed_camera: PointerProperty(
-        name="Assumed Camera",
-        description="Camera object that stands where the clip was assumed to be filmed from",
-        type=bpy.types.Object,
+    assumed_camera: link(
+        "Assumed Camera", "Camera object that stands where the clip was assumed to be filmed from", bpy.types.Object
     )
 
 
@@ -98,10 +91,8 @@ class SMOKELIFT_OT_set_up(ChangesScene, bpy.types.Operator):
 def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     layout.use_property_split = False
     settings = smoke.smokelift
-    column = layout.column()
-    for name in TICKS:
-        column.prop(settings, name)
-    row = column.row()
+    draw_settings(layout, settings, *TICKS)
+    row = layout.row()
     row.use_property_split = True
     row.active = settings.set_up_plate
     row.prop(settings, "plate_place")

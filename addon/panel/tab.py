@@ -11,7 +11,7 @@ from . import preferences
 from .camera_panel import draw_shot
 from .clip_panel import draw_clip
 from .common import ChangesScene
-from .layout import draw_text
+from .layout import draw_settings, draw_text
 from .quality_panel import draw_qualities
 from .run_panel import draw_run
 
@@ -54,11 +54,8 @@ class _Main:
         draw_clip(layout, context, smoke)
         draw_shot(layout, context, smoke)
         draw_qualities(layout, context, smoke)
-        column = layout.column()
-        column.prop(settings, "detail")
-        row = column.row()
-        row.active = settings.detail > 0.0
-        row.prop(settings, "seed")
+        layout.prop(settings, "detail")
+        draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
         layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
         draw_run(layout, context, smoke)
 

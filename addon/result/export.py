@@ -79,7 +79,8 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
     """Write a .blend beside an export with paths to the files there: the smoke as an asset."""
     copy = copy_of(smoke, smoke.name)
     copy.delta_location = (0.0, 0.0, 0.0)
-    copy.data.filepath = str(folder / FRAME_FILE.format(_first_frame(folder)))
+    first = json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0]
+    copy.data.filepath = str(folder / FRAME_FILE.format(int(first)))
     # as it is when the asset is used; nothing of this file but its material goes with it
     copy.location = (0.0, 0.0, 0.0)
     copy.asset_mark()
@@ -88,11 +89,6 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
         bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
     finally:
         bpy.data.volumes.remove(copy.data)  # takes the object with it
-
-
-def _first_frame(folder: Path) -> int:
-    """Number of the first frame of an export."""
-    return int(json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0])
 
 
 def copy_of(obj: bpy.types.Object, name: str) -> bpy.types.Object:
