@@ -3,10 +3,10 @@
 import bpy
 
 from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
-from ..result.side_job import write_files
+from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import Needing, needs_rest, needs_result, operator, sub_panels
+from .common import Needing, needs_rest, needs_result, needs_smoke, operator, sub_panels
 from .layout import draw_settings, draw_text, draw_work
 from .settings import choice, string, tick, whole
 
@@ -68,6 +68,12 @@ def make_proxy(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         volume.show(smoke, volume.shown_take(smoke))
 
     write_files(smoke, "smokelift.make_proxy", ["proxy", str(volume.shown_take(smoke).directory)], show_proxy)
+
+
+@operator("Stop Writing", needs_smoke, bl_options={"INTERNAL"})
+def stop_writing(_context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
+    """Stop writing these files"""
+    writing_job.stop()
 
 
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -6,10 +6,11 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
+from ..core import ShotError
 from ..core.contract import QUALITIES
 from ..scene.blender import PACKAGE
 from ..scene.smoke import is_smoke
-from .common import Needing
+from .common import Needing, operator
 from .layout import draw_automatic, draw_settings
 from .settings import automatic_unless, choice, string, whole
 
@@ -66,17 +67,12 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
         layout.operator("smokelift.open_manual", icon="HELP")
 
 
-class SMOKELIFT_OT_open_manual(bpy.types.Operator):
+@operator("Manual")
+def open_manual(_context: bpy.types.Context, _smoke: bpy.types.Object | None) -> None:
     """Open the manual in the browser; it is a part of the extension and needs no network"""
-
-    bl_idname = "smokelift.open_manual"
-    bl_label = "Manual"
-
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        if not MANUAL.is_file():
-            self.report({"ERROR"}, "This copy of the add-on has no manual: read docs/blender.md of the source code.")
-            return {"CANCELLED"}
-        return bpy.ops.wm.url_open(url=MANUAL.as_uri())
+    if not MANUAL.is_file():
+        raise ShotError("This copy of the add-on has no manual: read docs/blender.md of the source code.")
+    bpy.ops.wm.url_open(url=MANUAL.as_uri())
 
 
 class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):

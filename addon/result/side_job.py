@@ -144,18 +144,6 @@ def write_files(
             raise ShotError(job.sentence)
 
 
-class SMOKELIFT_OT_stop_writing(bpy.types.Operator):
-    """Stop writing these files"""
-
-    bl_idname = "smokelift.stop_writing"
-    bl_label = "Stop Writing"
-    bl_options = {"INTERNAL"}
-
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        writing_job.stop()
-        return {"FINISHED"}
-
-
 @persistent
 def _stop_all(_file: str = "") -> None:
     """End the engine: another file is loaded."""
