@@ -4,7 +4,7 @@ import bpy
 
 from ..result.shot_check import found_lines, state
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import needs_clip, speed_changed, sub_panels
+from .common import needs_clip, panels, speed_changed
 from .layout import draw_automatic, draw_settings
 from .settings import choice, tick
 
@@ -45,4 +45,4 @@ def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smok
     layout.operator("smokelift.check", icon="VIEWZOOM")
 
 
-PANELS = sub_panels("advanced", "Advanced", _draw_advanced, needs_clip)
+PANELS = panels("advanced", "Advanced", _draw_advanced, needs_clip)

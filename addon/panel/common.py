@@ -124,20 +124,23 @@ class ChoosesFolder(_OpensFileBrowser):
 
 
 Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]
-"""Draws a part of the tab for the active smoke."""
+"""Draws the tab or a part of it for the active smoke."""
 
 
-def sub_panels(name: str, label: str, draw: Draw, *needs: Need) -> tuple[type, ...]:
-    """The panels SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME of a part of the tab, closed at first.
+def panels(name: str, label: str, draw: Draw, *needs: Need, **attributes: Any) -> tuple[type, ...]:
+    """The panels of the tab in both editors.
 
     Parameters
     ----------
     name, label
-        Of the part, for Blender and for the user.
+        For Blender, SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME, and for the user. Without a name it is the tab
+        itself, with one a part of it, closed at first.
     draw
         Draws it, with the names of settings on their left.
     needs
         When it is shown.
+    attributes
+        Further ones of both classes.
     """
 
     def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
@@ -145,22 +148,15 @@ def sub_panels(name: str, label: str, draw: Draw, *needs: Need) -> tuple[type, .
         panel.layout.use_property_decorate = False
         draw(panel.layout, context, active_smoke(context.scene))
 
-    both = {
-        "__module__": draw.__module__,
-        "bl_category": "Smokelift",
-        "bl_region_type": "UI",
-        "bl_options": {"DEFAULT_CLOSED"},
-        "bl_label": label,
-        "needs": needs,
-    }
-    return tuple(
-        type(
-            f"SMOKELIFT_PT_{editor}_{name}",
-            (Needing, bpy.types.Panel),
-            {**both, "bl_space_type": space, "bl_parent_id": f"SMOKELIFT_PT_{editor}", "draw": draw_panel},
-        )
-        for editor, space in EDITORS.items()
-    )
+    made = []
+    for editor, space in EDITORS.items():
+        tab = f"SMOKELIFT_PT_{editor}"
+        own = {"__module__": draw.__module__, "draw": draw_panel, "needs": needs, **attributes}
+        own |= {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "Smokelift", "bl_label": label}
+        if name:
+            own |= {"bl_parent_id": tab, "bl_options": {"DEFAULT_CLOSED"}}
+        made.append(type(f"{tab}_{name}" if name else tab, (Needing, bpy.types.Panel), own))
+    return tuple(made)
 
 
 def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

@@ -9,7 +9,7 @@ from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import ChangesScene, needs_clip, needs_result, operator, speed_changed, sub_panels
+from .common import ChangesScene, needs_clip, needs_result, operator, panels, speed_changed
 from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
 from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
@@ -200,4 +200,4 @@ def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
 
 
-PANELS = sub_panels("direct", "Direct", _draw_direct, needs_result)
+PANELS = panels("direct", "Direct", _draw_direct, needs_result)

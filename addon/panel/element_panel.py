@@ -19,7 +19,7 @@ from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, sub_panels
+from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, panels
 from .editors import open_tab, show_image
 from .layout import draw_text, draw_work
 from .settings import choice
@@ -168,4 +168,4 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     draw_work(layout, context, smoke, "smokelift.render_element", "RENDER_ANIMATION")
 
 
-PANELS = sub_panels("element", "Element", _draw_element, needs_clip)
+PANELS = panels("element", "Element", _draw_element, needs_clip)

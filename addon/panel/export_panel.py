@@ -6,7 +6,7 @@ from ..result.export import arguments, copy_later, folder_of, size_estimate, wri
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import Needing, needs_rest, needs_result, needs_smoke, operator, sub_panels
+from .common import Needing, needs_rest, needs_result, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text, draw_work
 from .settings import choice, string, tick, whole
 
@@ -115,4 +115,4 @@ class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
         return {"FINISHED"}
 
 
-PANELS = sub_panels("export", "Export", _draw_export, needs_result)
+PANELS = panels("export", "Export", _draw_export, needs_result)

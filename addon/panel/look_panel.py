@@ -6,7 +6,7 @@ from ..core import ShotError
 from ..scene import look, volume
 from ..scene.modifiers import in_viewport, proxy_modifier
 from ..scene.smoke import is_override, smoke_with_look
-from .common import ChangesScene, needs_result, sub_panels
+from .common import ChangesScene, needs_result, panels
 from .layout import draw_text, draw_work
 from .settings import choice
 
@@ -81,4 +81,4 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
         draw_text(column, context, text, "INFO")
 
 
-PANELS = sub_panels("look", "Look", _draw_look, _needs_look)
+PANELS = panels("look", "Look", _draw_look, _needs_look)

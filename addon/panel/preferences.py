@@ -97,10 +97,10 @@ class SMOKELIFT_OT_add_preset(Needing, AddPresetBase, bpy.types.Operator):
     preset_values = tuple(f"settings.{name}" for name in SETTINGS)
 
 
-def draw_header(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the menu if the smoke is the active object, which presets change."""
+def draw_header(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
+    """Draw the menu in the header of a panel if the smoke is the active object, which presets change."""
     if is_smoke(context.object):
-        SMOKELIFT_PT_presets.draw_panel_header(layout)
+        SMOKELIFT_PT_presets.draw_panel_header(panel.layout)
 
 
 class SMOKELIFT_FH_video(bpy.types.FileHandler):

@@ -14,7 +14,7 @@ from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import absolute, redraw
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, sub_panels
+from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, panels
 from .layout import draw_text
 
 
@@ -155,4 +155,4 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row.operator("smokelift.remove_takes", text=text, translate=False)
 
 
-PANELS = sub_panels("results", "Results", _draw_results, needs_clip)
+PANELS = panels("results", "Results", _draw_results, needs_clip)

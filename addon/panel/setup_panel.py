@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core import ShotError
 from ..scene import shot_setup, volume
 from ..scene.plate import clip_behind
-from .common import ChangesScene, needs_clip, needs_result, sub_panels
+from .common import ChangesScene, needs_clip, needs_result, panels
 from .layout import draw_settings
 from .settings import choice, link, tick
 
@@ -103,4 +103,4 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
-PANELS = sub_panels("set_up", "Shot Set-Up", _draw_set_up, needs_clip)
+PANELS = panels("set_up", "Shot Set-Up", _draw_set_up, needs_clip)

@@ -6,12 +6,12 @@ from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..result import smoke_takes
-from ..scene.smoke import activate, active_smoke, smokes
-from . import preferences
+from ..scene.smoke import activate, smokes
 from .camera_panel import draw_shot
 from .clip_panel import draw_clip
-from .common import ChangesScene
+from .common import ChangesScene, panels
 from .layout import draw_settings, draw_text
+from .preferences import draw_header
 from .quality_panel import draw_qualities
 from .run_panel import draw_run
 
@@ -30,34 +30,22 @@ class SMOKELIFT_OT_show_smoke(ChangesScene, bpy.types.Operator):
         activate(found, context.scene)
 
 
-class _Main:
-    bl_label = "Smokelift"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-
-    def draw_header_preset(self, context: bpy.types.Context) -> None:
-        preferences.draw_header(self.layout, context)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        smoke = active_smoke(context.scene)
-        _draw_smokes(layout, context, smoke)
-        if smoke is None:
-            draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
-            return
-        settings = smoke.smokelift
-        layout.template_ID(settings, "clip", open="clip.open")
-        if settings.clip is None:
-            return
-        draw_clip(layout, context, smoke)
-        draw_shot(layout, context, smoke)
-        draw_qualities(layout, context, smoke)
-        layout.prop(settings, "detail")
-        draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
-        layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
-        draw_run(layout, context, smoke)
+def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object | None) -> None:
+    _draw_smokes(layout, context, smoke)
+    if smoke is None:
+        draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
+        return
+    settings = smoke.smokelift
+    layout.template_ID(settings, "clip", open="clip.open")
+    if settings.clip is None:
+        return
+    draw_clip(layout, context, smoke)
+    draw_shot(layout, context, smoke)
+    draw_qualities(layout, context, smoke)
+    layout.prop(settings, "detail")
+    draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
+    layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
+    draw_run(layout, context, smoke)
 
 
 def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active: bpy.types.Object | None) -> None:
@@ -71,13 +59,4 @@ def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active:
     column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
 
 
-class SMOKELIFT_PT_view(_Main, bpy.types.Panel):
-    """The panel in the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-
-
-class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
-    """The panel in the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
+PANELS = panels("", "Smokelift", _draw_tab, draw_header_preset=draw_header)
