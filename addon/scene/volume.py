@@ -53,7 +53,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
         set_unless_changed(smoke, "place", smoke, "matrix_basis", engine_to_world(smoke))
     _correct_position(smoke, index["scene"]["domain"])
     fit_look(smoke, index["scene"])
-    _play(smoke, scene_of(smoke), take, index)
+    _play(smoke, take, index)
     parts, before = index.get("provenance", []), frames_before(smoke.smokelift, index)
     smoke.data[PROVENANCE] = _provenance(parts, bool(index["scene"].get("views")), before)
     return smoke
@@ -94,8 +94,7 @@ def _step(smoke: bpy.types.Object) -> tuple[int, float]:
     index = shown_index(smoke)
     if index is None:
         return 1, 1.0
-    ratio = _ratio(smoke, scene_of(smoke), index)
-    return _numbers(index)[0], ratio if _real_time(smoke, ratio, index) else 1.0
+    return _numbers(index)[0], _ratio(smoke, index) if _real_time(smoke, index) else 1.0
 
 
 def frames_before_take(smoke: bpy.types.Object, take: Take) -> int:
@@ -166,7 +165,7 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     domain = index["scene"]["domain"]
     width = (domain["max"][0] - domain["min"][0]) * BESIDE
     copy.location += copy.matrix_basis.to_3x3() @ Vector((width, 0.0, 0.0))
-    _play(copy, scene_of(smoke), take, index)
+    _play(copy, take, index)
     return copy
 
 
@@ -217,17 +216,14 @@ def _renumbered(words: str, before: int) -> str:
 @persistent
 def correct_positions(_file: str = "") -> None:
     """Correct all smokes, since another version of Blender may have saved the file."""
-    for _, smoke, index in _shown():
+    for smoke, index in _shown():
         _correct_position(smoke, index["scene"]["domain"])
 
 
-def _shown() -> Iterator[tuple[bpy.types.Scene, bpy.types.Object, dict[str, Any]]]:
+def _shown() -> Iterator[tuple[bpy.types.Object, dict[str, Any]]]:
     """Every smoke of every scene whose take has finished frames, with its `sequence.json`."""
-    for scene in bpy.data.scenes:
-        for smoke in smokes(scene):
-            index = shown_index(smoke)
-            if index is not None:
-                yield scene, smoke, index
+    every = (smoke for scene in bpy.data.scenes for smoke in smokes(scene))
+    return ((smoke, index) for smoke in every if (index := shown_index(smoke)) is not None)
 
 
 def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
@@ -239,8 +235,8 @@ def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
 
 def synchronize_playback() -> None:
     """Play all smokes in step with their clips, after a clip or a scene got another time or rate."""
-    for scene, smoke, index in _shown():
-        _set_time(smoke, scene, index)
+    for smoke, index in _shown():
+        _set_time(smoke, index)
 
 
 def _numbers(index: dict[str, Any]) -> list[int]:
@@ -252,7 +248,7 @@ def _file_numbers(index: dict[str, Any]) -> list[int]:
     return [number + index.get("start_number", 1) - 1 for number in _numbers(index)]
 
 
-def _play(smoke: bpy.types.Object, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
+def _play(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
     """Make a smoke, and its proxy if the take has one, read the take's files and play when its clip does."""
     numbers = _file_numbers(index)
     _set_file(smoke.data, take.directory / FRAME_FILE.format(numbers[0]), index)
@@ -260,7 +256,7 @@ def _play(smoke: bpy.types.Object, scene: bpy.types.Scene, take: Take, index: di
     for volume, name in ((proxy_of(smoke), PROXY_FILE), (next_frame_volume(smoke), FRAME_FILE)):
         if volume is not None:
             _set_file(volume, take.directory / name.format(numbers[0]), index)
-    _set_time(smoke, scene, index)
+    _set_time(smoke, index)
 
 
 def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> None:
@@ -277,10 +273,10 @@ def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> No
     set_unless_changed(volume, "density", volume.display, "density", index["scene"]["medium"]["extinction"])
 
 
-def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
+def _set_time(smoke: bpy.types.Object, index: dict[str, Any]) -> None:
     """Make a smoke, its proxy and what it needs for frames between play when its clip does, at the timing on trial."""
-    settings, numbers, ratio = smoke.smokelift, _file_numbers(index), _ratio(smoke, scene, index)
-    real = _real_time(smoke, ratio, index)
+    settings, numbers, ratio = smoke.smokelift, _file_numbers(index), _ratio(smoke, index)
+    real = _real_time(smoke, index)
     direction = index.get("settings", {}).get("direct", {}).get("job")
     live = settings.directing.live and direction != "retime" and not _tracked(index)
     steps = ratio if real else 1.0
@@ -317,10 +313,9 @@ def _drive(volume: bpy.types.Volume, name: str, expression: str) -> None:
     driver.expression = expression
 
 
-def _ratio(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> float:
+def _ratio(smoke: bpy.types.Object, index: dict[str, Any]) -> float:
     """Frames of the scene in the time of one of the clip."""
-    rate: float = index["scene"]["clip"]["fps"]
-    return frame_rate(scene) / rate
+    return frame_rate(scene_of(smoke)) / index["scene"]["clip"]["fps"]
 
 
 def _tracked(index: dict[str, Any]) -> bool:
@@ -328,9 +323,10 @@ def _tracked(index: dict[str, Any]) -> bool:
     return "matrices" in index["scene"].get("camera", {})
 
 
-def _real_time(smoke: bpy.types.Object, ratio: float, index: dict[str, Any]) -> bool:
+def _real_time(smoke: bpy.types.Object, index: dict[str, Any]) -> bool:
     """Whether frames are left out or repeated so that the smoke is as fast as in reality."""
-    return smoke.smokelift.speed == "REAL" and not _tracked(index) and not math.isclose(ratio, 1.0, rel_tol=1e-3)
+    same = math.isclose(_ratio(smoke, index), 1.0, rel_tol=1e-3)
+    return smoke.smokelift.speed == "REAL" and not _tracked(index) and not same
 
 
 def frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> int:
