@@ -12,6 +12,7 @@ from addon.core import ShotError
 from addon.core.take import Take, takes
 from addon.result import directing, smoke_takes
 from addon.scene import volume
+from addon.scene.box import new_box
 from addon.scene.smoke import activate, smokes
 from conftest import changed, known_run
 from smokelift.direct import BoxObstacle, Mesh
@@ -69,10 +70,7 @@ def placed(collection, name, data=None, field="NONE", **values) -> bpy.types.Obj
 
 
 def cube(collection, scale=0.5, location=(0.0, 0.0, 1.5), name="Crate") -> bpy.types.Object:
-    mesh = bpy.data.meshes.new("Cube")
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
-    return placed(collection, name, mesh, location=location, scale=(scale,) * 3)
+    return placed(collection, name, new_box().data, location=location, scale=(scale,) * 3)
 
 
 def words(options: list[str], name: str) -> list[list[float]]:
@@ -165,12 +163,12 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
     obj = cube(acting)
     turned = (0.0, math.pi / 2, 0.0)
     fan = placed(acting, "Fan", empty_display_size=0.5, location=(-0.8, 0.0, 0.6), rotation_euler=turned)
-    before, options = (part for part in directing.engine_request(result)[:0:-1])
+    before, options = directing.engine_request(result)[:0:-1]
     result.location, result.scale, result.rotation_euler = (3.0, 1.0, -2.0), (2.0, 2.0, 2.0), (0.0, 0.0, 1.2)
     bpy.context.view_layer.update()
     there = Matrix.Translation(result.location) @ result.rotation_euler.to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
     obj.matrix_basis, fan.matrix_basis = there @ obj.matrix_basis, there @ fan.matrix_basis
-    after, found = (part for part in directing.engine_request(result)[:0:-1])
+    after, found = directing.engine_request(result)[:0:-1]
     np.testing.assert_array_equal(solid(*after, tmp_path), solid(*before, tmp_path))
     # one meter in the scene is half a meter of the smoke's own
     np.testing.assert_allclose(words(found, "--fan")[0][:4], words(options, "--fan")[0][:4], atol=1e-5)
@@ -222,7 +220,6 @@ def test_retime_and_loop(result) -> None:
     settings.direction = "loop"
     assert directing.engine_request(result)[:2] == ("loop", [])
     settings.use_part = True
-    assert (settings.part_first, settings.part_last) == (1, 6)
     settings.part_first, settings.part_last, settings.overlap = 2, 6, 2
     assert directing.engine_request(result)[1] == ["--frames", "2:6", "--overlap", "2"]
     settings.part_last = 4

@@ -11,6 +11,7 @@ from addon.core.take import Take, takes
 from addon.result import smoke_takes
 from addon.scene import shot_setup, volume
 from addon.scene.blender import absolute
+from addon.scene.box import new_box
 from addon.scene.smoke import active_smoke, hide_default_cube, new_smoke
 from conftest import changed, made, ticked
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
@@ -60,9 +61,7 @@ def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> 
     ],
 )
 def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change, hides) -> None:
-    cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
+    cube = add(scene, "Cube", new_box().data)
     change(cube)
     assert hide_default_cube(scene) == hides
     assert cube.hide_render == cube.hide_viewport == hides
