@@ -277,12 +277,6 @@ def test_pictures_are_chosen_among_pictures(shot, tmp_path, name) -> None:
     assert getattr(settings, name) == str(tmp_path / "a.png")
 
 
-def test_a_mask_that_is_drawn_says_which_side_is_smoke(shot) -> None:
-    assert "inside its lines" not in words(shot)
-    bpy.ops.smokelift.new_mask()
-    assert "inside its lines" in words(shot)
-
-
 def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
     for mode in ("SCENE", "ESTIMATE"):
         smoke(shot).smokelift.camera_mode = mode

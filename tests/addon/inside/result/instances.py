@@ -31,7 +31,3 @@ def test_an_instance_plays_later_once_or_again(shown) -> None:
     again = bpy.context.object
     expected = [f"smoke_{FRAMES - 1:04d}.vdb", "smoke_0004.vdb"]
     assert [played(again, start + n) for n in (1, FRAMES)] == expected
-
-
-def test_only_a_sequence_has_instances(scene) -> None:
-    assert not bpy.ops.smokelift.add_instance.poll()

@@ -182,11 +182,6 @@ def test_what_is_missing_is_said(shot, spoil, words) -> None:
 # clip
 
 
-def test_frames_are_counted_from_nought(shot) -> None:
-    smoke(shot).smokelift.first, smoke(shot).smokelift.last = 5, 9
-    assert shot_tables(smoke(shot))["clip"] == {"path": str(EXAMPLE / "clip.mp4"), "frames": [4, 8]}
-
-
 def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
     for number in range(7, 12):
         (tmp_path / f"smoke_{number:03d}.png").write_bytes((EXAMPLE / "plate.png").read_bytes())
