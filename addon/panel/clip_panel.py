@@ -18,7 +18,7 @@ from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
 from .common import ChangesScene, ChoosesFile, needs_clip, operator
 from .editors import open_tab
-from .layout import draw_text
+from .layout import draw_hint, draw_text
 from .settings import automatic_unless, choice, link, number, string, vector, whole
 
 UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
@@ -227,38 +227,29 @@ def new_mask(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     first, last = used_range(settings)
     if not first <= context.scene.frame_current <= last:
         context.scene.frame_set(first)  # what is drawn on a frame that is not used helps little
-    if not bpy.app.background:
-        open_tab(editors.show_clip(settings.clip, settings.drawn_mask))
+    editors.show_clip(settings.clip, settings.drawn_mask)
 
 
 @operator("Show Clip", needs_clip)
 def show_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Open the clip in the Clip Editor, to choose its frames, track its camera, or stabilize it (Stabilization)"""
-    if not bpy.app.background:
-        open_tab(editors.show_clip(smoke.smokelift.clip))
+    editors.show_clip(smoke.smokelift.clip)
 
 
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
     if not clip_path(clip).is_file():
-        draw_text(
-            layout, context, iface_("{:s} is not there: choose the clip again.").format(str(clip_path(clip))), "ERROR"
-        )
+        text = iface_("{:s} is not there: choose the clip again.")
+        draw_text(layout, context, text.format(str(clip_path(clip))), "ERROR")
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
     row.operator("smokelift.show_clip", text="", icon="FILE_MOVIE")
     _draw_gaps(layout, context, settings)
     if is_distorted(clip):
-        column = layout.column(align=True)
-        draw_text(
-            column,
-            context,
-            "The clip's lens bends lines, and smoke is made for one that does not: undistort it.",
-            "INFO",
-        )
-        column.operator("smokelift.undistort")
+        text = "The clip's lens bends lines, and smoke is made for one that does not: undistort it."
+        draw_hint(layout, context, text, "smokelift.undistort")
     said, size = [], (scene.render.resolution_x, scene.render.resolution_y)
     if size != tuple(clip.size):
         said.append(iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size))
@@ -266,9 +257,7 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         text = iface_("The clip has {:g} frames a second, the scene {:g}.")
         said.append(text.format(clip.fps, frame_rate(scene)))
     if said:
-        column = layout.column(align=True)
-        draw_text(column, context, " ".join(said), "INFO")
-        column.operator("smokelift.match_clip")
+        draw_hint(layout, context, " ".join(said), "smokelift.match_clip")
 
 
 def _draw_gaps(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:

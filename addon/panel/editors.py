@@ -49,32 +49,37 @@ def show_page(_context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
     """Show on a page all that was found in the clip and assumed: box and light, background, smoke, doubts"""
     page = bpy.data.images.load(state.page, check_existing=True)
     page.reload()
-    if not bpy.app.background:
-        show_image(page)
+    show_image(page)
 
 
-def show_image(image: bpy.types.Image, mode: str = "VIEW") -> bpy.types.Area:
+def show_image(image: bpy.types.Image, mode: str = "VIEW") -> None:
     """Show the whole of a picture in an Image Editor in a mode, so that one that is painted and one of the result stay.
 
-    To view, it is over a checker where it is transparent; to paint, it is shown without its alpha.
+    To view, it is over a checker where it is transparent; to paint, it is shown without its alpha, beside the tab.
+    Without a window nothing is shown, here and below.
     """
+    if bpy.app.background:
+        return
     area = _editor("IMAGE_EDITOR", mode)
     space = area.spaces.active
     space.mode, space.image = mode, image
     space.display_channels = "COLOR" if mode == "PAINT" else "COLOR_ALPHA"
     bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
-    return area
+    if mode == "PAINT":
+        open_tab(area)
 
 
-def show_clip(clip: bpy.types.MovieClip, mask: bpy.types.Mask | None = None) -> bpy.types.Area:
-    """Show a clip in a Clip Editor, with a mask to be drawn over it, or to be tracked and stabilized."""
+def show_clip(clip: bpy.types.MovieClip, mask: bpy.types.Mask | None = None) -> None:
+    """Show a clip in a Clip Editor beside the tab, with a mask to be drawn over it, or to be tracked and stabilized."""
+    if bpy.app.background:
+        return
     area = _editor("CLIP_EDITOR")
     space = area.spaces.active
     space.clip, space.mode = clip, "TRACKING" if mask is None else "MASK"
     if mask is not None:
         space.mask = mask
     bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
-    return area
+    open_tab(area)
 
 
 def _windows_and_areas() -> list[tuple[bpy.types.Window, bpy.types.Area]]:

@@ -20,7 +20,7 @@ from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
 from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, panels
-from .editors import open_tab, show_image
+from .editors import show_image
 from .layout import draw_text, draw_work
 from .settings import choice
 
@@ -47,9 +47,8 @@ def paint_strokes(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         lay_below(settings.strokes, picture)
     except (RuntimeError, OSError) as error:
         raise ShotError(str(error)) from error
-    if not bpy.app.background:
-        open_tab(show_image(settings.strokes, "PAINT"))
-        _choose_color(context, "SMOKE")
+    show_image(settings.strokes, "PAINT")
+    _choose_color(context, "SMOKE")
 
 
 def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
@@ -139,8 +138,7 @@ def extract(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     def show(_smoke: bpy.types.Object) -> str:
         image = bpy.data.images.load(str(picture), check_existing=True)
         image.reload()
-        if not bpy.app.background:
-            show_image(image)
+        show_image(image)
         return rpt_("Frame {:d} of the clip is in {:s}.").format(frame, str(picture))
 
     words = [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"]

@@ -100,6 +100,15 @@ def draw_failure(layout: bpy.types.UILayout, context: bpy.types.Context, words: 
         layout.operator("smokelift.show_clip", text="Track or Stabilize", icon="TRACKER")
 
 
+def draw_hint(
+    layout: bpy.types.UILayout, context: bpy.types.Context, words: str, operator: str, icon: str = "NONE"
+) -> None:
+    """A sentence, and right below it the button that does what it says."""
+    column = layout.column(align=True)
+    draw_text(column, context, words, "INFO")
+    column.operator(operator, icon=icon)
+
+
 def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A label in the user's language, wrapped to the sidebar's width."""
     text = iface_(text)

@@ -14,7 +14,7 @@ from ..scene import volume
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import find_smoke
 from .common import needs_clip, operator
-from .layout import draw_doubts, draw_failure, draw_progress, draw_text
+from .layout import draw_doubts, draw_failure, draw_hint, draw_progress, draw_text
 from .quality_panel import SEEDS, draw_check
 
 
@@ -109,9 +109,8 @@ def _draw_shown(
     if known:
         draw_text(layout, context, known, "INFO")
     if index["complete"] and lacks_proxy(smoke, index):
-        column = layout.column(align=True)
-        draw_text(column, context, "This smoke is large: a proxy keeps the viewport fast.", "INFO")
-        column.operator("smokelift.make_proxy", icon="MOD_REMESH")
+        text = "This smoke is large: a proxy keeps the viewport fast."
+        draw_hint(layout, context, text, "smokelift.make_proxy", "MOD_REMESH")
 
 
 def _draw_run(

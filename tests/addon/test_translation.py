@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ADDON = Path(__file__).parents[2] / "addon"
-SAYING = {"label", "draw_text", "report", "operator", "progress", "poll_message_set"}
+SAYING = {"label", "draw_text", "report", "operator", "progress", "poll_message_set", "draw_hint"}
 TRANSLATING = {"iface_", "rpt_"}
 
 
