@@ -47,9 +47,9 @@ except KeyboardInterrupt:
 
 DEAF = """
 import json, time
-print(json.dumps({"event": "start", "total": 9, "done": 2}), flush=True)
 while True:
     try:
+        print(json.dumps({"event": "start", "total": 9, "done": 2}), flush=True)
         time.sleep(60)
     except KeyboardInterrupt:
         pass
@@ -213,8 +213,10 @@ def test_cancelling_an_engine(own_engine, monkeypatch, script, listens) -> None:
     job = own_engine(script)
     job.start()
     until(lambda: job.poll() and job.total == 9)
+    assert not job.stopping
     job.cancel()
     job.cancel()
+    assert job.stopping
     finished(job)
     assert job.outcome == "cancelled" and (job.status == 130) == listens
     assert job.sentence == "Cancelled; finished frames stay: 2."

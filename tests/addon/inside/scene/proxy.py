@@ -75,17 +75,9 @@ def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, spee
     assert volume.number_at(obj, 3) == 3
     scene.render.fps = 48
     volume.synchronize_playback()
-    later = "smoke_1002.vdb" if speed == "REAL" else "smoke_1003.vdb"
-    assert played(obj, 3) == later
-
-
-def test_it_plays_when_the_smoke_does(shot, tmp_path) -> None:
-    shot.render.fps, smoke(shot).smokelift.speed = 48, "REAL"
-    obj = volume.show(smoke(shot), made(tmp_path, proxies=True))
-    assert [played(obj, frame) for frame in (1, 2, 3)] == ["proxy_0001.vdb"] * 2 + ["proxy_0002.vdb"]
-    obj.smokelift.clip.frame_start = 101
-    volume.synchronize_playback()
-    assert [played(obj, frame) for frame in (1, 103)] == ["", "proxy_0002.vdb"]
+    for kind in ("smoke", "proxy"):
+        modifiers.proxy_modifier(obj).show_viewport = kind == "proxy"
+        assert played(obj, 3) == f"{kind}_{1002 if speed == 'REAL' else 1003}.vdb"
 
 
 def test_a_result_without_one_is_shown_itself(scene, obj, tmp_path) -> None:
