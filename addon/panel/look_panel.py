@@ -4,7 +4,7 @@ import bpy
 
 from ..core import ShotError
 from ..scene import look, volume
-from ..scene.modifiers import in_viewport, proxy_modifier
+from ..scene.modifiers import PROXY, in_viewport
 from ..scene.smoke import is_override, smoke_with_look
 from .common import ChangesScene, needs_result, panels
 from .layout import draw_text, draw_work
@@ -57,7 +57,7 @@ def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
             column.prop(socket, "default_value", text=SHORT.get(socket.name, socket.name))
     column = layout.column()
     column.use_property_decorate = False
-    modifier = proxy_modifier(smoke)
+    modifier = PROXY.modifier(smoke)
     if not override:
         column.prop(in_viewport(smoke).display, "density", text="View Density")
         _draw_render(column, context, smoke)

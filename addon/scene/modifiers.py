@@ -79,54 +79,39 @@ class SecondVolume:
             bpy.data.volumes.remove(obj.data)  # takes the object with it
 
 
-PROXY = "Smokelift Proxy"
-"""Name of the node group, and of the modifier."""
-
-_PROXY_INPUTS = (
-    Input("Smoke", "NodeSocketGeometry", "The smoke itself"),
-    Input("Proxy", "NodeSocketObject", "Volume that is shown in its place"),
-)
-
-
-def proxy_modifier(smoke: bpy.types.Object) -> bpy.types.Modifier | None:
-    """The modifier that shows the proxy of a smoke, and is its switch; None where there is no proxy."""
-    return _PROXY.modifier(smoke)
-
-
-def proxy_of(smoke: bpy.types.Object) -> bpy.types.Volume | None:
-    """The Volume that is the proxy of a smoke, whether it is on show or not."""
-    return _PROXY.volume(smoke)
-
-
-def in_viewport(smoke: bpy.types.Object) -> bpy.types.Volume:
-    """The Volume that viewports show of a smoke, which has the settings for that."""
-    modifier, proxy = proxy_modifier(smoke), proxy_of(smoke)
-    return proxy if proxy is not None and modifier.show_viewport else smoke.data
-
-
-def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
-    """Whether a smoke is large for a viewport and has no proxy, as an earlier result; ``index`` is that of its take."""
-    return proxy_modifier(smoke) is None and math.prod(index["scene"]["domain"]["resolution"]) >= PROXY_VOXELS
-
-
-def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
-    """Give a smoke a proxy if its take has files of one with these numbers, else none. Whether it is on show stays."""
-    if {PROXY_FILE.format(number) for number in numbers} <= {file.name for file in take.directory.iterdir()}:
-        _PROXY.add(smoke).show_render = False
-    else:
-        _PROXY.remove(smoke)
-
-
 def _build_proxy(tree: bpy.types.NodeTree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0)
     shown = add_node(tree, "GeometryNodeObjectInfo", 1, 0, given.outputs["Proxy"])
     add_node(tree, "NodeGroupOutput", 2, 0, shown.outputs["Geometry"])
 
 
-_PROXY = SecondVolume(PROXY, "smokelift_proxy", _PROXY_INPUTS, _build_proxy, "Proxy")
+_PROXY_INPUTS = (
+    Input("Smoke", "NodeSocketGeometry", "The smoke itself"),
+    Input("Proxy", "NodeSocketObject", "Volume that is shown in its place"),
+)
 
-INTERPOLATION = "Smokelift Frames Between"
-"""Name of the node group, and of the modifier."""
+PROXY = SecondVolume("Smokelift Proxy", "smokelift_proxy", _PROXY_INPUTS, _build_proxy, "Proxy")
+"""Shows the proxy of a smoke in viewports, and is its switch."""
+
+
+def in_viewport(smoke: bpy.types.Object) -> bpy.types.Volume:
+    """The Volume that viewports show of a smoke, which has the settings for that."""
+    modifier, proxy = PROXY.modifier(smoke), PROXY.volume(smoke)
+    return proxy if proxy is not None and modifier.show_viewport else smoke.data
+
+
+def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
+    """Whether a smoke is large for a viewport and has no proxy, as an earlier result; ``index`` is that of its take."""
+    return PROXY.modifier(smoke) is None and math.prod(index["scene"]["domain"]["resolution"]) >= PROXY_VOXELS
+
+
+def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
+    """Give a smoke a proxy if its take has files of one with these numbers, else none. Whether it is on show stays."""
+    if {PROXY_FILE.format(number) for number in numbers} <= {file.name for file in take.directory.iterdir()}:
+        PROXY.add(smoke).show_render = False
+    else:
+        PROXY.remove(smoke)
+
 
 CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)
 """Whether this Blender has nodes that move grids."""
@@ -142,17 +127,12 @@ _INTERPOLATION_INPUTS = (
 )
 
 
-def next_frame_volume(smoke: bpy.types.Object) -> bpy.types.Volume | None:
-    """The Volume that plays the frame after the one that a smoke plays; None without frames between."""
-    return _INTERPOLATION.volume(smoke)
-
-
 def fit_interpolation(smoke: bpy.types.Object, wanted: bool) -> None:
     """Give a smoke frames between, or take them away."""
     if not wanted or not CAN_INTERPOLATE:
-        _INTERPOLATION.remove(smoke)
+        FRAMES_BETWEEN.remove(smoke)
         return
-    modifier = _INTERPOLATION.add(smoke)
+    modifier = FRAMES_BETWEEN.add(smoke)
     # before the proxy, which takes the place of all; where that is on show, nothing need be computed
     smoke.modifiers.move(list(smoke.modifiers).index(modifier), 0)
     modifier.show_viewport = in_viewport(smoke) == smoke.data
@@ -170,7 +150,7 @@ def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> 
     seconds
         From one frame to the next.
     """
-    modifier = _INTERPOLATION.modifier(smoke)
+    modifier = FRAMES_BETWEEN.modifier(smoke)
     if modifier is None:
         return
     set_input(modifier, "Seconds", seconds)
@@ -207,6 +187,7 @@ def _build_interpolation(tree: bpy.types.NodeTree) -> None:
     add_node(tree, "NodeGroupOutput", 7 + len(GRIDS), 0, result)
 
 
-_INTERPOLATION = SecondVolume(
-    INTERPOLATION, "smokelift_between", _INTERPOLATION_INPUTS, _build_interpolation, "Next Frame"
+FRAMES_BETWEEN = SecondVolume(
+    "Smokelift Frames Between", "smokelift_between", _INTERPOLATION_INPUTS, _build_interpolation, "Next Frame"
 )
+"""Computes frames between two of a take; its Volume plays the frame after the one that the smoke plays."""

@@ -16,7 +16,7 @@ from ..core.take import TITLES, Take
 from .blender import absolute, frame_rate, relative, set_unless_changed
 from .box import engine_to_world
 from .look import fit_look
-from .modifiers import drive_interpolation, fit_interpolation, fit_proxy, next_frame_volume, proxy_of
+from .modifiers import FRAMES_BETWEEN, PROXY, drive_interpolation, fit_interpolation, fit_proxy
 from .smoke import scene_of, smokes
 
 BESIDE = 1.1
@@ -253,7 +253,7 @@ def _play(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
     numbers = _file_numbers(index)
     _set_file(smoke.data, take.directory / FRAME_FILE.format(numbers[0]), index)
     fit_proxy(smoke, take, numbers)
-    for volume, name in ((proxy_of(smoke), PROXY_FILE), (next_frame_volume(smoke), FRAME_FILE)):
+    for volume, name in ((PROXY.volume(smoke), PROXY_FILE), (FRAMES_BETWEEN.volume(smoke), FRAME_FILE)):
         if volume is not None:
             _set_file(volume, take.directory / name.format(numbers[0]), index)
     _set_time(smoke, index)
@@ -289,7 +289,7 @@ def _set_time(smoke: bpy.types.Object, index: dict[str, Any]) -> None:
     time = f"(frame-{start}+{EARLY})/{steps:.9g}"
     place = f"min({timing.place(time)},{len(numbers) - 1})"
     fit_interpolation(smoke, settings.between and (real or live))
-    for volume, ahead in ((smoke.data, 0), (proxy_of(smoke), 0), (next_frame_volume(smoke), 1)):
+    for volume, ahead in ((smoke.data, 0), (PROXY.volume(smoke), 0), (FRAMES_BETWEEN.volume(smoke), 1)):
         if volume is None:
             continue
         volume.frame_start, volume.frame_offset = start, numbers[0] - 1

@@ -100,8 +100,8 @@ def test_a_render_has_them_and_their_motion_blur(slow, tmp_path) -> None:
 def test_only_renders_have_them_while_the_viewport_shows_a_proxy(slow, tmp_path) -> None:
     volume.show(slow, flying(tmp_path, proxies=True))
     first, second = slow.modifiers
-    assert (first.name, first.show_viewport, first.show_render) == (modifiers.INTERPOLATION, False, True)
-    assert (second, second.show_render) == (modifiers.proxy_modifier(slow), False)
+    assert (first.name, first.show_viewport, first.show_render) == (modifiers.FRAMES_BETWEEN.name, False, True)
+    assert (second, second.show_render) == (modifiers.PROXY.modifier(slow), False)
 
 
 def test_they_are_taken_away(slow, tmp_path) -> None:

@@ -44,7 +44,7 @@ def test_viewports_show_the_proxy_and_renders_the_smoke(scene, obj, tmp_path) ->
 
 
 def test_it_has_a_switch(obj, tmp_path) -> None:
-    modifiers.proxy_modifier(obj).show_viewport = False
+    modifiers.PROXY.modifier(obj).show_viewport = False
     volume.show(obj, volume.shown_take(obj))
     volume.show(obj, made(tmp_path, number=2, proxies=True))
     assert played(obj, 3) == "smoke_0003.vdb"
@@ -52,9 +52,9 @@ def test_it_has_a_switch(obj, tmp_path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     obj = smoke(bpy.context.scene)
-    modifiers.proxy_modifier(obj).show_viewport = True
+    modifiers.PROXY.modifier(obj).show_viewport = True
     assert played(obj, 3) == "proxy_0003.vdb"
-    assert modifiers.in_viewport(obj) == modifiers.proxy_of(obj)
+    assert modifiers.in_viewport(obj) == modifiers.PROXY.volume(obj)
 
 
 @pytest.mark.parametrize("speed", ["FRAMES", "REAL"])
@@ -69,14 +69,14 @@ def test_files_that_are_numbered_from_elsewhere_are_played(scene, tmp_path, spee
     scene.render.fps, smoke(scene).smokelift.speed = 24, speed
     obj = volume.show(smoke(scene), take)
     assert [played(obj, frame) for frame in (0, 1, 3, FRAMES + 1)] == ["", "proxy_1001.vdb", "proxy_1003.vdb", ""]
-    modifiers.proxy_modifier(obj).show_viewport = False
+    modifiers.PROXY.modifier(obj).show_viewport = False
     assert [played(obj, frame) for frame in (1, 3)] == ["smoke_1001.vdb", "smoke_1003.vdb"]
     assert volume.shown_numbers(obj) == list(range(1, FRAMES + 1))
     assert volume.number_at(obj, 3) == 3
     scene.render.fps = 48
     volume.synchronize_playback()
     for kind in ("smoke", "proxy"):
-        modifiers.proxy_modifier(obj).show_viewport = kind == "proxy"
+        modifiers.PROXY.modifier(obj).show_viewport = kind == "proxy"
         assert played(obj, 3) == f"{kind}_{1002 if speed == 'REAL' else 1003}.vdb"
 
 
@@ -84,7 +84,7 @@ def test_a_result_without_one_is_shown_itself(scene, obj, tmp_path) -> None:
     volume.show(obj, made(tmp_path, number=2))
     assert played(obj, 3) == "smoke_0003.vdb"
     assert list(bpy.data.volumes) == [obj.data] and not obj.modifiers
-    assert modifiers.proxy_of(obj) is None
+    assert modifiers.PROXY.volume(obj) is None
 
 
 def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
@@ -93,7 +93,7 @@ def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
     scene.collection.objects.link(twin)
     volume.show(twin, made(tmp_path, number=2, proxies=True))
     beside = volume.show_beside(obj, made(tmp_path, number=3, proxies=True))
-    proxies = [modifiers.proxy_of(each) for each in (obj, twin, beside)]
+    proxies = [modifiers.PROXY.volume(each) for each in (obj, twin, beside)]
     assert len(set(proxies)) == 3
     assert [volume.take_of(data).directory.name for data in proxies] == ["take_0001", "take_0002", "take_0003"]
     assert len({tuple(data.materials) for data in proxies}) == 1
@@ -106,7 +106,7 @@ def test_it_follows_a_run(scene, tmp_path) -> None:
     index = (take.directory / "sequence.json").read_text()
     obj = smoke(scene)
     volume.show(obj, take)
-    assert modifiers.proxy_modifier(obj) is None
+    assert modifiers.PROXY.modifier(obj) is None
     (take.directory / "sequence.json").write_text(index.replace(', "3": {}, "4": {}, "5": {}, "6": {}', ""))
     volume.show(obj, take)
     assert played(obj, 2) == "proxy_0002.vdb"
