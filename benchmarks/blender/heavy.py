@@ -40,7 +40,7 @@ def main() -> None:
     addon.register()
     obj = volume.show(smoke(bpy.context.scene), take)
     for shown in (True, False):
-        modifiers.proxy_modifier(obj).show_viewport = shown
+        modifiers.PROXY.modifier(obj).show_viewport = shown
         before = psutil.Process().memory_info().rss
         seconds = [_played(obj, frame) for frame in range(1, FRAMES + 1)]
         megabytes = (psutil.Process().memory_info().rss - before) / 1e6 / FRAMES
