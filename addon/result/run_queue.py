@@ -66,9 +66,8 @@ def _tick() -> bool:
     run = running()
     waiting = next((run for run in runs if run.job.outcome == "waiting"), None)
     changed = run is not None and run.job.poll()
-    if changed and run.settings and run.job.forecast is not None and (smoke := find_smoke(run.smoke)) is not None:
-        shot_check.learn(smoke, run.settings, run.job)
-        run.settings = ""
+    if changed:
+        shot_check.learn(run)
     if run is None and waiting is not None:
         waiting.job.start()
         changed = True
@@ -93,8 +92,7 @@ def _show(run: Run) -> None:
         count = _datablocks()
         if run.first:
             run.before, run.first = volume.shown_take(smoke), False
-        if not run.left:
-            said = show_while_made(smoke, run.take, run.before, job.outcome)
+        said = show_while_made(smoke, run)
         created = _datablocks() - count
         in_tab = smoke == active_smoke(scene_of(smoke))  # of another the artist sees nothing now
         if run.before is None and in_tab and not run.seen:  # the artist may leave it afterwards

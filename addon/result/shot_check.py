@@ -22,9 +22,9 @@ from ..scene.blender import absolute, call_later, cancel_call, redraw, thread_op
 from ..scene.box import box_corners, box_of
 from ..scene.clip import clip_path
 from ..scene.scene_file import options, shot_tables
-from ..scene.smoke import active_smoke, scene_of, smokes
+from ..scene.smoke import active_smoke, find_smoke, scene_of, smokes
 from .side_job import REST_SECONDS, SideJob
-from .smoke_takes import runs
+from .smoke_takes import Run, runs
 
 _known: dict[str, tuple[Mapping[str, Any], list[tuple[str, str]]]] = {}
 """What the engine said of the shots of this session at its end, and its doubts, by their fingerprints."""
@@ -142,9 +142,13 @@ def stop(smoke: bpy.types.Object) -> None:
     state.error = rpt_("Time and memory are not estimated: Check Shot does it.")
 
 
-def learn(smoke: bpy.types.Object, settings: str, job: Job) -> None:
-    """Take the forecast of a run that began with settings for a check, unless they have changed meanwhile."""
-    if job.forecast is None or settings != settings_text(smoke):
+def learn(run: Run) -> None:
+    """Take the forecast of a run for a check, once, unless the settings that it began with have changed meanwhile."""
+    smoke, job, settings = find_smoke(run.smoke), run.job, run.settings
+    if smoke is None or job.forecast is None or not settings:
+        return
+    run.settings = ""
+    if settings != settings_text(smoke):
         return
     with suppress(ShotError):
         shot = _fingerprint(smoke, shot_tables(smoke, quick=True))

@@ -11,7 +11,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
-from ..core.job import Job, Outcome
+from ..core.job import Job
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
 from ..scene.blender import absolute, preferred_output_folder, relative
@@ -259,22 +259,15 @@ def choose(smoke: bpy.types.Object, take: Take) -> None:
             run.left = run.take != take
 
 
-def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> str:
-    """Show the frames of a take while it is made, unless the artist has chosen another meanwhile; as `present`.
+def show_while_made(smoke: bpy.types.Object, run: Run) -> str:
+    """Show the frames of a run while it is made, unless the artist has chosen another result meanwhile; as `present`.
 
-    Parameters
-    ----------
-    smoke, take
-        The smoke, and the take that is made for it.
-    before
-        What the smoke showed before; it is shown again if the run fails or is stopped. An undo may bring it back, too.
-    outcome
-        State of the run.
+    What was on show before is shown again if the run fails or is stopped. An undo may bring it back, too.
     """
-    if volume.shown_take(smoke) not in (before, take):
+    if run.left or volume.shown_take(smoke) not in (run.before, run.take):
         return ""
-    stopped = outcome in ("failed", "cancelled")
-    return present(smoke, before if stopped and before is not None else take)
+    stopped = run.job.outcome in ("failed", "cancelled")
+    return present(smoke, run.before if stopped and run.before is not None else run.take)
 
 
 def busy(take: Take) -> bool:

@@ -250,9 +250,12 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
 def test_frames_of_a_stopped_run_do_not_stay_on_show(result, tmp_path, outcome) -> None:
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
-    smoke_takes.show_while_made(result, take, shown, "running")
+    run = known_run(result, take, "running")
+    run.before = shown
+    smoke_takes.show_while_made(result, run)
     assert volume.shown_take(result) == take
-    smoke_takes.show_while_made(result, take, shown, outcome)
+    run.job.outcome = outcome
+    smoke_takes.show_while_made(result, run)
     assert volume.shown_take(result) == (take if outcome == "done" else shown)
 
 
@@ -261,7 +264,8 @@ def test_what_the_artist_shows_while_a_run_goes_on_stays(result, tmp_path) -> No
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
     both = [known_run(result, take, outcome) for outcome in ("running", "waiting")]
-    smoke_takes.show_while_made(result, take, shown, "running")
+    both[0].before = shown
+    smoke_takes.show_while_made(result, both[0])
     assert [run.left for run in both] == [False, False]
     assert bpy.ops.smokelift.show_take(take=str(shown.directory)) == {"FINISHED"}
     assert volume.shown_take(result) == shown
