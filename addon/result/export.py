@@ -29,22 +29,23 @@ class SizeEstimate:
     def __init__(self) -> None:
         self._of: tuple[object, ...] = ()
         self._smoke, self._size = 0, ""
+        self._timer = self._start  # Blender knows a timer by the object, and each `self._start` is another
 
     def size(self, smoke: bpy.types.Object) -> str:
         """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
         now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
         if self._of != now and not writing_job.writing:
             self._of, self._smoke, self._size = now, smoke.session_uid, ""
-            call_later(_estimate, REST_SECONDS)
+            call_later(self._timer, REST_SECONDS)
         return self._size if self._of == now else ""
 
-    def start(self) -> None:
-        """Ask the engine."""
+    def _start(self) -> None:
+        """Ask the engine once the settings rest."""
         smoke = find_smoke(self._smoke)
         if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
             return
         try:
-            writing_job.start(smoke, ([*arguments(smoke), "--size"], self._store))
+            writing_job.start(smoke, [*arguments(smoke), "--size"], self._store)
         except ShotError as error:
             self._size = str(error)
 
@@ -54,11 +55,6 @@ class SizeEstimate:
 
 
 size_estimate = SizeEstimate()
-
-
-def _estimate() -> None:
-    """Ask once the settings rest; a timer."""
-    size_estimate.start()
 
 
 def folder_of(smoke: bpy.types.Object) -> Path:

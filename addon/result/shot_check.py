@@ -217,7 +217,7 @@ def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
             else:
                 state.error = job.sentence
 
-        check_job.start(smoke, (["inspect", str(take.scene_file), "--page", str(page), *words], store))
+        check_job.start(smoke, ["inspect", str(take.scene_file), "--page", str(page), *words], store)
     except ShotError as error:
         check_job.stop()
         state.error = str(error)

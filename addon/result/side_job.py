@@ -25,9 +25,6 @@ REST_SECONDS = 0.4
 End = Callable[[bpy.types.Object, Job], None]
 """Called with the smoke and the job when that has ended."""
 
-Request = tuple[list[str], End]
-"""The engine's arguments, and what is done at the end."""
-
 
 class SideJob:
     """One such job at a time, and after its end what it said; never saved.
@@ -67,10 +64,10 @@ class SideJob:
         """Whether files are being written."""
         return self.job is not None and bool(self.operator)
 
-    def start(self, smoke: bpy.types.Object, request: Request, operator: str = "") -> None:
-        """Start the engine; ShotError if there is none."""
+    def start(self, smoke: bpy.types.Object, words: list[str], end: End, operator: str = "") -> None:
+        """Start the engine with arguments; ShotError if there is none."""
         self.stop()
-        words, self._end = request
+        self._end = end
         self.smoke, self.operator, self.sentence, self.doubts = smoke.session_uid, operator, "", []
         words = [*words, "--progress", "json", *thread_options()]
         self.job = Job(engine_command(words), Path(bpy.app.tempdir) / "smokelift.log")
@@ -136,7 +133,7 @@ def write_files(
         if job.outcome == "done":
             writing_job.sentence = complete(smoke) or job.sentence
 
-    writing_job.start(smoke, (words, end), operator)
+    writing_job.start(smoke, words, end, operator)
     job = writing_job.job
     if bpy.app.background:
         writing_job.wait()

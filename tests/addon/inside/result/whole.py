@@ -12,7 +12,7 @@ import smokelift
 from addon.core.contract import QUALITIES
 from addon.core.job import Job
 from addon.core.take import Take, takes
-from addon.result import shot_check, smoke_takes
+from addon.result import shot_check, side_job, smoke_takes
 from addon.scene import look, volume
 from addon.scene.lights import sun_irradiance
 from addon.scene.scene_file import shot_tables
@@ -191,7 +191,7 @@ def test_the_check_says_what_a_run_takes_and_assumes(shot, monkeypatch) -> None:
     page = bpy.data.images[Path(state.page).name]
     assert page.size[0] > 1000
     with monkeypatch.context() as blocked:
-        blocked.setattr(shot_check, "Job", None)  # a shot that was checked before is not measured anew
+        blocked.setattr(side_job, "Job", None)  # a shot that was checked before is not measured anew
         state.done = False
         bpy.ops.smokelift.check()
         assert state.done and state.costs(smoke(shot)) == costs
