@@ -241,15 +241,15 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     clip = settings.clip
     if not clip_path(clip).is_file():
         text = iface_("{:s} is not there: choose the clip again.")
-        draw_text(layout, context, text.format(str(clip_path(clip))), "ERROR")
+        draw_text(layout, text.format(str(clip_path(clip))), "ERROR")
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
     row.operator("smokelift.show_clip", text="", icon="FILE_MOVIE")
-    _draw_gaps(layout, context, settings)
+    _draw_gaps(layout, settings)
     if is_distorted(clip):
         text = "The clip's lens bends lines, and smoke is made for one that does not: undistort it."
-        draw_hint(layout, context, text, "smokelift.undistort")
+        draw_hint(layout, text, "smokelift.undistort")
     said, size = [], (scene.render.resolution_x, scene.render.resolution_y)
     if size != tuple(clip.size):
         said.append(iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size))
@@ -257,23 +257,23 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         text = iface_("The clip has {:g} frames a second, the scene {:g}.")
         said.append(text.format(clip.fps, frame_rate(scene)))
     if said:
-        draw_hint(layout, context, " ".join(said), "smokelift.match_clip")
+        draw_hint(layout, " ".join(said), "smokelift.match_clip")
 
 
-def _draw_gaps(layout: bpy.types.UILayout, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+def _draw_gaps(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """Pictures that are missing in a sequence, and the button that uses those after them."""
     found = unseen_pictures(settings)
     if found is None:
         return
     column = layout.column(align=True)
     if found.missing:
-        draw_text(column, context, iface_("Missing: {:s}.").format(found.missing_names()), "ERROR")
+        draw_text(column, iface_("Missing: {:s}.").format(found.missing_names()), "ERROR")
     if settings.last < found.count:
         text = iface_("Blender sees {:d} of {:d} frames.").format(settings.clip.frame_duration, found.count)
-        draw_text(column, context, text, "BLANK1" if found.missing else "INFO")
+        draw_text(column, text, "BLANK1" if found.missing else "INFO")
         column.operator("smokelift.use_all_files")
     else:
-        draw_text(column, context, "A neighboring picture stands in for each.", "BLANK1")
+        draw_text(column, "A neighboring picture stands in for each.", "BLANK1")
 
 
 def draw_mask(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

@@ -109,7 +109,7 @@ class SMOKELIFT_PT_strokes(bpy.types.Panel):
         layout = self.layout
         if context.tool_settings.image_paint.brush is None:
             text = "This Blender comes without brushes: paint the strokes in another, and open that picture as Strokes."
-            draw_text(layout, context, text, "ERROR")
+            draw_text(layout, text, "ERROR")
         layout.column(align=True).operator_enum("smokelift.stroke", "means")
         layout.operator("smokelift.paint_strokes", text="Show This Frame", icon="FILE_REFRESH")
 
@@ -162,8 +162,8 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row = layout.row(align=True)
     row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
     row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
-    draw_work(layout, context, smoke, "smokelift.extract", "IMAGE_RGB_ALPHA")
-    draw_work(layout, context, smoke, "smokelift.render_element", "RENDER_ANIMATION")
+    draw_work(layout, smoke, "smokelift.extract", "IMAGE_RGB_ALPHA")
+    draw_work(layout, smoke, "smokelift.render_element", "RENDER_ANIMATION")
 
 
 PANELS = panels("element", "Element", _draw_element, needs_clip)

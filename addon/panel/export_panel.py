@@ -80,8 +80,8 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     settings = smoke.smokelift_export
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
     draw_settings(layout, settings, "host", "precision", "use_velocity", "proxy")
-    draw_text(layout, context, size_estimate.size(smoke), "DISK_DRIVE")
-    draw_work(layout, context, smoke, "smokelift.export", "EXPORT")
+    draw_text(layout, size_estimate.size(smoke), "DISK_DRIVE")
+    draw_work(layout, smoke, "smokelift.export", "EXPORT")
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 

@@ -14,6 +14,9 @@ from ..result.side_job import writing_job
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
+NEW_WIDTH = 258
+"""Points of the sidebar in a new window; those of a sidebar that is not drawn."""
+
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
     """Draw a number with a cross that makes it automatic, or that it is; returns its row."""
@@ -57,7 +60,6 @@ def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.t
 
 def draw_doubts(
     layout: bpy.types.UILayout,
-    context: bpy.types.Context,
     smoke: bpy.types.Object,
     doubts: Iterable[tuple[str, str]],
     said: set[str],
@@ -66,7 +68,7 @@ def draw_doubts(
 
     Parameters
     ----------
-    layout, context, smoke
+    layout, smoke
         Where, and whose settings.
     doubts
         Each a kind and words.
@@ -85,44 +87,41 @@ def draw_doubts(
         if repeats(kind, said):
             continue
         said.add(kind)
-        draw_text(layout, context, words, "ERROR")
+        draw_text(layout, words, "ERROR")
         if left := advice(kind, [name for name, is_given in given.items() if is_given]):
-            draw_text(layout, context, left, "BLANK1")
+            draw_text(layout, left, "BLANK1")
         if "mask" in dict(REMEDIES.get(kind, ())):
             text = "New Mask" if settings.drawn_mask is None else "Edit Mask"
             layout.operator("smokelift.new_mask", text=text, icon="MOD_MASK")
 
 
-def draw_failure(layout: bpy.types.UILayout, context: bpy.types.Context, words: str) -> None:
+def draw_failure(layout: bpy.types.UILayout, words: str) -> None:
     """Why a check or a run ended without a result, and the button that helps."""
-    draw_text(layout, context, words, "ERROR")
+    draw_text(layout, words, "ERROR")
     if MOVING_CAMERA in words:
         layout.operator("smokelift.show_clip", text="Track or Stabilize", icon="TRACKER")
 
 
-def draw_hint(
-    layout: bpy.types.UILayout, context: bpy.types.Context, words: str, operator: str, icon: str = "NONE"
-) -> None:
+def draw_hint(layout: bpy.types.UILayout, words: str, operator: str, icon: str = "NONE") -> None:
     """A sentence, and right below it the button that does what it says."""
     column = layout.column(align=True)
-    draw_text(column, context, words, "INFO")
+    draw_text(column, words, "INFO")
     column.operator(operator, icon=icon)
 
 
-def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
     """A label in the user's language, wrapped to the sidebar's width."""
     text = iface_(text)
-    points = context.region.width / context.preferences.system.ui_scale - (50.0 if icon == "NONE" else 70.0)
-    lines = textwrap.wrap(text, max(16, int(points / POINTS_A_LETTER)))
+    region = bpy.context.region
+    width = NEW_WIDTH if region is None else region.width / bpy.context.preferences.system.ui_scale
+    lines = textwrap.wrap(text, max(16, int((width - (50.0 if icon == "NONE" else 70.0)) / POINTS_A_LETTER)))
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(lines):
         column.label(text=line, translate=False, icon=icon if number == 0 or icon == "NONE" else "BLANK1")
 
 
-def draw_work(
-    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, operator: str, icon: str
-) -> None:
+def draw_work(layout: bpy.types.UILayout, smoke: bpy.types.Object, operator: str, icon: str) -> None:
     """The button that has files written; their progress while that is at work, and what it said at its end."""
     own = operator == writing_job.operator
     if own and writing_job.writing:
@@ -130,8 +129,8 @@ def draw_work(
     else:
         layout.operator(operator, icon=icon)
     if own and writing_job.smoke == smoke.session_uid and writing_job.sentence:
-        draw_text(layout, context, writing_job.sentence, "INFO")
-        draw_doubts(layout, context, smoke, writing_job.doubts, set())
+        draw_text(layout, writing_job.sentence, "INFO")
+        draw_doubts(layout, smoke, writing_job.doubts, set())
 
 
 def draw_ticked(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, tick: str, *names: str) -> None:

@@ -50,7 +50,7 @@ def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     else:
         layout.label(text="The material is your own", icon="MATERIAL")
     if look.is_linked(smoke):
-        draw_text(layout, context, "A preset gives this override a look of its own.", "INFO")
+        draw_text(layout, "A preset gives this override a look of its own.", "INFO")
     else:
         column = layout.column()
         for socket in sockets:
@@ -64,7 +64,7 @@ def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     if modifier is not None:
         column.prop(modifier, "show_viewport", text="Proxy in View", icon="NONE")
     elif not override:
-        draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
+        draw_work(column, smoke, "smokelift.make_proxy", "MOD_REMESH")
 
 
 def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -78,7 +78,7 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.prop(smoke.data.render, "step_size", text="Render Step")
     if may_choose and not cycles.volume_biased:
         text = "Marching has less noise in less time, but its steps make an error."
-        draw_text(column, context, text, "INFO")
+        draw_text(column, text, "INFO")
 
 
 PANELS = panels("look", "Look", _draw_look, _needs_look)

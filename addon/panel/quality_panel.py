@@ -120,19 +120,19 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         layout.label(text=text, translate=False, icon="MESH_GRID")
 
 
-def draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, said: set[str]) -> None:
+def draw_check(layout: bpy.types.UILayout, smoke: bpy.types.Object, said: set[str]) -> None:
     """What the check of this smoke warns of, or why it failed, but for sentences and doubts that are ``said``."""
     state = shot_check.state
     if not state.fits(smoke) or (state.error and state.error in said):
         return
     if state.error:
-        draw_failure(layout, context, state.error)
+        draw_failure(layout, state.error)
     elif state.done:
         cost = state.costs(smoke)[smoke.smokelift.quality]
         if cost["memory"] > cost["memory_free"]:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(layout, context, text.format(cost["memory_free"] / 2**30), "ERROR")
-        draw_doubts(layout, context, smoke, state.doubts, said)
+            draw_text(layout, text.format(cost["memory_free"] / 2**30), "ERROR")
+        draw_doubts(layout, smoke, state.doubts, said)
 
 
 def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:

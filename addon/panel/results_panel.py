@@ -147,7 +147,7 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
         text = iface_("Show {:s} Beside").format(other.read().title)
         column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = name
     if found:
-        draw_text(layout, context, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
+        draw_text(layout, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
     removable = earlier_takes(context)
     row = layout.row()
     row.enabled = bool(removable)

@@ -69,28 +69,26 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
     row.operator("smokelift.vary", icon="MOD_NOISE")
     jobs = [run.job for run in own]
     of_runs = {job.sentence for job in jobs} | {kind for job in jobs for kind, _ in job.doubts}
-    draw_check(layout, context, smoke, of_runs)
+    draw_check(layout, smoke, of_runs)
     said: set[str] = set()
     for run in runs:
-        _draw_run(layout, context, smoke, run, said)
+        _draw_run(layout, smoke, run, said)
     if begun is not None:
-        _draw_begun(layout, context, smoke, begun, any(run.take == begun for run in own))
+        _draw_begun(layout, smoke, begun, any(run.take == begun for run in own))
     if index is not None:
         _draw_shown(layout, context, smoke, index)
     elif (take := volume.shown_take(smoke)) is not None:
         text = iface_("The files of the smoke in {:s} are missing: make it again, or choose their folder.")
-        draw_text(layout, context, text.format(str(take.directory)), "ERROR")
+        draw_text(layout, text.format(str(take.directory)), "ERROR")
         layout.operator("smokelift.choose_results", icon="FILE_FOLDER")
 
 
-def _draw_begun(
-    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, take: Take, known: bool
-) -> None:
+def _draw_begun(layout: bpy.types.UILayout, smoke: bpy.types.Object, take: Take, known: bool) -> None:
     """A run that can go on; one that this session does not know was interrupted by the end of another."""
     frames = take.read().frames
     if not known:
         text = iface_("{:s} was interrupted.") if frames else iface_("{:s} was interrupted before its first frame.")
-        draw_text(layout, context, text.format(take.read().title), "ERROR")
+        draw_text(layout, text.format(take.read().title), "ERROR")
     if frames:
         last = volume.frames_before_take(smoke, take) + frames
         text = iface_("Resume {:s} after Frame {:d}").format(take.read().title, last)
@@ -104,18 +102,16 @@ def _draw_shown(
     seen = volume.shown_range(smoke)
     if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
         text = iface_("The smoke is seen in frames {:d} to {:d}.")
-        draw_text(layout, context, text.format(*seen), "INFO")
+        draw_text(layout, text.format(*seen), "INFO")
     known = volume.provenance_note(smoke)
     if known:
-        draw_text(layout, context, known, "INFO")
+        draw_text(layout, known, "INFO")
     if index["complete"] and lacks_proxy(smoke, index):
         text = "This smoke is large: a proxy keeps the viewport fast."
-        draw_hint(layout, context, text, "smokelift.make_proxy", "MOD_REMESH")
+        draw_hint(layout, text, "smokelift.make_proxy", "MOD_REMESH")
 
 
-def _draw_run(
-    layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, run: Run, said: set[str]
-) -> None:
+def _draw_run(layout: bpy.types.UILayout, shown: bpy.types.Object, run: Run, said: set[str]) -> None:
     """A run, also of another smoke; that one's warnings stand in its own tab. Doubts that are ``said`` stand above."""
     box, job, own = layout.box(), run.job, run.smoke == shown.session_uid
     smoke, name = find_smoke(run.smoke), str(run.take.directory)
@@ -128,13 +124,13 @@ def _draw_run(
     elif job.outcome == "running":
         draw_progress(box, job, "smokelift.cancel").take = name
     elif job.outcome == "failed":
-        (draw_failure if own else draw_text)(box, context, job.sentence)
+        (draw_failure if own else draw_text)(box, job.sentence)
     else:
-        draw_text(box, context, job.sentence, "INFO")
+        draw_text(box, job.sentence, "INFO")
     if run.icon:
         box.template_icon(icon_value=run.icon, scale=8.0)
     if own:
-        draw_doubts(box, context, shown, job.doubts, said)
+        draw_doubts(box, shown, job.doubts, said)
     if not job.ended:
         return
     if own and job.outcome == "done" and run.take != volume.shown_take(shown):  # after an undo to before it

@@ -33,7 +33,7 @@ class SMOKELIFT_OT_show_smoke(ChangesScene, bpy.types.Operator):
 def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object | None) -> None:
     _draw_smokes(layout, context, smoke)
     if smoke is None:
-        draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
+        draw_text(layout, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
         return
     settings = smoke.smokelift
     layout.template_ID(settings, "clip", open="clip.open")

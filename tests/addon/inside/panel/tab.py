@@ -16,11 +16,8 @@ from addon.scene.smoke import active_smoke, new_smoke
 from conftest import changed, known_run, made
 from tests.example_shot import smoke
 
-WIDTH = 258
-"""Pixels of the sidebar in a new window."""
-
 LETTERS = 34
-"""Of a label without an icon, at most, at that width."""
+"""Of a label without an icon, at most, at the width of the sidebar in a new window."""
 
 
 class Layout:
@@ -47,8 +44,6 @@ def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[s
     context = SimpleNamespace(
         scene=scene,
         window=None,
-        region=SimpleNamespace(width=WIDTH),
-        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
         tool_settings=SimpleNamespace(image_paint=SimpleNamespace(brush=brush)),
         window_manager=bpy.context.window_manager,
     )
