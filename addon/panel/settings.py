@@ -23,6 +23,7 @@ def _named(kind: Callable[..., Any]) -> Callable[..., Any]:
 tick, number, whole, string, vector = map(
     _named, (BoolProperty, FloatProperty, IntProperty, StringProperty, FloatVectorProperty)
 )
+"""Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
 
 
 def choice(name: str, description: str, items: list[tuple[Any, ...]], **options: Any) -> Any:
