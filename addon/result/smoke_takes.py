@@ -14,7 +14,7 @@ from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import absolute, preferred_output_folder, relative
+from ..scene.blender import absolute, preferred, relative
 from ..scene.clip import clip_path
 from ..scene.scene_file import options as engine_options
 from ..scene.scene_file import shot_tables
@@ -76,9 +76,8 @@ def output_folder(smoke: bpy.types.Object) -> Path:
     for folder in (settings.output, settings.results):
         if folder:
             return absolute(folder)
-    common = preferred_output_folder()
-    if common is not None:
-        return common / settings.folder
+    if common := preferred("output"):  # a folder in which every smoke has one
+        return absolute(common) / settings.folder
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
     return clip_path(settings.clip).parent / f"{settings.folder}_smokelift"

@@ -83,28 +83,16 @@ def frame_rate(scene: bpy.types.Scene) -> float:
     return scene.render.fps / scene.render.fps_base
 
 
-def _user_preferences() -> bpy.types.AddonPreferences | None:
-    """The user's preferences; None where the add-on runs without being installed."""
+def preferred(name: str) -> Any:
+    """A preference of the user; None where the add-on runs without being installed."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
-    return addon.preferences if addon is not None else None
-
-
-def preferred_output_folder() -> Path | None:
-    """Folder in which every smoke has one for its results; None if they lie beside the .blend."""
-    user = _user_preferences()
-    return absolute(user.output) if user is not None and user.output else None
-
-
-def preferred_quality() -> str | None:
-    """Quality of new smokes; None for the usual one."""
-    user = _user_preferences()
-    return user.quality if user is not None else None
+    return getattr(addon.preferences, name) if addon is not None else None
 
 
 def thread_options() -> list[str]:
     """Options of the engine that limit its threads; they change no result."""
-    user = _user_preferences()
-    return ["--threads", str(user.threads)] if user is not None and user.threads else []
+    threads = preferred("threads")
+    return ["--threads", str(threads)] if threads else []
 
 
 def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:

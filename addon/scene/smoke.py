@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix, Vector
 
-from .blender import preferred_quality
+from .blender import preferred
 
 LAMP_OF_A_NEW_FILE = (4.0762453, 1.0054539, 5.9038620), 1000.0
 """Place (m) and power (W) of the point light that Blender's own new file begins with."""
@@ -78,7 +78,7 @@ def new_smoke(scene: bpy.types.Scene, clip: bpy.types.MovieClip | None = None) -
     if clip is not None:
         obj.smokelift.clip = clip
     activate(obj, scene)
-    obj.smokelift.quality = preferred_quality() or obj.smokelift.quality
+    obj.smokelift.quality = preferred("quality") or obj.smokelift.quality
     return obj
 
 
