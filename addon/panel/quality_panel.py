@@ -95,10 +95,11 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         button.prop_enum(settings, "quality", item.identifier)
         cost = costs.get(item.identifier)
         if cost is not None:
+            seconds, megabytes = cost["seconds"], cost["disk"] / 1e6
             words = (
-                _brief_time(cost["seconds"]),
+                duration(seconds) if seconds < 3570.0 else _brief(seconds / 3600.0, "h"),
                 _brief(cost["memory"] / 2**30, "G"),
-                _brief_disk(cost["disk"] / 1e6),
+                f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G"),
                 _brief_fraction(cost["lost"]),
             )
             for cell, word in zip(cells, words, strict=True):
@@ -143,14 +144,6 @@ def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
         cells.append(column.row(align=True))
         left -= fraction
     return [*cells, column.row(align=True)]
-
-
-def _brief_time(seconds: float) -> str:
-    return duration(seconds) if seconds < 3570.0 else _brief(seconds / 3600.0, "h")
-
-
-def _brief_disk(megabytes: float) -> str:
-    return f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G")
 
 
 def _brief_fraction(fraction: float | None) -> str:
