@@ -28,7 +28,7 @@ from smokelift import Background, Clip, Domain, Frame, Settings
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plates, evened, known_plate, without_noise_light
+from smokelift.footage.plate import Plate, evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
 from smokelift.scene import CompleteScene
 
@@ -45,7 +45,7 @@ LOOKED_AT = 8
 """Frames of a clip."""
 
 
-def plate_score(clip: Clip, plates: Plates, background: Picture, clean: Picture) -> dict[str, float]:
+def plate_score(clip: Clip, plates: Plate, background: Picture, clean: Picture) -> dict[str, float]:
     """Judge the plates that were found for a clip.
 
     Parameters
@@ -98,7 +98,7 @@ def plate_row(case: Case, scenes: Sequence[Baked]) -> list[str]:
         clip, background = case.clip(seen), case.background(seen)
         began = time.process_time()
         if case.given:
-            plates: Plates = known_plate(background, clip)
+            plates: Plate = known_plate(background, clip)
             clip = without_noise_light(clip, plates.noise)
         else:
             found = find_backdrop(clip, None, None)

@@ -24,7 +24,7 @@ from smokelift.footage.background_kind import OBJECT
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, reduced_size
 from smokelift.footage.noise import EIGHT_BIT_STEP
-from smokelift.footage.plate import Plate, Plates
+from smokelift.footage.plate import Plate
 
 FRAMES, SIDE, TURNS = 8, 96, 4
 """Frames that are extracted, cells along their longer side, and turns. More frames and turns change T rms by .001,
@@ -53,13 +53,13 @@ CLEAR_TRANSMITTANCE = 0.02
 """Lower bound of T, for division."""
 
 
-def plates_and_source(clip: Clip, shot: Clip, plates: Plates, smoky: Sequence[int]) -> tuple[Plates, Picture]:
+def plates_and_source(clip: Clip, shot: Clip, plates: Plate, smoky: Sequence[int]) -> tuple[Plate, Picture]:
     """Return the plates of a clip, better known if they were found in its ``shot``, and its smoke's source radiance.
 
     Both clips are at the plates' exposure; ``smoky`` are the frames of `clip_source`.
     """
     source = clip_source(clip, plates, smoky)
-    if not isinstance(plates, Plate):
+    if plates.images is not None:
         return plates, source
     better = plate_in_turn(shot, plates, source)
     if better is plates:

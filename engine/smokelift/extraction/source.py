@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.extraction.element import MODEL_ERROR, extract_element, usual_source
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, reduced_size
-from smokelift.footage.plate import Plates
+from smokelift.footage.plate import Plate
 
 SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and cells along their longer side, from which the source radiance is found."""
@@ -23,7 +23,7 @@ HUE = 2 * MODEL_ERROR
 model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
 
 
-def clip_source(clip: Clip, plates: Plates, frames: Sequence[int]) -> Picture:
+def clip_source(clip: Clip, plates: Plate, frames: Sequence[int]) -> Picture:
     """Return the usual source radiance (3,) of a clip's smoke before its plates, from the first of some frames.
 
     ``frames`` (one at least) have those with the most smoke first.
@@ -32,7 +32,7 @@ def clip_source(clip: Clip, plates: Plates, frames: Sequence[int]) -> Picture:
     return usual_source(shown, reduced_size(*clip.size, SOURCE_SIDE))
 
 
-def brightest_smoke(clip: Clip, plates: Plates, frame: int, source: Picture) -> float:
+def brightest_smoke(clip: Clip, plates: Plate, frame: int, source: Picture) -> float:
     """Return the radiance that the brightest thick smoke of a frame sends, S of its element; 0 without any.
 
     ``source`` (3,) is what `clip_source` returns. Smoke sends no more than its source radiance, so a light has to make

@@ -6,7 +6,7 @@ hides. ``images`` reads and resizes single pictures; ``color`` knows how files e
 ``backdrop`` decides on a small copy of the file (``proxy``) what stands behind the smoke: what ``given_background``
 reads, or one color or a picture, as ``background_kind`` ranks them. ``clear_picture`` makes the picture from frames
 that show it clear, and ``inpainting`` continues it where none does. If the camera moves (``camera_motion``), frames
-are ``registered`` by a ``similarity`` each.
+are moved onto a reference by ``registration``.
 ``noise`` measures the clip's noise. ``matte`` finds the smoke: it differs from the ``plate`` by more than noise.
 ``working_picture`` cuts out the small picture that a grid is fitted to.
 """

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -21,19 +21,11 @@ from smokelift.footage.background_kind import MAX_DEVIATION, color_around, rank,
 from smokelift.footage.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import given_plates, one_picture
+from smokelift.footage.given_background import mean_of_frames, read_background
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
 from smokelift.footage.inpainting import DETAIL
-from smokelift.footage.noise import (
-    EIGHT_BIT_STEP,
-    Noise,
-    lasting_noise,
-    median_of_seen,
-    noise_of,
-    spread_about,
-    white_noise,
-)
-from smokelift.footage.plate import Plate, Plates, cleared, known_plate, uncovered, without_noise_light
+from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, lasting_noise, median_of_seen, noise_of, spread_about
+from smokelift.footage.plate import Plate, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import PROXY_SIDE, Proxy
 from smokelift.footage.strokes import Strokes, stroked_plate, without_others
 from smokelift.footage.video import median_quantizer
@@ -110,7 +102,7 @@ class Backdrop:
 
     source: Source
     clip: Clip
-    plates: Plates
+    plates: Plate
     background: Background | None = None
     frames: int = 0
     shot: tuple[int, int] | None = None
@@ -135,29 +127,31 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     behind, moves = gray or background, camera is not None and camera.moves
     if moves and behind is not None and behind.frame is not None:
         raise ValueError(MOVING_CAMERA)
-    clip, motion = _on_plate(clip, one_picture(behind, camera, clip))
-    plates = given_plates(behind, camera, clip)
-    if plates is None:
+    frames = None if behind is None else behind.frame
+    if frames:
+        given: Picture | Clip | None = mean_of_frames(frames[:1], clip)
+    else:
+        given = None if behind is None else read_background(behind, camera)
+    clip, motion = _on_plate(clip, given)
+    if given is None:
         found = _estimated(clip, moves)
     else:
-        quiet = without_noise_light(clip, plates.noise)
+        plate = known_plate(mean_of_frames(frames, clip) if frames else given, clip)
+        quiet = without_noise_light(clip, plate.noise)
         if quiet is not clip:
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
-            again: Any = given_plates(behind, camera, quiet)
-            plates = replace(again, noise=plates.noise)
-        found = Backdrop("alpha" if gray else "given", quiet, plates, behind, motion=motion)
-    shown = found.plates
-    if found.source == "picture" and isinstance(shown, Plate):
-        shown = uncovered(shown, found.clip)
-    found = replace(found, clip=cleared(found.clip, shown), plates=shown)
+            plate = replace(known_plate(mean_of_frames(frames, quiet) if frames else given, quiet), noise=plate.noise)
+        found = Backdrop("alpha" if gray else "given", quiet, plate, behind, motion=motion)
+    plate = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
+    found = replace(found, clip=cleared(found.clip, plate), plates=plate)
     if background is None or background.strokes is None or gray is not None:
         return found
     return _with_strokes(found, background, background.strokes, moves)
 
 
-def _on_plate(clip: Clip, plate: Picture | None) -> tuple[Clip, CameraMotion | None]:
+def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMotion | None]:
     """A clip, registered to a given picture if it does not lie on it, and the motion by which."""
-    if plate is None:
+    if plate is None or isinstance(plate, Clip) or plate.ndim == 1:
         return clip, None
     texture = Texture(area_average(plate, *reduced_size(*clip.size, PROXY_SIDE)))
     motion = motion_before(texture, Proxy.of(clip, beyond=False)) if texture.enough else None
@@ -174,7 +168,7 @@ def _registered(clip: Clip, motion: CameraMotion) -> Clip:
 
 def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bool) -> Backdrop:
     """A background with what strokes say of it."""
-    if moves or not isinstance(found.plates, Plate):
+    if moves or found.plates.images is not None:
         raise ValueError(STROKES_OVER_ONE_FRAME)
     strokes, clip = Strokes.read(path, found.clip.size), found.clip
     one_color = background.color is not None or (background.estimated and found.source != "picture")
@@ -190,98 +184,67 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     if len(clip) == len(clip.whole()) == 1 and (around := color_around(clip.frame(0))) is not None:
         return Backdrop("color around one frame", clip, known_plate(around, clip), frames=1)
     proxy = Proxy.of(clip)
-    white = _white_noise(proxy)
+    white = proxy.white_noise()
     quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
     if quiet is not clip:
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
-    even, gains = part.evened
-    found = rank(even, white)
+    found = rank(part.evened, white)
+    color, objects = found.color, found.objects
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
-        if found.color is None or found.objects.any() or passes_by:
+        if color is None or objects.any() or passes_by:
             raise ValueError(MOVING_CAMERA)
-        red, green, blue = (float(v) for v in found.color)
+        red, green, blue = (float(v) for v in color)
         behind = Background(color=(red, green, blue))
-        return Backdrop("color", clip, known_plate(found.color, clip), behind, len(proxy.numbers))
-    shot = part.numbers[0], part.numbers[-1]
-    made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
+        return Backdrop("color", clip, known_plate(color, clip), behind, len(proxy.numbers))
     # black, or a color seen often, is the same wherever the camera points; any other may be texture that passes by
     often = found.clear > SEEN_OFTEN and white.max() <= TEXTURE
-    plain = found.color is not None and (often or not found.color.any())
+    plain = color is not None and (often or not color.any())
     if not plain and motion is None:
         shaken = find_motion(proxy.with_own(part))
         if shaken == "other":
             raise ValueError(MOVING_CAMERA)
         if shaken is not None:
             return _estimated(_registered(filmed, shaken), moves, shaken)
-    color, objects = found.color, found.objects
+    shot = part.numbers[0], part.numbers[-1]
+    made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
     source: Source = "color"
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
         shown = part.with_still()
-        plate = _picture(clip, shown, white)
+        plate = _picture(clip, shown.evened, white)
         if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
             return made("picture", plates=plate, quantizer=median_quantizer(clip.path))
         # fog drifts over all of the file: treat it as filmed before black
         color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    return made(source, plates=_of_one_color(clip, part, even, gains, color, objects, white))
+    return made(source, plates=_of_one_color(clip, part.evened, color, objects, white))
 
 
-def _picture(clip: Clip, part: Proxy, white: Picture) -> Plate:
+def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
     """The plate that the clear frames show."""
-    even, gains = part.evened
-    noise = _noise(even, median_of_seen(even.pictures), white)
-    picture = clear_picture(even, noise.averaged(even.scale**2), DETAIL / even.scale)
-    return Plate(
-        whole_plate(clip, part, gains, picture),
-        spread_out(picture.known, clip.size).astype(np.float32),
-        _noise(even, picture.image, white),
-        picture.errors,
-    )
+    noise = proxy.noise_about(median_of_seen(proxy.pictures), white)
+    picture = clear_picture(proxy, noise.averaged(proxy.scale**2), DETAIL / proxy.scale)
+    known = spread_out(picture.known, clip.size).astype(np.float32)
+    image, noise = whole_plate(clip, proxy, picture), proxy.noise_about(picture.image, white)
+    return Plate(image, known, noise, picture.errors)
 
 
-def _of_one_color(
-    clip: Clip, part: Proxy, even: Proxy, gains: Picture, color: Picture, objects: Mask, white: Picture
-) -> Plate:
+def _of_one_color(clip: Clip, proxy: Proxy, color: Picture, objects: Mask, white: Picture) -> Plate:
     """The plate of one color with the objects before it."""
     image = np.tile(color, (*objects.shape, 1))
-    deviations = _deviations(even, image)
+    deviations = proxy.deviations(image)
     # smoke moves a color to one side: deviations to the other side are noise alone
     sides = (np.where(beyond, np.float32(np.nan), deviations) for beyond in (deviations > 0, deviations < 0))
-    noise = noise_of(white, np.minimum(*map(spread_about, sides)), even.scale**2)
+    noise = noise_of(white, np.minimum(*map(spread_about, sides)), proxy.scale**2)
     whole = np.tile(color, (*clip.size[::-1], 1))
     if objects.any():
-        own = np.median(even.pictures[:, objects], axis=0)
+        own = np.median(proxy.pictures[:, objects], axis=0)
         image[objects] = own
-        clear = np.zeros(even.seen.shape, np.bool_)
-        limit = MAX_DEVIATION * noise.averaged(even.scale**2).total
-        clear[:, objects] = within(even.encoded[:, objects] - linear_to_srgb(own), limit)
+        clear = np.zeros(proxy.seen.shape, np.bool_)
+        limit = MAX_DEVIATION * noise.averaged(proxy.scale**2).total
+        clear[:, objects] = within(proxy.encoded[:, objects] - linear_to_srgb(own), limit)
         known = np.ones(objects.shape, np.bool_)
-        picture = whole_plate(clip, part, gains, ClearPicture(image, known, clear, known.astype(np.float32), NO_ERRORS))
+        picture = whole_plate(clip, proxy, ClearPicture(image, known, clear, known.astype(np.float32), NO_ERRORS))
         whole = np.where(spread_out(objects, clip.size)[..., None], picture, whole)
     return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)
-
-
-def _white_noise(proxy: Proxy) -> Picture:
-    """The white noise (3,) of the clip's pixels, measured at one exposure."""
-    part = proxy.only(np.flatnonzero([number in proxy.blocks for number in proxy.numbers]))
-    _, gains = part.evened
-    blocks = []
-    for number, gain in zip(part.numbers, gains, strict=True):
-        part_of, seen = proxy.blocks[number]
-        even = part_of.through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(part_of.linear() / gain)
-        blocks.append(even if seen is None else np.where(seen[..., None], even, np.float32(np.nan)))
-    return white_noise(np.stack(blocks))
-
-
-def _noise(proxy: Proxy, background: Picture, white: Picture) -> Noise:
-    """The noise of the file's pixels about a linear background (rows, columns, 3)."""
-    return noise_of(white, spread_about(_deviations(proxy, background)), proxy.scale**2)
-
-
-def _deviations(proxy: Proxy, background: Picture) -> Picture:
-    """Differences (frames, rows, columns, 3) from a linear background, in sRGB values; NaN where a mask hides."""
-    deviations = proxy.encoded - linear_to_srgb(background)
-    deviations[~proxy.seen] = np.nan
-    return deviations

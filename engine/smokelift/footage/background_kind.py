@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.checks.array_types import Mask
+from smokelift.footage.clear_picture import spread_out
 from smokelift.footage.images import (
     Picture,
     area_average,
@@ -95,11 +96,6 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
     visible = _visible(proxy, shape)
     values = every[:, visible]
 
-    def on_picture(blocks: Mask) -> Mask:
-        whole = np.zeros(len(visible), np.bool_)
-        whole[visible] = blocks
-        return _at_pixels(whole.reshape(shape), proxy)
-
     limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / np.prod(proxy.seen.shape[1:])) / proxy.scale))
     jump = -float(np.log(2 * limit.mean()))
     goes_on = _goes_on(values, limit, jump)
@@ -127,7 +123,10 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
             best, found, share = total, stands & still, float(clear.mean())
             color = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
             color[linear_to_srgb(color) < EIGHT_BIT_STEP / 2] = 0
-    return Ranking(color, on_picture(found), share)
+    whole = np.zeros(len(visible), np.bool_)
+    whole[visible] = found
+    rows, columns = proxy.seen.shape[1:]
+    return Ranking(color, spread_out(whole.reshape(shape), (columns, rows)), share)
 
 
 def color_around(picture: Picture) -> tuple[float, float, float] | None:
@@ -224,15 +223,6 @@ def within(deviations: Picture, limit: Picture) -> Mask:
     """Return where deviations (..., 3) are within a limit (3,)."""
     red, green, blue = (np.abs(deviations[..., channel]) <= limit[channel] for channel in range(3))
     return np.asarray(red & green & blue)
-
-
-def _at_pixels(blocks: Mask, proxy: Proxy) -> Mask:
-    """Values of blocks (rows, columns), repeated at the pixels of a proxy."""
-    rows, columns = (
-        np.minimum(np.arange(pixels) * count // pixels, count - 1)
-        for pixels, count in zip(proxy.seen.shape[1:], blocks.shape, strict=True)
-    )
-    return np.asarray(blocks[rows][:, columns])
 
 
 def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:

@@ -20,7 +20,7 @@ from smokelift.checks.array_types import Doubles, Indices, Mask
 from smokelift.footage.images import Picture, blurred, brightest_channel, channel_mean, linear_to_srgb
 from smokelift.footage.noise import median_of_seen
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.similarity import IDENTITY, Similarity, corners
+from smokelift.footage.registration import IDENTITY, Similarity, corners
 
 Complex = npt.NDArray[np.complex128]
 """Points and shifts of the picture plane, columns + i rows."""
@@ -108,8 +108,12 @@ class Match:
 
     @property
     def fits(self) -> bool:
-        """Whether enough cells fit the motion to register the frame by it."""
+        """Whether enough cells fit the motion."""
         return self.fitting >= max(MIN_CELLS, HALF * self.found)
+
+    def registers(self, shape: tuple[int, ...]) -> bool:
+        """Whether a frame of a shape (rows, columns, ...) can be registered by the motion."""
+        return self.fits and self.motion.reach(*shape[1::-1]) <= MAX_REACH
 
     @property
     def camera(self) -> Literal["still", "moved", "travelled", "unknown"]:
@@ -286,7 +290,7 @@ class CameraMotion:
             return self.measured[number]
         picture = small()
         match = self.texture.match(picture)
-        if match.fits and _within_reach(match, picture.shape):
+        if match.registers(picture.shape):
             return match.motion
         return self.measured[min(self.measured, key=lambda other: abs(other - number))]
 
@@ -356,14 +360,8 @@ def _registered_to_median(proxy: Proxy, matches: Sequence[Match]) -> CameraMotio
 
 def _measured(proxy: Proxy, matches: Sequence[Match]) -> dict[int, Similarity]:
     """The motion in the frames that can be registered, by their numbers in the file."""
-    each = zip(proxy.numbers, matches, strict=True)
-    return {
-        number: match.motion for number, match in each if match.fits and _within_reach(match, proxy.pictures.shape[1:])
-    }
-
-
-def _within_reach(match: Match, shape: tuple[int, ...]) -> bool:
-    return match.motion.reach(*shape[1::-1]) <= MAX_REACH
+    each, shape = zip(proxy.numbers, matches, strict=True), proxy.pictures.shape[1:]
+    return {number: match.motion for number, match in each if match.registers(shape)}
 
 
 def _detail(picture: Picture) -> Picture:

@@ -287,16 +287,13 @@ def _most_detail(detail: Picture, known: Mask) -> Picture:
     return np.quantile(np.abs(detail[known]), DETAIL_QUANTILE, axis=0) if known.any() else np.zeros(3, np.float32)
 
 
-def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -> Picture:
-    """Return the linear background (rows, columns, 3) at full size, made of the frames of the clip's proxy.
-
-    Each frame is brighter by its gain (3,) than the background ``found`` on the proxy.
-    """
+def whole_plate(clip: Clip, proxy: Proxy, found: ClearPicture) -> Picture:
+    """Return the linear background (rows, columns, 3) ``found`` on a proxy at full size, made of the same frames."""
     if found.image.shape[1::-1] == clip.size:
         return found.image
     shown = (found.clear & found.known)[::STEP]
     known = shown.any(0)
-    whole = _mean(clip, proxy.numbers[::STEP], gains[::STEP], np.where(known, shown, True))
+    whole = _mean(clip, proxy.numbers[::STEP], proxy.gains[::STEP], np.where(known, shown, True))
     if known.all():
         return whole
     rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))

@@ -19,8 +19,7 @@ from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSo
 from smokelift.footage.image_sequence import ImageSequence, is_video
 from smokelift.footage.images import Picture, Transfer, reduced_size
 from smokelift.footage.mask import Mask, Seen
-from smokelift.footage.registered import Read, RegisteredMask, registered
-from smokelift.footage.similarity import IDENTITY, Similarity
+from smokelift.footage.registration import IDENTITY, Read, Similarity, registered, registered_mask
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
@@ -64,7 +63,7 @@ class Clip:
         self.path = path
         self.fps = source.fps if fps is None else float(fps)
         self.warning, self.lens, self.backdrop = source.warning, source.lens, source.backdrop
-        self.mask: Mask | RegisteredMask | None = None
+        self.mask: Mask | None = None
         self._source = source
         self._damaged = lru_cache(maxsize=None)(source.damaged)
         self._count = source.count
@@ -243,8 +242,8 @@ class Clip:
                 return motion(number, before(number))
             return IDENTITY  # another frame stands in, as it is registered
 
-        masked = RegisteredMask(self.mask, known)
-        return self._with(_read=registered(before, known), _filmed=registered(filmed, known), mask=masked)
+        mask = registered_mask(self.mask, known)
+        return self._with(_read=registered(before, known), _filmed=registered(filmed, known), mask=mask)
 
     def close(self) -> None:
         """Close the file, and that of a mask."""
@@ -277,7 +276,7 @@ class Clip:
 
     def _behind(self, path: Path) -> Clip:
         """The clip with what a mask hides continued from around it."""
-        mask, filmed = Mask(path, self.numbers, self.size), self._filmed
+        mask, filmed = Mask.open(path, self.numbers, self.size), self._filmed
         read = partial(_kept, Kept(), STORED_BYTES, lambda number: mask.applied(number, filmed(number)))
         count = min(self._count, mask.count or self._count)
         return self._with(_read=read, mask=mask, _count=count)

@@ -17,7 +17,7 @@ from smokelift.checks.array_types import Mask
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, brightest_channel
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate, Plates
+from smokelift.footage.plate import Plate
 from smokelift.scene.checks import Vector
 
 MIN_FLAME_RED = 0.5
@@ -90,9 +90,9 @@ def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
     return HotPixels(float(fire.mean()), float(bright[fire].mean()))
 
 
-def without_fire(clip: Clip, plates: Plates) -> Clip:
-    """Return a clip with the smoke beside fire continued over it; the clip must be exposed as its backgrounds are."""
-    return clip.changed(lambda number, picture: _doused(picture, plates.at(number)))
+def without_fire(clip: Clip, plate: Plate) -> Clip:
+    """Return a clip with the smoke beside fire continued over it; the clip must be exposed as its plate is."""
+    return clip.changed(lambda number, picture: _doused(picture, plate.at(number)))
 
 
 def firelight(clip: Clip, doused: Clip) -> Clip:

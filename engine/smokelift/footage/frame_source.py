@@ -63,11 +63,11 @@ class StoredPicture:
 
     def cut(self, part: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> StoredPicture:
         """Return the pixels that a function takes, whether they are codes or linear."""
-        return StoredPicture(part(self.values), self.table)
+        return StoredPicture(part(self.linear() if self.table is None else self.values), self.table)
 
     def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
         """Return the picture with a function applied to each linear value, computed once for each code."""
-        return change(self.values) if self.table is None else look_up(change(self.table), self.values)
+        return change(self.linear()) if self.table is None else look_up(change(self.table), self.values)
 
     def averaged(self, width: int, height: int) -> Picture:
         """Return the `area_average` of the linear picture."""

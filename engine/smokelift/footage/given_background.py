@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import is_pattern, is_video
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
-from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, Scene, shared_part
 
 ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.9
@@ -26,46 +24,23 @@ def open_plates(background: Background | None, camera: Camera | None) -> Clip | 
     that it begins, else for itself. ClipError is raised if the plate cannot be read.
     """
     image = None if background is None else background.image
-    return None if image is None or not _changes(image, camera) else Clip.open(image)
+    changes = image is not None and ((camera is not None and camera.moves) or is_pattern(image) or is_video(image))
+    return Clip.open(image) if image is not None and changes else None
 
 
-def _changes(image: Path, camera: Camera | None) -> bool:
-    """Whether a clean plate has a picture for each frame."""
-    return (camera is not None and camera.moves) or is_pattern(image) or is_video(image)
+def read_background(background: Background, camera: Camera | None) -> Picture | Clip | None:
+    """Return what a scene says is behind the smoke, but for frames of its clip; None if it says nothing.
 
-
-def one_picture(background: Background | None, camera: Camera | None, clip: Clip) -> Picture | None:
-    """Return the one linear picture (rows, columns, 3) that a scene gives for all frames; None if it gives none.
-
-    Of several frames of the clip it is the first. ClipError or ImageError is raised if it cannot be read.
+    A linear color (3,), a picture (rows, columns, 3), or a clip with one for each frame of the file. ClipError or
+    ImageError is raised if it cannot be read.
     """
-    if background is None:
-        return None
-    if background.frame is not None:
-        return _mean_of_frames(background.frame[:1], clip)
-    image = background.image
-    return None if image is None or _changes(image, camera) else read_image(image)
-
-
-def given_plates(background: Background | None, camera: Camera | None, clip: Clip) -> Plates | None:
-    """Return the background of every frame of a clip as its scene gives it; None if it has to be estimated.
-
-    ClipError or ImageError is raised if a picture or a frame cannot be read, ValueError if plates are too few.
-    """
-    plates = open_plates(background, camera)
-    if plates is not None:
-        return changing_plate(plates, clip)
-    if background is None:
-        return None
     if background.image is not None:
-        return known_plate(read_image(background.image), clip)
-    if background.frame is not None:
-        return known_plate(_mean_of_frames(background.frame, clip), clip)
-    return None if background.color is None else known_plate(background.color, clip)
+        return open_plates(background, camera) or read_image(background.image)
+    return None if background.color is None else np.array(background.color, np.float32)
 
 
-def _mean_of_frames(numbers: Sequence[int], clip: Clip) -> Picture:
-    """The mean (rows, columns, 3) of frames of a clip's file."""
+def mean_of_frames(numbers: Sequence[int], clip: Clip) -> Picture:
+    """Return the mean (rows, columns, 3) of frames of a clip's file, as they were filmed; ClipError if one lacks."""
     whole = clip.whole().as_filmed()
     for number in numbers:
         if number >= len(whole):
@@ -82,17 +57,12 @@ def background_picture(scene: Scene, camera: Camera | None = None) -> Picture:
     the scene's own; `behind` says what another one sees of a clean plate. ImageError or ClipError is raised if the
     plate cannot be read.
     """
-    background = scene.background
-    if background is not None and background.color is not None:
-        return np.array(background.color, np.float32)
-    if background is None or background.image is None:
-        return np.zeros(3, np.float32)
-    plates = open_plates(background, scene.camera)
-    if plates is None:
-        picture = read_image(background.image)
-    else:
-        with plates:
+    picture = None if scene.background is None else read_background(scene.background, scene.camera)
+    if isinstance(picture, Clip):
+        with picture as plates:
             picture = plates.frame(scene.clip.first if scene.clip is not None else 0)
+    if picture is None or picture.ndim == 1:
+        return np.zeros(3, np.float32) if picture is None else picture
     own = scene.camera
     if own is None:
         return picture if camera is None else np.asarray(picture.mean((0, 1)))

@@ -10,6 +10,8 @@ meaning: a frame that shows only a part of its smoke would be taken for one of t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -42,49 +44,67 @@ KEPT_MASKS = 16
 Seen = npt.NDArray[np.bool_]
 
 
+@dataclass(frozen=True, eq=False)
 class Mask:
-    """One mask for all frames of a clip's file, or one for each.
+    """What hides a part of the frames of a clip's file.
 
-    The path is a picture, or a video or a pattern ``mask_####.png`` whose frame n belongs to the file's frame n. A
-    picture with an alpha channel is read over black. ``needed`` are the file's frames that need a mask, ``size`` is the
-    width and height of the clip. ClipError or ImageError is raised if the mask cannot be read, lacks a frame, has
-    another shape than the clip, or hides nearly all of it.
-
-    ``files`` are what it is read from. ``count`` is the number of the file's frames that have a mask, None if one mask
-    serves all.
+    Attributes
+    ----------
+    seen
+        What returns which pixels (height, width) of the file's frame n are not hidden, by n, width and height.
+    files
+        What it is read from.
+    count
+        Number of the file's frames that have a mask, None if one serves all.
+    close
+        What closes its file.
     """
 
-    def __init__(self, path: Path, needed: range, size: tuple[int, int]) -> None:
-        self._video = Video(path, "linear") if is_video(path) else None
-        self.files = numbered_pictures(path) if is_pattern(path) else (path,)
-        self.count = self._video.count if self._video else len(self.files) if is_pattern(path) else None
-        if missing := [file for file in self.files if self.count and not file.is_file()]:
+    seen: Callable[[int, int, int], Seen]
+    files: tuple[Path, ...] = ()
+    count: int | None = None
+    close: Callable[[], None] = lambda: None
+
+    @staticmethod
+    def open(path: Path, needed: range, size: tuple[int, int]) -> Mask:
+        """Open one mask for all frames of a clip's file, or one for each.
+
+        The path is a picture, or a video or a pattern ``mask_####.png`` whose frame n belongs to the file's frame n. A
+        picture with an alpha channel is read over black. ``needed`` are the file's frames that need a mask, ``size`` is
+        the width and height of the clip. ClipError or ImageError is raised if the mask cannot be read, lacks a frame,
+        has another shape than the clip, or hides nearly all of it.
+        """
+        video = Video(path, "linear") if is_video(path) else None
+        files = numbered_pictures(path) if is_pattern(path) else (path,)
+        count = video.count if video else len(files) if is_pattern(path) else None
+        if missing := [file for file in files if count and not file.is_file()]:
             raise ClipError(f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all.")
-        if self.count is None:
+        if count is None:
             needed = needed[:1]
-        elif needed[-1] >= self.count:
+        elif needed[-1] >= count:
             raise ClipError(
-                f"{path}: has masks for {self.count} of the frames 0 to {needed[-1]} that are needed; give one for "
-                "every frame of the clip, or one picture for all."
+                f"{path}: has masks for {count} of the frames 0 to {needed[-1]} that are needed; give one for every "
+                "frame of the clip, or one picture for all."
             )
-        self._kept = lru_cache(maxsize=KEPT_MASKS)(self._resized)
-        (width, height), (rows, columns) = size, self._picture(needed[0]).shape[:2]
-        # either may be a resized copy, whose sides are right to a pixel
-        if abs(columns * height - rows * width) > columns + rows + width + height:
-            raise ClipError(
-                f"{path}: this mask is {columns} x {rows} pixels, another shape than the clip's {width} x {height}; "
-                "paint it over a frame of the clip."
-            )
+
+        def picture(n: int) -> Picture:
+            return video.read(n).linear() if video else read_image(files[n], "linear")
+
+        @lru_cache(maxsize=KEPT_MASKS)
+        def resized(n: int, width: int, height: int) -> Seen:
+            return area_average(picture(n) @ LUMINANCE.astype(np.float32), width, height) >= HALF
+
+        def seen(n: int, width: int, height: int) -> Seen:
+            return resized(n if count else 0, width, height)
+
+        require_shape(f"{path}: this mask is", picture(needed[0] if count else 0), size, "paint it")
         side = max(1, round(MIN_SQUARE * max(size)))
-        if not any(ndimage.binary_erosion(self.seen(n, *size), np.ones((side, side))).any() for n in needed):
+        if not any(ndimage.binary_erosion(seen(n, *size), np.ones((side, side))).any() for n in needed):
             raise ClipError(
                 f"{path}: this mask leaves too little of the picture white (transparent counts as black); paint white "
                 f"where smoke may be, a square of {side} x {side} pixels at least."
             )
-
-    def seen(self, n: int, width: int, height: int) -> Seen:
-        """Return which pixels (height, width) of the file's frame ``n`` are not hidden, at any size."""
-        return self._kept(n if self.count else 0, width, height)
+        return Mask(seen, files, count, video.close if video else lambda: None)
 
     def applied(self, n: int, image: StoredPicture) -> StoredPicture:
         """Return the picture of the file's frame ``n``, continued where it is hidden."""
@@ -95,16 +115,16 @@ class Mask:
         whole[~seen] = continued(whole, seen)
         return StoredPicture(whole)
 
-    def close(self) -> None:
-        """Close the file."""
-        if self._video is not None:
-            self._video.close()
 
-    def _resized(self, n: int, width: int, height: int) -> Seen:
-        return area_average(self._picture(n) @ LUMINANCE.astype(np.float32), width, height) >= HALF
-
-    def _picture(self, n: int) -> Picture:
-        return self._video.read(n).linear() if self._video else read_image(self.files[n if self.count else 0], "linear")
+def require_shape(what: str, picture: Picture, size: tuple[int, int], do: str) -> None:
+    """Raise ClipError if a picture (rows, columns, ...) is not of a clip's shape; ``size`` is its width and height."""
+    (width, height), (rows, columns) = size, picture.shape[:2]
+    # either may be a resized copy, whose sides are right to a pixel
+    if abs(columns * height - rows * width) > columns + rows + width + height:
+        raise ClipError(
+            f"{what} {columns} x {rows} pixels, another shape than the clip's {width} x {height}; {do} over a frame of "
+            "the clip."
+        )
 
 
 def continued(picture: Picture, seen: Seen) -> Picture:

@@ -1,16 +1,12 @@
-"""What a camera sees without smoke: one picture for the whole clip, or one for each frame.
-
-Clips are matched to it here: to its exposure, and without the light that noise adds.
-"""
+"""What a camera sees without smoke, and clips matched to it: at its exposure, without the light that noise adds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -48,86 +44,82 @@ NO_NOISE = lasting_noise(0.0)
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """What the camera sees without smoke.
+    """What the camera sees without smoke: one picture, or one for each frame of a clip.
 
     Attributes
     ----------
     image : (rows, columns, 3)
-        Linear.
+        Linear; that of the first frame if it changes.
     confidence : (rows, columns)
         From 0 (filled from neighbors) to 1 (seen clear in many frames).
     noise
         Noise of the clip's pictures.
     errors : (3, 3)
         Covariance of the linear color errors where it is filled in; 0 if they are unknown.
+    images
+        What makes the image of a frame, counted from 0, behind a camera that moves or before a scene that changes; it
+        raises ClipError if it cannot. None if the background stands still.
+    files
+        What such images are read from.
     """
 
     image: Picture
     confidence: Picture
     noise: Noise
     errors: Picture = field(default_factory=lambda: np.zeros((3, 3), np.float32))
+    images: Callable[[int], Picture] | None = None
+    files: tuple[Path, ...] = ()
 
     def at(self, frame: int) -> Plate:
-        """Return the plate of a frame: this one, since the background stands still."""
-        return self
+        """Return the plate of a frame, counted from 0, which has one image."""
+        return self if self.images is None else replace(self, image=self.images(frame), images=None)
 
     def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> Plate:
         """Return the plate of a part of the picture, or of a smaller one.
 
         ``cut`` makes that from a picture (rows, columns, ...); each new pixel is the mean of ``pixels`` old ones.
         """
-        return Plate(cut(self.image), cut(self.confidence), self.noise.averaged(pixels), self.errors)
+        of, noise = self.images, self.noise.averaged(pixels)
+        images = None if of is None else lambda frame: cut(of(frame))
+        return replace(self, image=cut(self.image), confidence=cut(self.confidence), noise=noise, images=images)
+
+    def gain(self, frame: int, picture: Picture) -> Picture:
+        """Return how many times brighter a frame is, (3,), by its `small` linear picture."""
+        return gain_of(picture, self.at(frame)._small)
+
+    @cached_property
+    def _small(self) -> Picture:
+        return small(self.image)
 
 
-@dataclass(frozen=True, eq=False)
-class ChangingPlate:
-    """A background that differs from frame to frame, behind a camera that moves or before a scene that does.
-
-    ``of`` makes a frame's plate, counted from 0, without its noise; it raises ClipError if it cannot. ``noise`` is that
-    of the footage; ``files`` are what the plates are read from.
-    """
-
-    of: Callable[[int], Plate]
-    noise: Noise
-    files: tuple[Path, ...] = ()
-
-    def at(self, frame: int) -> Plate:
-        """Return the plate of a frame of the footage, counted from 0."""
-        return replace(self.of(frame), noise=self.noise)
-
-    def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> ChangingPlate:
-        """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
-        return ChangingPlate(lambda frame: self.of(frame).through(cut), self.noise.averaged(pixels), self.files)
-
-
-class Plates(Protocol):
-    """The background of every frame of a clip."""
-
-    @property
-    def noise(self) -> Noise:
-        """Noise of the clip's pictures."""
-
-    def at(self, frame: int) -> Plate:
-        """Return the plate of a frame, counted from 0."""
-
-    def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> Plates:
-        """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
-
-
-def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
+def known_plate(background: npt.ArrayLike | Clip, clip: Clip) -> Plate:
     """Return the plate, with the clip's noise, of a known background.
 
-    The background is a linear color (3,), or a picture (rows, columns, 3), resized to the clip if need be. Noise that
-    is clipped at black brightens a black one on the mean, and so its plate. ClipError is raised if a frame cannot be
-    read, ValueError if the background is neither or not finite.
+    The background is a linear color (3,), a picture (rows, columns, 3), or a clip with one for each frame of the clip's
+    file; pictures are resized to the clip if need be. Noise that is clipped at black brightens a black one on the mean,
+    and so its plate. ClipError is raised if a frame cannot be read, ValueError if the background is none of these, not
+    finite, or has too few frames.
     """
-    width, height = clip.size
+    (width, height), last = clip.size, clip.numbers[-1]
+    known = np.ones((height, width), np.float32)
+    if isinstance(background, Clip):
+        if last >= len(background):
+            raise ValueError(
+                f"{background.path}: has {len(background)} of the frames 0 to {last} that are needed; give a clean "
+                "plate with a picture for every frame of the clip, or a color, as background."
+            )
+
+        def images(frame: int) -> Picture:
+            return area_average(background.frame(clip.numbers.start + frame), width, height)
+
+        plate = Plate(images(0), known, NO_NOISE, images=images, files=background.files)
+        return replace(plate, noise=noise_about(*_noise_samples(plate, clip)))
     linear = np.asarray(background, np.float32)
     if linear.shape == (3,):
         linear = np.broadcast_to(linear, (height, width, 3))
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
-    plate = Plate(area_average(linear, width, height), np.ones((height, width), np.float32), NO_NOISE)
+    plate = Plate(area_average(linear, width, height), known, NO_NOISE)
     deviations, blocks = _noise_samples(plate, clip)
     given = linear_to_srgb(plate.image)
     raised = np.maximum(given, clipped_black(deviations, blocks)) - given
@@ -138,37 +130,16 @@ def known_plate(background: npt.ArrayLike, clip: Clip) -> Plate:
     return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting))
 
 
-def changing_plate(plates: Clip, clip: Clip) -> ChangingPlate:
-    """Return the plates, with the clip's noise, of a background that is known frame by frame.
-
-    ``plates`` has a frame for each one of the clip's file, resized to the clip if need be. ValueError is raised if
-    there are too few, ClipError if a frame cannot be read.
-    """
-    last, (width, height) = clip.numbers[-1], clip.size
-    if last >= len(plates):
-        raise ValueError(
-            f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
-            "picture for every frame of the clip, or a color, as background."
-        )
-    known = np.ones((height, width), np.float32)
-
-    def of(frame: int) -> Plate:
-        return Plate(area_average(plates.frame(clip.numbers.start + frame), width, height), known, NO_NOISE)
-
-    silent = ChangingPlate(of, NO_NOISE, plates.files)
-    return replace(silent, noise=noise_about(*_noise_samples(silent, clip)))
-
-
-def _noise_samples(plates: Plates, clip: Clip) -> tuple[Picture, Picture]:
+def _noise_samples(plate: Plate, clip: Clip) -> tuple[Picture, Picture]:
     """Differences of a clip from known backgrounds, as `noise_about` takes them; NaN where a mask hides it."""
     single, blocks = [], []
     encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # once if the plate is always the same
     for number in clip.spread(NOISE_FRAMES):
-        plate, stored = plates.at(number), clip.stored(number)
+        behind, stored = plate.at(number), clip.stored(number)
         seen = clip.as_seen(number, stored.linear())
-        gains = gain_of(small(seen), small(plate.image))
+        gains = behind.gain(number, small(seen))
         even = stored.through(linear_to_srgb) if (gains == 1).all() else linear_to_srgb(seen / gains)
-        deviation = clip.as_seen(number, even) - encoded(plate)
+        deviation = clip.as_seen(number, even) - encoded(behind)
         single.append(some_blocks(deviation))
         blocks.append(block_means(deviation[None])[0])
     return np.stack(single), np.stack(blocks)
@@ -182,12 +153,11 @@ def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
     return plate.noise.total * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))
 
 
-def evened(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
-    """Return a clip exposed as its backgrounds are; ``known`` are gains (3,) by frame that are not measured."""
-    gains_of = exposures(plates)
+def evened(clip: Clip, plate: Plate, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
+    """Return a clip exposed as its plate is; ``known`` are gains (3,) by frame that are not measured."""
 
     def gains(number: int, shown: Callable[[], Picture]) -> Picture:
-        return known[number] if number in known else gains_of(number, shown())
+        return known[number] if number in known else plate.gain(number, shown())
 
     def balanced(number: int, picture: Picture) -> Picture:
         return picture / gains(number, lambda: small(picture))
@@ -210,18 +180,17 @@ def without_noise_light(clip: Clip, noise: Noise) -> Clip:
     return clip.changed(lessened)
 
 
-def cleared(clip: Clip, plates: Plates) -> Clip:
+def cleared(clip: Clip, plate: Plate) -> Clip:
     """Return a clip that shows its background, at each frame's exposure, where a mask hides it."""
-    return clip if clip.mask is None else shown_behind(clip, plates, clip.as_seen)
+    return clip if clip.mask is None else shown_behind(clip, plate, clip.as_seen)
 
 
-def shown_behind(clip: Clip, plates: Plates, visible: Callable[[int, Picture], Picture]) -> Clip:
+def shown_behind(clip: Clip, plate: Plate, visible: Callable[[int, Picture], Picture]) -> Clip:
     """Return a clip that shows its background, at each frame's exposure, where ``visible`` makes it not a number."""
-    gains_of = exposures(plates)
 
     def change(number: int, picture: Picture) -> Picture:
         shown = visible(number, picture)
-        return np.where(np.isnan(shown), plates.at(number).image * gains_of(number, small(shown)), picture)
+        return np.where(np.isnan(shown), plate.at(number).image * plate.gain(number, small(shown)), picture)
 
     return clip.changed(change)
 
@@ -240,21 +209,11 @@ def uncovered(plate: Plate, clip: Clip) -> Plate:
         hidden = hidden if seen is None else hidden & ~seen
     if not hidden.any():
         return plate
-    filmed, gains_of = clip.as_filmed(), exposures(plate)
+    filmed = clip.as_filmed()
     shown = []
     for number in numbers:
-        gains = gains_of(number, small(clip.as_seen(number, clip.frame(number))))
+        gains = plate.gain(number, small(clip.as_seen(number, clip.frame(number))))
         shown.append(filmed.frame(number)[hidden] / gains)
     image = plate.image.copy()
     image[hidden] = np.median(shown, axis=0)
     return replace(plate, image=image)
-
-
-def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:
-    """Return what gives the gain (3,) of a frame, by number and `small` picture, against its background."""
-
-    @lru_cache(maxsize=1)
-    def still(plate: Plate) -> Picture:
-        return small(plate.image)
-
-    return lambda number, picture: gain_of(picture, still(plates.at(number)))

@@ -20,7 +20,7 @@ from smokelift.footage.exposure import gain_of, sample_gains, small
 from smokelift.footage.frame_source import ClipError, StoredPicture
 from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb, reduced_size
 from smokelift.footage.mask import Seen
-from smokelift.footage.noise import some_blocks
+from smokelift.footage.noise import Noise, noise_of, some_blocks, spread_about, white_noise
 
 PROXY_SIDE = 480
 """Pixels along the longer side: lengths in `clear_picture` hold at some hundred (docs/experiments/background.md)."""
@@ -56,6 +56,8 @@ class Proxy:
         The same with what a mask hides.
     seen : (frames, rows, columns) bool
         Pixels that no mask hides.
+    gains : (frames, 3)
+        Exposure of the file's frames over that of the pictures: 1, unless they are `evened`.
     blocks
         For `NOISE_FRAMES` of the clip's frames, `some_blocks` of the full picture, and where no mask hides them (None
         without one).
@@ -68,6 +70,7 @@ class Proxy:
     pictures: Picture
     filmed: Picture
     seen: NDArray[np.bool_]
+    gains: Picture
     blocks: Mapping[int, tuple[StoredPicture, Seen | None]]
     scale: float
 
@@ -95,7 +98,8 @@ class Proxy:
         scale = max(clip.size) / max(columns, rows)
         whole_file = np.stack(list(pictures.values()))
         bare = np.stack(filmed) if filmed else whole_file
-        return Proxy(tuple(pictures), (numbers[0], numbers[-1]), whole_file, bare, np.stack(seen), blocks, scale)
+        gains, used = np.ones((len(pictures), 3), np.float32), (numbers[0], numbers[-1])
+        return Proxy(tuple(pictures), used, whole_file, bare, np.stack(seen), gains, blocks, scale)
 
     @cached_property
     def encoded(self) -> Picture:
@@ -168,17 +172,36 @@ class Proxy:
     def only(self, which: NDArray[np.intp]) -> Proxy:
         """Return some of the frames, by their indices here."""
         numbers = tuple(self.numbers[n] for n in which)
-        pictures, filmed = self.pictures[which], self.filmed[which]
-        return replace(self, numbers=numbers, pictures=pictures, filmed=filmed, seen=self.seen[which])
+        pictures, filmed, seen = self.pictures[which], self.filmed[which], self.seen[which]
+        return replace(self, numbers=numbers, pictures=pictures, filmed=filmed, seen=seen, gains=self.gains[which])
 
     @cached_property
-    def evened(self) -> tuple[Proxy, Picture]:
-        """The pictures at one exposure, and the gains (frames, 3) that they had."""
+    def evened(self) -> Proxy:
+        """The pictures at one exposure."""
         hidden = np.where(self.seen[..., None], self.pictures, np.float32(np.nan))
         gains = sample_gains(np.stack([small(picture) for picture in hidden]))
         if (gains == 1).all():
-            return self, gains
-        return replace(self, pictures=self.pictures / gains[:, None, None, :]), gains
+            return self
+        return replace(self, pictures=self.pictures / gains[:, None, None, :], gains=gains)
+
+    def white_noise(self) -> Picture:
+        """Return the white noise (3,) of the file's pixels, in sRGB values, measured at one exposure."""
+        part, blocks = self.only(np.flatnonzero([number in self.blocks for number in self.numbers])), []
+        for number, gain in zip(part.numbers, part.evened.gains, strict=True):
+            some, seen = self.blocks[number]
+            even = some.through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(some.linear() / gain)
+            blocks.append(even if seen is None else np.where(seen[..., None], even, np.float32(np.nan)))
+        return white_noise(np.stack(blocks))
+
+    def deviations(self, background: Picture) -> Picture:
+        """Return differences (frames, rows, columns, 3) from a linear background, in sRGB values; NaN is hidden."""
+        deviations = self.encoded - linear_to_srgb(background)
+        deviations[~self.seen] = np.nan
+        return deviations
+
+    def noise_about(self, background: Picture, white: Picture) -> Noise:
+        """Return the noise, with a ``white`` part (3,), of the file's pixels about a linear background."""
+        return noise_of(white, spread_about(self.deviations(background)), self.scale**2)
 
 
 def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> tuple[int, int]:

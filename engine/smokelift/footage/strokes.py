@@ -18,7 +18,8 @@ from smokelift.footage.exposure import small
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_layer, srgb_to_linear
 from smokelift.footage.inpainting import continuation_errors, push_pull
-from smokelift.footage.plate import Plate, exposures, shown_behind
+from smokelift.footage.mask import require_shape
+from smokelift.footage.plate import Plate, shown_behind
 
 PAINTED = 0.5
 """Alpha, difference of a stroke's channels, and fraction of a pixel's area, from which on a pixel is painted: nearer to
@@ -43,21 +44,15 @@ class Strokes:
         ImageError is raised if the file cannot be read, ClipError if it has another shape, or no stroke.
         """
         values, alpha = read_layer(path, "linear")
-        (width, height), (rows, columns) = size, values.shape[:2]
-        # either may be a resized copy, whose sides are right to a pixel
-        if abs(columns * height - rows * width) > columns + rows + width + height:
-            raise ClipError(
-                f"{path}: these strokes are {columns} x {rows} pixels, another shape than the clip's {width} x "
-                f"{height}; paint them over a frame of the clip."
-            )
-        opaque = np.ones((rows, columns), np.bool_) if alpha is None else alpha >= PAINTED
+        require_shape(f"{path}: these strokes are", values, size, "paint them")
+        opaque = np.ones(values.shape[:2], np.bool_) if alpha is None else alpha >= PAINTED
         if not opaque.any():
             raise ClipError(f"{path}: nothing is painted there; paint strokes, or leave them out.")
         painted = opaque & (np.ptp(values, axis=-1) >= PAINTED)
         if not painted.any():
             raise ClipError(f"{path}: no stroke is green (smoke), red (not smoke) or blue (behind); use pure colors.")
         nearest = values.argmax(-1)
-        red, green, blue = (area_average(painted & (nearest == n), width, height) >= PAINTED for n in range(3))
+        red, green, blue = (area_average(painted & (nearest == n), *size) >= PAINTED for n in range(3))
         return Strokes(green, red, blue)
 
     @property
@@ -98,8 +93,8 @@ def without_others(strokes: Strokes, clip: Clip, plate: Plate) -> Clip:
 
 def _median(clip: Clip, plate: Plate, where: Mask) -> Picture:
     """The median (n, 3) over time of pixels, at the plate's exposure."""
-    gains_of, shown = exposures(plate), []
+    shown = []
     for number in clip.spread(MEDIAN_FRAMES):
         picture = clip.frame(number)
-        shown.append(picture[where] / gains_of(number, small(clip.as_seen(number, picture))))
+        shown.append(picture[where] / plate.gain(number, small(clip.as_seen(number, picture))))
     return np.asarray(np.median(shown, axis=0), np.float32)

@@ -12,7 +12,7 @@ from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern
 from smokelift.footage.images import Picture
-from smokelift.footage.plate import Plates, evened
+from smokelift.footage.plate import Plate, evened
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
 from smokelift.setup.first_estimate import sample_smoke
@@ -41,7 +41,7 @@ class Extraction:
     """
 
     clip: Clip
-    plates: Plates
+    plates: Plate
     source: Picture
 
     @property

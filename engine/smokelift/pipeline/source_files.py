@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from smokelift.footage.plate import ChangingPlate
 from smokelift.output.files import checksum
 from smokelift.scene import Background, EnvironmentLight
 from smokelift.setup.shot import Shot, ShotView
@@ -40,6 +39,4 @@ def sources(shot: Shot) -> dict[str, dict[str, Any]]:
 
 def _background(given: Background | None, view: ShotView) -> tuple[Path, ...]:
     """The files of a background; none where it is a color, or estimated."""
-    if isinstance(view.plates, ChangingPlate):
-        return view.plates.files
-    return () if given is None or given.image is None else (given.image,)
+    return view.plates.files or (() if given is None or given.image is None else (given.image,))

@@ -16,7 +16,7 @@ from smokelift.footage.fire import HotPixels, fire_color, firelight, hot_pixels,
 from smokelift.footage.given_background import backdrop_color
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plates, evened, exposures
+from smokelift.footage.plate import Plate, evened
 from smokelift.scene import Background, Camera, Medium
 from smokelift.scene.checks import Vector
 
@@ -115,7 +115,7 @@ class FirstEstimate:
 
     clip: Clip
     found: Backdrop
-    plates: Plates
+    plates: Plate
     samples: SmokeSamples
     fire: Fire | None
     hot: HotPixels
@@ -147,7 +147,7 @@ def first_estimate(
     return FirstEstimate(exposed, found, plates, samples, fire, hot, source)
 
 
-def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plates, Picture | None]:
+def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plate, Picture | None]:
     """Return the plates of a clip, found in turn with its smoke, and the usual source radiance (3,) of that.
 
     There is none before what does not show T: black, one color, or a picture that is as good as one; and without
@@ -160,20 +160,20 @@ def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plat
     return (plates, source) if shows_transmittance(shown, source) else (found.plates, None)
 
 
-def visible_plate(plates: Plates, clip: Clip, frame: int) -> Picture:
+def visible_plate(plates: Plate, clip: Clip, frame: int) -> Picture:
     """Return the plate (rows, columns, 3) of a frame; where a mask hides it, and no smoke is, the mean of the rest."""
     plate, seen = plates.at(frame).image, clip.seen(frame, *clip.size)
     return plate if seen is None else np.where(seen[..., None], plate, plate[seen].mean(0))
 
 
-def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
+def unknown_part(plates: Plate, clip: Clip, number: int) -> NDArray[np.bool_]:
     """Return the pixels (rows, columns) whose background is unknown in a frame and not hidden by a mask."""
     unknown = plates.at(number).confidence < UNKNOWN
     seen = clip.seen(number, *unknown.shape[::-1])
     return unknown if seen is None else unknown & seen
 
 
-def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
+def sample_smoke(clip: Clip, plates: Plate) -> SmokeSamples:
     """Find the smoke in frames spread over a clip, whose exposure may change."""
     width, height = clip.size
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
@@ -183,11 +183,10 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
-    gains_of = exposures(reduced)
     for number in clip.spread(SAMPLE_FRAMES):
         plate = reduced.at(number)
         seen = clip.stored(number).averaged(columns, rows)
-        gains[number] = gains_of(number, small(seen))
+        gains[number] = reduced.gain(number, small(seen))
         picture = seen / gains[number]
         mask = matte(picture, plate).mask
         covered |= mask

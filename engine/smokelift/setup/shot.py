@@ -11,7 +11,7 @@ from smokelift.checks import Finding
 from smokelift.density import AxisEstimate, Observation
 from smokelift.extraction import Element, extract_element
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plate, Plates, uncovered
+from smokelift.footage.plate import Plate, uncovered
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
@@ -30,12 +30,12 @@ class ShotView:
 
     clip: Clip
     camera: Camera
-    plates: Plates
+    plates: Plate
     working: WorkingPicture
     source: Image | None = None
 
     @staticmethod
-    def before(domain: Domain, clip: Clip, camera: Camera, plates: Plates) -> ShotView:
+    def before(domain: Domain, clip: Clip, camera: Camera, plates: Plate) -> ShotView:
         """Return a camera's view of a domain; CameraError if no frame shows it."""
         for frame in range(len(camera.matrices)):
             with suppress(CameraError):
@@ -72,7 +72,7 @@ class ShotView:
             return None
 
     @cached_property
-    def _still_plates(self) -> Plates:
+    def _still_plates(self) -> Plate:
         """Plates of a still camera's small picture."""
         return self.plates.through(self.working.cut, self.working.pixels)
 
@@ -127,7 +127,7 @@ class Shot:
         """
         plates, background = self.views[0].plates, self.scene.background
         painted = background.strokes is not None
-        if not isinstance(plates, Plate) or (background.image is not None and not painted):
+        if plates.images is not None or (background.image is not None and not painted):
             return None
         shown = plates if self.moves else uncovered(plates, self.clip)
         return None if background.color is not None and not painted and shown is plates else shown.image

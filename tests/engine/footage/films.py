@@ -182,9 +182,7 @@ def codes_apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def plate_of(clip: Clip) -> Plate:
     """Return the background that is found for a clip whose camera stands still."""
-    found = find_backdrop(clip, None, None).plates
-    assert isinstance(found, Plate)
-    return found
+    return find_backdrop(clip, None, None).plates
 
 
 def clear_plate(image: np.ndarray, codes: float = 1.0) -> Plate:

@@ -13,9 +13,8 @@ from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.camera_motion import CameraMotion, find_motion
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.plate import Plate
 from smokelift.footage.proxy import Proxy
-from smokelift.footage.similarity import Similarity, corners
+from smokelift.footage.registration import Similarity, corners
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 
@@ -72,8 +71,8 @@ def shifts(down: np.ndarray, right: np.ndarray) -> tuple[Similarity, ...]:
 
 def found(pictures: np.ndarray) -> CameraMotion | str | None:
     """Return the motion that is found in pictures."""
-    seen = np.ones(pictures.shape[:3], np.bool_)
-    return find_motion(Proxy(tuple(range(len(pictures))), (0, len(pictures) - 1), pictures, pictures, seen, {}, 1.0))
+    count, seen, gains = len(pictures), np.ones(pictures.shape[:3], np.bool_), np.ones((len(pictures), 3), np.float32)
+    return find_motion(Proxy(tuple(range(count)), (0, count - 1), pictures, pictures, seen, gains, {}, 1.0))
 
 
 def pixels_off(motion: CameraMotion, truth: tuple[Similarity, ...]) -> float:
@@ -205,7 +204,6 @@ def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path: Path)
         assert backdrop.motion is not None
         assert backdrop.motion.reference is None
         assert backdrop.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
-        assert isinstance(backdrop.plates, Plate)
         off = codes_apart(backdrop.clip.frame(0), backdrop.plates.image)
         assert off[10 : SIZE[0] // 2, 10:-10].mean() < 4
 
@@ -220,6 +218,5 @@ def test_frames_of_the_clip_are_a_plate_that_the_others_are_registered_to(tmp_pa
     with clip_of_puff(tmp_path, shifts(*SHAKE)) as clip:
         backdrop = find_backdrop(clip, None, Background(frame=(0,)))
         assert backdrop.motion is not None
-        assert isinstance(backdrop.plates, Plate)
         off = codes_apart(backdrop.clip.frame(5), backdrop.plates.image)
         assert off[10 : SIZE[0] // 3, 10:-10].mean() < 4

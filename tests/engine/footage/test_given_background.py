@@ -9,8 +9,8 @@ from films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, pan, passing_wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.given_background import background_picture, given_plates, open_plates
-from smokelift.footage.plate import ChangingPlate, Plate
+from smokelift.footage.given_background import background_picture, mean_of_frames, open_plates, read_background
+from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix
 
@@ -28,15 +28,11 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_color_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
-    plates = given_plates(Background(color=(0.1, 0.2, 0.3)), None, clip)
-    assert isinstance(plates, Plate)
-    assert plates.at(0) is plates.at(COUNT - 1)
-    np.testing.assert_allclose(plates.image[5, 7], (0.1, 0.2, 0.3), atol=1e-4)
-    picture = Background(image=folder / "plate" / "frame_003.png")
-    plates = given_plates(picture, None, clip)
-    assert isinstance(plates, Plate)
-    assert codes_apart(plates.image, passing_wall()[:, 6 : 6 + WIDTH]).max() < 6
-    assert open_plates(picture, None) is None
+    color, picture = Background(color=(0.1, 0.2, 0.3)), Background(image=folder / "plate" / "frame_003.png")
+    for background, behind, codes in ((color, (0.1, 0.2, 0.3), 0.1), (picture, passing_wall()[:, 6 : 6 + WIDTH], 6)):
+        plate = known_plate(read_background(background, None), clip)
+        assert plate.at(0) is plate.at(COUNT - 1)
+        assert codes_apart(plate.image, np.broadcast_to(behind, plate.image.shape)).max() < codes
 
 
 def test_frames_of_the_clip_are_its_plate_as_they_were_filmed(tmp_path: Path) -> None:
@@ -48,17 +44,14 @@ def test_frames_of_the_clip_are_its_plate_as_they_were_filmed(tmp_path: Path) ->
     write_image(tmp_path / "mask.png", seen)
     for mask in (None, tmp_path / "mask.png"):
         with Clip.open(tmp_path / "frame_###.exr", frames=(1, 2), mask=mask) as clip:
-            plates = given_plates(Background(frame=(0, 3)), None, clip)
-            assert isinstance(plates, Plate)
-            np.testing.assert_allclose(plates.image, filmed[[0, 3]].mean(0), atol=1e-3)
+            np.testing.assert_allclose(mean_of_frames((0, 3), clip), filmed[[0, 3]].mean(0), atol=1e-3)
             with pytest.raises(ClipError, match="has no frame 4"):
-                given_plates(Background(frame=(4,)), None, clip)
+                mean_of_frames((4,), clip)
 
 
 def test_pictures_are_a_plate_a_frame_and_are_cut_like_one(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
-    plates = given_plates(Background(image=folder / "plate" / "frame_###.png"), CAMERA, clip)
-    assert isinstance(plates, ChangingPlate)
+    plates = known_plate(read_background(Background(image=folder / "plate" / "frame_###.png"), CAMERA), clip)
     part = plates.through(lambda picture: picture[8:40]).through(lambda picture: picture[:, 4:])
     for n in (0, 9):
         np.testing.assert_array_equal(part.at(n).image, plates.at(n).image[8:40, 4:])

@@ -55,7 +55,7 @@ def mask(tmp_path: Path) -> Path:
     ids=["gray", "transparent"],
 )
 def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path: Path, values: list, shown: list) -> None:
-    seen = Mask(painted(tmp_path / "mask.png", np.array(values)), range(1), (80, 20)).seen(0, 8, 2)
+    seen = Mask.open(painted(tmp_path / "mask.png", np.array(values)), range(1), (80, 20)).seen(0, 8, 2)
     np.testing.assert_array_equal(seen, [np.repeat(np.array(shown, bool), 2)] * 2)
 
 

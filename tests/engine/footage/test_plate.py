@@ -9,7 +9,7 @@ from films import COUNT, HEIGHT, WIDTH, codes_apart, film, overlap, pan, passing
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import changing_plate, evened, known_plate, without_noise_light
+from smokelift.footage.plate import evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
 
 
@@ -47,7 +47,7 @@ def test_a_plate_for_every_frame(tmp_path: Path) -> None:
     wide = passing_wall()
     clip = pan(tmp_path / "clip", wide, 1.0)
     plates = pan(tmp_path / "plate", wide, 0.0)
-    changing = changing_plate(plates, clip)
+    changing = known_plate(plates, clip)
     for n in (4, 12, 20):
         plate = changing.at(n)
         assert codes_apart(plate.image, wide[:, 2 * n : 2 * n + WIDTH]).max() < 6
@@ -64,10 +64,10 @@ def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
     pan(tmp_path / "clip", wide, 1.0)
     plates = pan(tmp_path / "plate", wide, 0.0)
     late = Clip.open(tmp_path / "clip" / "frame_###.png", fps=24, frames=(10, 15))
-    assert codes_apart(changing_plate(plates, late).at(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
+    assert codes_apart(known_plate(plates, late).at(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
     few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
     with pytest.raises(ValueError, match="has 13 of the frames 0 to 15 that are needed"):
-        changing_plate(few, late)
+        known_plate(few, late)
 
 
 @pytest.mark.parametrize("codes", [13.0, 25.0, 51.0])

@@ -35,7 +35,6 @@ def strokes(folder: Path, *painted: tuple[np.ndarray, tuple[int, ...]]) -> Path:
 
 def painted(clip: Clip, *lines: tuple[np.ndarray, tuple[int, ...]], **given: object) -> tuple[Backdrop, Plate]:
     found = find_backdrop(clip, None, Background(strokes=strokes(clip.path.parent, *lines), **given))
-    assert isinstance(found.plates, Plate)
     return found, found.plates
 
 

@@ -45,7 +45,6 @@ def wall() -> np.ndarray:
 def found(clip: Clip) -> Plate:
     backdrop = find_backdrop(clip, None, None)
     assert backdrop.source == "picture"
-    assert isinstance(backdrop.plates, Plate)
     return backdrop.plates
 
 

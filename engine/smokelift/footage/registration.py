@@ -1,17 +1,25 @@
-"""Similarities of the picture plane: a shift, a rotation and a zoom."""
+"""Registration: frames as a reference shows them, by a similarity of the picture plane each."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks.array_types import Mask
+from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import Picture
+from smokelift.footage.mask import KEPT_MASKS, Mask, Seen
+
+KEPT_FRAMES = 2
+"""Registered frames that are kept: several parts of the program read one after another."""
+
+Read = Callable[[int], StoredPicture]
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,7 @@ class Similarity:
             found = np.stack(list(pool.map(one, channels)), axis=-1)
         return np.maximum(found, 0)  # splines overshoot beside edges, and light is not negative
 
-    def nearest(self, seen: Mask) -> Mask:
+    def nearest(self, seen: Seen) -> Seen:
         """Return which pixels (rows, columns) of the reference a frame shows; ``seen`` are its pixels that count."""
         matrix, offset = self._of_indices(seen.shape)
         shown = ndimage.affine_transform(seen.astype(np.uint8), matrix, offset, order=0, mode="constant")
@@ -83,3 +91,52 @@ def corners(width: int, height: int) -> npt.NDArray[np.complex128]:
     """Return the corners (4,) of a picture as a `Similarity` takes points."""
     x, y = np.array([width, height]) / (2 * max(width, height))
     return np.array([-x - 1j * y, x - 1j * y, x + 1j * y, -x + 1j * y])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RegisteredPicture(StoredPicture):
+    """A stored frame that is registered when it is read: many readers need it at reduced size alone.
+
+    Its ``values`` are the frame's. ``motion`` is that of the camera in it, ``whole`` makes the registered picture.
+    """
+
+    raw: StoredPicture
+    motion: Similarity
+    whole: Callable[[], Picture]
+
+    def linear(self) -> Picture:
+        """Return the linear picture (rows, columns, 3), read-only."""
+        return self.whole()
+
+    def averaged(self, width: int, height: int) -> Picture:
+        """Return the `area_average` of the linear picture, registered at that size."""
+        return self.motion.registered(self.raw.averaged(width, height))
+
+
+def registered(read: Read, motion: Callable[[int], Similarity]) -> Read:
+    """Return what reads the frames of a file registered by their motion."""
+
+    @lru_cache(maxsize=KEPT_FRAMES)
+    def whole(number: int) -> Picture:
+        picture = motion(number).registered(read(number).linear())
+        picture.flags.writeable = False
+        return picture
+
+    def frame(number: int) -> StoredPicture:
+        raw = read(number)
+        return RegisteredPicture(raw.values, raw=raw, motion=motion(number), whole=partial(whole, number))
+
+    return frame
+
+
+def registered_mask(mask: Mask | None, motion: Callable[[int], Similarity]) -> Mask:
+    """Return what a mask hides in frames that are registered, and what of the reference such frames do not show.
+
+    ``mask`` is that of the frames as they were filmed, if there is one.
+    """
+
+    @lru_cache(maxsize=KEPT_MASKS)
+    def seen(n: int, width: int, height: int) -> Seen:
+        return motion(n).nearest(np.ones((height, width), np.bool_) if mask is None else mask.seen(n, width, height))
+
+    return Mask(seen) if mask is None else replace(mask, seen=seen)
