@@ -1,8 +1,14 @@
 """Extraction: smoke apart from what is behind it, I = S + T B + n; before anything is fitted."""
 
-from smokelift.extraction.element import Element, extract_element, usual_source
+from smokelift.extraction.element import (
+    Element,
+    brightest_smoke,
+    extract_element,
+    shows_transmittance,
+    tells_source,
+    usual_source,
+)
 from smokelift.extraction.hidden_plate import plates_and_source
-from smokelift.extraction.source import brightest_smoke, shows_transmittance, tells_source
 
 __all__ = [
     "Element",

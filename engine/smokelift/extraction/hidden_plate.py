@@ -18,8 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Mask
-from smokelift.extraction.element import BRIGHTNESS_RANGE, FINER, OUTLIER_FREEDOM, Cells, extracted, source_of
-from smokelift.extraction.source import clip_source
+from smokelift.extraction.element import (
+    BRIGHTNESS_RANGE,
+    FINER,
+    OUTLIER_FREEDOM,
+    Cells,
+    clip_source,
+    extracted,
+    source_of,
+)
 from smokelift.footage.background_kind import OBJECT
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, reduced_size
@@ -61,25 +68,25 @@ def plates_and_source(clip: Clip, shot: Clip, plates: Plate, smoky: Sequence[int
     source = clip_source(clip, plates, smoky)
     if plates.images is not None:
         return plates, source
-    better = plate_in_turn(shot, plates, source)
+    better, loss = plate_in_turn(shot, plates, source)
     if better is plates:
         return plates, source
-    shrunk, sources = _shrunk(shot, plates), (source, clip_source(clip, better, smoky))
+    after = clip_source(clip, better, smoky)
     # a plate that holds bright smoke makes what it leaves look like dark smoke
-    return better, min(sources, key=lambda each: _likeliest(*shrunk, each)[1])
+    return better, source if loss <= _likeliest(*_shrunk(shot, plates), after)[1] else after
 
 
-def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
-    """Return a plate that is better known where its confidence is less than 1.
+def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> tuple[Plate, float]:
+    """Return a plate that is better known where its confidence is less than 1, and the mean loss of the first turn.
 
     ``clip`` is at the plate's exposure. ``source`` (3,) is the usual source radiance of its smoke.
     """
     if (1 - plate.confidence).mean() < MIN_UNKNOWN or not plate.errors.any():
-        return plate
+        return plate, 0.0
     pictures, first, size = _shrunk(clip, plate)
     behind = area_average(first.image, *size)
     variance = float(np.trace(plate.errors)) / 3
-    start, _ = _likeliest(pictures, first, size, source)
+    start, loss = _likeliest(pictures, first, size, source)
     found = replace(first, image=_changed(first, start - behind))
     for _ in range(TURNS):
         best, clearest = np.zeros_like(behind[..., :1]), start
@@ -91,7 +98,7 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> Plate:
         change = start + (1 - left) * (clearest - start) - behind
         found = replace(first, image=_changed(first, change))
     confidence = 1 - (1 - plate.confidence) * area_average(left[..., 0], *clip.size)
-    return replace(plate, image=_changed(plate, change), confidence=confidence)
+    return replace(plate, image=_changed(plate, change), confidence=confidence), loss
 
 
 def _shrunk(clip: Clip, plate: Plate) -> tuple[list[Picture], Plate, tuple[int, int]]:

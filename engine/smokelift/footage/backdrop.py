@@ -11,19 +11,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.background_kind import MAX_DEVIATION, color_around, rank, within
+from smokelift.footage.background_kind import MAX_DEVIATION, color_around, likeliest, within
 from smokelift.footage.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.given_background import mean_of_frames, read_background
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
-from smokelift.footage.inpainting import DETAIL
+from smokelift.footage.inpainting import DETAIL, continuation_errors
 from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, lasting_noise, median_of_seen, noise_of, spread_about
 from smokelift.footage.plate import Plate, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import PROXY_SIDE, Proxy
@@ -44,9 +43,6 @@ have .2 and more, two walls before a moving camera .05 and .12 (docs/experiments
 
 TEXTURE = np.float32(6 / 255)
 """White noise, in sRGB values, above which it is texture that a moving camera sees."""
-
-NO_ERRORS = np.zeros((3, 3), np.float32)
-"""Covariance of the color errors of a known background."""
 
 MOVING_CAMERA = (
     "The camera moves, so what is behind the smoke cannot be found from the clip. Stabilize the clip (Blender's Movie "
@@ -146,7 +142,13 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     found = replace(found, clip=cleared(found.clip, plate), plates=plate)
     if background is None or background.strokes is None or gray is not None:
         return found
-    return _with_strokes(found, background, background.strokes, moves)
+    if moves or plate.images is not None:
+        raise ValueError(STROKES_OVER_ONE_FRAME)
+    strokes, clip = Strokes.read(background.strokes, found.clip.size), found.clip
+    one_color = background.color is not None or (background.estimated and found.source != "picture")
+    plate = stroked_plate(strokes, plate, clip, one_color)
+    clip = without_others(strokes, clip, plate)
+    return replace(found, clip=clip, plates=plate, background=background, strokes=strokes)
 
 
 def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMotion | None]:
@@ -166,18 +168,6 @@ def _registered(clip: Clip, motion: CameraMotion) -> Clip:
     return clip.registered(lambda number, frame: motion.at(number, lambda: frame.averaged(*size)))
 
 
-def _with_strokes(found: Backdrop, background: Background, path: Path, moves: bool) -> Backdrop:
-    """A background with what strokes say of it."""
-    if moves or found.plates.images is not None:
-        raise ValueError(STROKES_OVER_ONE_FRAME)
-    strokes, clip = Strokes.read(path, found.clip.size), found.clip
-    one_color = background.color is not None or (background.estimated and found.source != "picture")
-    plate = stroked_plate(strokes, found.plates, clip, one_color)
-    return replace(
-        found, clip=without_others(strokes, clip, plate), plates=plate, background=background, strokes=strokes
-    )
-
-
 def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> Backdrop:
     """The background of a clip when none is given; ``motion`` is that by which its frames are registered."""
     filmed = clip
@@ -189,7 +179,7 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     if quiet is not clip:
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
-    found = rank(part.evened, white)
+    found = likeliest(part.evened, white)
     color, objects = found.color, found.objects
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
@@ -227,7 +217,7 @@ def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
     picture = clear_picture(proxy, noise.averaged(proxy.scale**2), DETAIL / proxy.scale)
     known = spread_out(picture.known, clip.size).astype(np.float32)
     image, noise = whole_plate(clip, proxy, picture), proxy.noise_about(picture.image, white)
-    return Plate(image, known, noise, picture.errors)
+    return Plate(image, known, noise, continuation_errors(picture.image, picture.known))
 
 
 def _of_one_color(clip: Clip, proxy: Proxy, color: Picture, objects: Mask, white: Picture) -> Plate:
@@ -245,6 +235,6 @@ def _of_one_color(clip: Clip, proxy: Proxy, color: Picture, objects: Mask, white
         limit = MAX_DEVIATION * noise.averaged(proxy.scale**2).total
         clear[:, objects] = within(proxy.encoded[:, objects] - linear_to_srgb(own), limit)
         known = np.ones(objects.shape, np.bool_)
-        picture = whole_plate(clip, proxy, ClearPicture(image, known, clear, known.astype(np.float32), NO_ERRORS))
+        picture = whole_plate(clip, proxy, ClearPicture(image, known, clear, known.astype(np.float32)))
         whole = np.where(spread_out(objects, clip.size)[..., None], picture, whole)
     return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)

@@ -1,4 +1,4 @@
-"""Whether a clip stands before one color or a picture: one cost ranks them.
+"""Whether a clip stands before one color or a picture: hypotheses, of which the likeliest is taken.
 
 A block of the picture is clear, and shows its background within the noise, or it is smoke, and shows anything. Smoke
 goes on as it was, or jumps to any value. The cost of a background is the negative logarithm of the blocks' probability
@@ -78,25 +78,27 @@ stages in the dark (docs/experiments/background.md)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Ranking:
-    """The likeliest background: one linear color (3,), or a picture if ``color`` is None.
+class Hypothesis:
+    """A background: one linear color (3,), or a picture if ``color`` is None.
 
-    ``objects`` (rows, columns) are the proxy's pixels where something hides the color all the time. ``clear`` is the
-    share of all blocks and frames that show the color.
+    ``cost`` is the negative logarithm of the frames' probability before it, on the mean over blocks. ``objects`` (rows,
+    columns) are the proxy's pixels where something hides the color all the time. ``clear`` is the share of all blocks
+    and frames that show the color.
     """
 
+    cost: float
     color: Picture | None
     objects: Mask
     clear: float
 
 
-def rank(proxy: Proxy, white: Picture) -> Ranking:
-    """Rank the backgrounds that frames of one exposure may have; ``white`` (3,) is their pixels' noise."""
+def likeliest(proxy: Proxy, white: Picture) -> Hypothesis:
+    """Return the likeliest background of frames of one exposure; ``white`` (3,) is their pixels' noise."""
     every, shape = _blocks(proxy)
     visible = _visible(proxy, shape)
     values = every[:, visible]
-
-    limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / np.prod(proxy.seen.shape[1:])) / proxy.scale))
+    (rows, columns), pixels = proxy.seen.shape[1:], np.prod(proxy.seen.shape[1:])
+    limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / pixels) / proxy.scale))
     jump = -float(np.log(2 * limit.mean()))
     goes_on = _goes_on(values, limit, jump)
     empty = within(values, limit)
@@ -104,8 +106,7 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
     picture = np.full(values.shape[1], np.inf)
     for value in values:
         picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
-    best = float(picture.mean()) + jump
-    color, found, share = None, np.zeros(values.shape[1], np.bool_), 0.0
+    table = [Hypothesis(float(picture.mean()) + jump, None, np.zeros((rows, columns), np.bool_), 0.0)]
     still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
     for candidate in _candidates(values, limit):
         clear = within(values - candidate, limit)
@@ -114,19 +115,20 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
         stands = ~shows & (own < cost)
         if candidate.max() <= EIGHT_BIT_STEP and not _sharp(proxy, white):
             stands[:] = False
+        if stands.mean() > OBJECT or shows.mean() < MIN_SHOWN_SHARE:
+            continue
         cost = np.where(stands, np.minimum(own - np.log(OBJECT), cost), cost)
         # smoke of one brightness moves a color to one side only
         brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
+        color = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
+        color[linear_to_srgb(color) < EIGHT_BIT_STEP / 2] = 0
+        objects = np.zeros(len(visible), np.bool_)
+        objects[visible] = stands & still
+        before = spread_out(objects.reshape(shape), (columns, rows))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
-        if total < best and stands.mean() <= OBJECT and shows.mean() >= MIN_SHOWN_SHARE:
-            best, found, share = total, stands & still, float(clear.mean())
-            color = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
-            color[linear_to_srgb(color) < EIGHT_BIT_STEP / 2] = 0
-    whole = np.zeros(len(visible), np.bool_)
-    whole[visible] = found
-    rows, columns = proxy.seen.shape[1:]
-    return Ranking(color, spread_out(whole.reshape(shape), (columns, rows)), share)
+        table.append(Hypothesis(total, color, before, float(clear.mean())))
+    return min(table, key=lambda each: each.cost)
 
 
 def color_around(picture: Picture) -> tuple[float, float, float] | None:
@@ -227,8 +229,6 @@ def within(deviations: Picture, limit: Picture) -> Mask:
 
 def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:
     """Blocks (n,) that no mask hides in any frame; if there are none, those that one frame at least shows."""
-    if proxy.seen.all():
-        return np.ones(shape[0] * shape[1], np.bool_)
     rows, columns = shape
     shown = np.stack(
         [area_average(seen.astype(np.float32), columns, rows).ravel() > MIN_SEEN_SHARE for seen in proxy.seen]

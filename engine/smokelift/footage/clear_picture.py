@@ -28,7 +28,7 @@ from smokelift.checks.array_types import Mask
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Edges
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
-from smokelift.footage.inpainting import ISLAND, continuation_errors, in_one_piece, mostly_beside, push_pull
+from smokelift.footage.inpainting import ISLAND, in_one_piece, mostly_beside, push_pull
 from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 from smokelift.footage.proxy import Proxy
@@ -93,14 +93,13 @@ class ClearPicture:
 
     ``known`` (rows, columns) are the pixels that some pictures show without smoke, ``clear`` (frames, rows, columns)
     says where each picture does. ``contrast`` (rows, columns) is the factor that makes the detail of the pictures' mean
-    the background's, 0 where smoke hides it. ``errors`` (3, 3) are those of `smokelift.footage.plate.Plate`.
+    the background's, 0 where smoke hides it.
     """
 
     image: Picture
     known: Mask
     clear: Mask
     contrast: Picture
-    errors: Picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +149,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
     whole, contrast = _completed(image, known, mean, smoke.brightness, brightens, detail)
-    return ClearPicture(whole, known, clear, contrast, continuation_errors(whole, known))
+    return ClearPicture(whole, known, clear, contrast)
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:

@@ -200,17 +200,13 @@ def uncovered(plate: Plate, clip: Clip) -> Plate:
 
     That is no smoke, so it may stand behind the result.
     """
-    if clip.mask is None:
+    mask, numbers = clip.mask, clip.spread(UNCOVERED)
+    if mask is None:
         return plate
-    numbers = clip.spread(UNCOVERED)
-    hidden = np.ones(plate.confidence.shape, np.bool_)
-    for number in numbers:
-        seen = clip.seen(number, *clip.size)
-        hidden = hidden if seen is None else hidden & ~seen
+    hidden = ~np.any([mask.seen(clip.numbers[number], *clip.size) for number in numbers], axis=0)
     if not hidden.any():
         return plate
-    filmed = clip.as_filmed()
-    shown = []
+    filmed, shown = clip.as_filmed(), []
     for number in numbers:
         gains = plate.gain(number, small(clip.as_seen(number, clip.frame(number))))
         shown.append(filmed.frame(number)[hidden] / gains)

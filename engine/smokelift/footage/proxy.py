@@ -106,14 +106,6 @@ class Proxy:
         """The pictures in sRGB values."""
         return linear_to_srgb(self.pictures)
 
-    def between(self, first: int, last: int) -> Proxy:
-        """Return up to `FRAMES` frames, evenly spread from one number of the file to another, both included."""
-        inside = np.array([n for n, number in enumerate(self.numbers) if first <= number <= last])
-        numbers = np.array(self.numbers)[inside]
-        wanted = np.linspace(numbers[0], numbers[-1], min(FRAMES, len(numbers)))
-        chosen = np.unique(np.abs(numbers - wanted[:, None]).argmin(1))
-        return self.only(inside[chosen])
-
     def with_own(self, part: Proxy) -> Proxy:
         """Return a part of the frames, and the middle one of those that the clip uses if it has none of them."""
         first, last = self.clip
@@ -124,7 +116,7 @@ class Proxy:
         return self.only(np.array([n for n, number in enumerate(self.numbers) if number in wanted]))
 
     def shot(self, clip: Clip) -> tuple[Proxy, tuple[int, int] | None]:
-        """Return the frames of a clip's shot, and the file's frames before and after a cut within the clip, if any.
+        """Return frames of a clip's shot, evenly spread, and those of the file beside a cut within the clip, if any.
 
         At a cut most of the picture changes at once and for good, while little changes in as many frames beside it: on
         the clip's side, for beyond a cut anything may be; on both sides of one within the clip, which smoke may fill.
@@ -145,7 +137,10 @@ class Proxy:
                 last = min(last, before)
             elif within is None:
                 within = _cut(clip, before, after, tiny[n], tiny[n + 1])
-        return self.between(first, last), within
+        inside = np.array([n for n, number in enumerate(self.numbers) if first <= number <= last])
+        numbers = np.array(self.numbers)[inside]
+        wanted = np.linspace(numbers[0], numbers[-1], min(FRAMES, len(numbers)))
+        return self.only(inside[np.unique(np.abs(numbers - wanted[:, None]).argmin(1))]), within
 
     def _steady(self, tiny: Sequence[Picture], n: int) -> tuple[float, float]:
         """How alike frames are before frame ``n``, and after the next, in as many frames as lie between these two.

@@ -55,11 +55,6 @@ class Strokes:
         red, green, blue = (area_average(painted & (nearest == n), *size) >= PAINTED for n in range(3))
         return Strokes(green, red, blue)
 
-    @property
-    def all(self) -> Mask:
-        """Where anything is painted."""
-        return self.smoke | self.other | self.behind
-
 
 def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> Plate:
     """Return a plate with what strokes say of it; behind smoke before ``one_color`` is that color for certain.
@@ -77,7 +72,7 @@ def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -
         raise ClipError("The strokes leave nothing that is not smoke; leave free, or paint blue, what is behind it.")
     # a stroke says nothing of what is unknown elsewhere, which may have detail of its own
     patches, _ = ndimage.label((confidence == 0) | seen, structure=np.ones((3, 3)))
-    unknown = (confidence == 0) & np.isin(patches, patches[strokes.all])
+    unknown = (confidence == 0) & np.isin(patches, patches[strokes.smoke | seen])
     image[unknown] = srgb_to_linear(push_pull(linear_to_srgb(image), confidence))[unknown]
     errors = plate.errors if plate.errors.any() else continuation_errors(image, confidence > 0)
     return Plate(image, confidence, plate.noise, errors)
