@@ -27,7 +27,6 @@ from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, lasting_noise, median
 from smokelift.footage.plate import Plate, cleared, known_plate, uncovered, without_noise_light
 from smokelift.footage.proxy import PROXY_SIDE, Proxy
 from smokelift.footage.strokes import Strokes, stroked_plate, without_others
-from smokelift.footage.video import median_quantizer
 from smokelift.scene import Background, Camera
 
 MOSTLY = 0.5
@@ -86,8 +85,6 @@ class Backdrop:
         Number of the file's frames, up to the next cut, that it was estimated from.
     shot
         First and last of these in the file; None where it was not estimated from frames.
-    quantizer
-        The file's median quantizer, if known; only for an estimated picture.
     cut
         Frames of the file before and after a cut within the clip, if there is one.
     strokes
@@ -102,7 +99,6 @@ class Backdrop:
     background: Background | None = None
     frames: int = 0
     shot: tuple[int, int] | None = None
-    quantizer: float | None = None
     cut: tuple[int, int] | None = None
     strokes: Strokes | None = None
     motion: CameraMotion | None = None
@@ -205,7 +201,7 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
         shown = part.with_still()
         plate = _picture(clip, shown.evened, white)
         if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
-            return made("picture", plates=plate, quantizer=median_quantizer(clip.path))
+            return made("picture", plates=plate)
         # fog drifts over all of the file: treat it as filmed before black
         color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
     return made(source, plates=_of_one_color(clip, part.evened, color, objects, white))

@@ -102,15 +102,6 @@ class ClearPicture:
     contrast: Picture
 
 
-@dataclass(frozen=True, eq=False)
-class _Smoke:
-    """Properties of a clip's smoke, in sRGB values: see `_smoke_of`."""
-
-    similarity: float
-    brightness: float
-    brightens: Mask
-
-
 def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     """Return the background of pictures of one exposure.
 
@@ -122,9 +113,9 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     gray[~seen] = np.nan
     some = np.ascontiguousarray(gray[:, ::STRIDE, ::STRIDE])
     window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
-    smoke = _smoke_of(some, window)
+    similarity, brightness, brightens = _smoke_of(some, window)
     height, across = gray.shape[1:]
-    brightens = np.repeat(np.repeat(smoke.brightens, STRIDE, 0), STRIDE, 1)[:height, :across]
+    brightens = np.repeat(np.repeat(brightens, STRIDE, 0), STRIDE, 1)[:height, :across]
     gray *= np.where(brightens, np.float32(1), np.float32(-1))
     image = np.empty((height, across, 3), np.float32)
     known, calm = np.empty((2, height, across), np.bool_)
@@ -133,7 +124,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     for row in range(0, height, rows):
         band = slice(row, row + rows)
         image[band], known[band], calm[band], clear[:, band] = _clear_values(
-            pictures[:, band], gray[:, band], window, smoke.similarity
+            pictures[:, band], gray[:, band], window, similarity
         )
     known = in_one_piece(known)
     if not known.all():
@@ -148,7 +139,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         known &= ~never
         mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
-    whole, contrast = _completed(image, known, mean, smoke.brightness, brightens, detail)
+    whole, contrast = _completed(image, known, mean, brightness, brightens, detail)
     return ClearPicture(whole, known, clear, contrast)
 
 
@@ -158,8 +149,8 @@ def _unlike(image: Picture, known: Mask) -> Picture:
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
 
-def _smoke_of(gray: Picture, window: float) -> _Smoke:
-    """Measure the smoke in gray pictures (frames, rows, columns).
+def _smoke_of(gray: Picture, window: float) -> tuple[float, float, Mask]:
+    """Return the similarity of smoke in gray pictures (frames, rows, columns), its brightness, and where it brightens.
 
     Its similarity is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
     the value that it moves every background towards; it brightens pixels of a darker background.
@@ -191,9 +182,9 @@ def _smoke_of(gray: Picture, window: float) -> _Smoke:
         if in_place.any() and np.isinf(side := _turn(behind, in_place)):
             change, turn = in_place, side
     if not change.any():
-        return _Smoke(similarity, 1.0, np.ones(shape, np.bool_))
+        return similarity, 1.0, np.ones(shape, np.bool_)
     thickest = np.quantile(values[change != 0], [0.01, 0.99])
-    return _Smoke(similarity, float(np.clip(turn, *thickest)), (behind <= turn).reshape(shape))
+    return similarity, float(np.clip(turn, *thickest)), (behind <= turn).reshape(shape)
 
 
 def _turn(background: Picture, change: Picture) -> float:

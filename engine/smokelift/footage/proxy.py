@@ -150,9 +150,8 @@ class Proxy:
         before, after = self.numbers[n], self.numbers[n + 1]
         earlier = [other for other in range(n) if self.numbers[other] <= 2 * before - after]
         later = [other for other in range(n + 2, len(tiny)) if self.numbers[other] >= 2 * after - before]
-        one = _alike(tiny[earlier[-1]], tiny[n]) if earlier else None
-        other = _alike(tiny[n + 1], tiny[later[0]]) if later else None
-        sides = [side for side in (one, other) if side is not None] or [0.0]
+        pairs = [*((other, n) for other in earlier[-1:]), *((n + 1, other) for other in later[:1])]
+        sides = [_alike(tiny[one], tiny[other]) for one, other in pairs] or [0.0]
         return sides[0], sides[-1]
 
     def with_still(self) -> Proxy:

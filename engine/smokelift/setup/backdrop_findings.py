@@ -10,6 +10,7 @@ from smokelift.checks import Finding
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
+from smokelift.footage.video import median_quantizer
 from smokelift.setup.first_estimate import SAMPLE_FRAMES, FirstEstimate, SmokeSamples, sample_smoke, unknown_part
 
 MAX_BLACK = 0.001
@@ -110,8 +111,9 @@ def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]
         said.append(doubt("background never seen"))
     if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
         said.append(doubt("background of few frames", {"frames": found.frames}))
-    if found.quantizer is not None and found.quantizer >= MIN_COARSE_QUANTIZER:
-        said.append(doubt("strong compression", {"quantizer": found.quantizer}))
+    quantizer = median_quantizer(clip.path) if found.source == "picture" else None
+    if quantizer is not None and quantizer >= MIN_COARSE_QUANTIZER:
+        said.append(doubt("strong compression", {"quantizer": quantizer}))
     unknown = samples.unknown
     if found.strokes is not None:  # what is painted as smoke is none of the background
         unknown = unknown & (area_average(found.strokes.smoke, *unknown.shape[::-1]) < MAJORITY)
