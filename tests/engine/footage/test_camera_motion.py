@@ -198,25 +198,19 @@ def test_a_clip_that_stands_still_stays_as_it_is(tmp_path: Path) -> None:
         assert (backdrop.motion, backdrop.clip) == (None, clip)
 
 
-def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path: Path) -> None:
-    with clip_of_puff(tmp_path, shifts(NONE - 3, NONE + 4)) as clip:
-        backdrop = find_backdrop(clip, None, plate_picture(tmp_path))
+@pytest.mark.parametrize("frame", [None, (0,)], ids=["picture", "frame of the clip"])
+def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path: Path, frame: tuple[int] | None) -> None:
+    with clip_of_puff(tmp_path, shifts(NONE - 3, NONE + 4) if frame is None else shifts(*SHAKE)) as clip:
+        backdrop = find_backdrop(clip, None, Background(frame=frame) if frame else plate_picture(tmp_path))
         assert backdrop.motion is not None
         assert backdrop.motion.reference is None
-        assert backdrop.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
-        off = codes_apart(backdrop.clip.frame(0), backdrop.plates.image)
-        assert off[10 : SIZE[0] // 2, 10:-10].mean() < 4
+        if frame is None:
+            assert backdrop.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
+        off = codes_apart(backdrop.clip.frame(5 if frame else 0), backdrop.plates.image)
+        assert off[10 : SIZE[0] // 3, 10:-10].mean() < 4
 
 
 def test_a_plate_of_another_place_is_refused(tmp_path: Path) -> None:
     clip = clip_of_puff(tmp_path, shifts(NONE, NONE + 30))
     with clip, pytest.raises(ValueError, match="does not lie on the clip"):
         find_backdrop(clip, None, plate_picture(tmp_path))
-
-
-def test_frames_of_the_clip_are_a_plate_that_the_others_are_registered_to(tmp_path: Path) -> None:
-    with clip_of_puff(tmp_path, shifts(*SHAKE)) as clip:
-        backdrop = find_backdrop(clip, None, Background(frame=(0,)))
-        assert backdrop.motion is not None
-        off = codes_apart(backdrop.clip.frame(5), backdrop.plates.image)
-        assert off[10 : SIZE[0] // 3, 10:-10].mean() < 4

@@ -35,21 +35,17 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return encode(path, [flat(v) for v in LEVELS], options={"g": "8", "bf": "3", "sc_threshold": "0"})
 
 
-def test_frames_are_linear_and_in_any_order(ramp: Path) -> None:
+def test_frames_are_linear(ramp: Path) -> None:
     with Clip.open(ramp) as clip:
         assert (clip.fps, len(clip), clip.size) == (24.0, 30, (32, 16))
         assert (clip.path, clip.warning, clip.numbers[0]) == (ramp, None, 0)
-        in_order = [image.copy() for image in clip]
-        np.testing.assert_allclose(codes(in_order), LEVELS, atol=1)
+        np.testing.assert_allclose(codes(clip), LEVELS, atol=1)
         image = clip.frame(12)
         assert image.dtype == np.float32
         assert image.shape == (16, 32, 3)
         assert not image.flags.writeable
     with Clip.open(ramp, transfer="linear") as clip:
         np.testing.assert_allclose(srgb_to_linear(clip.frame(12)), image, rtol=1e-5)
-    with Clip.open(ramp) as clip:
-        for n in [*np.random.default_rng(0).permutation(30).tolist(), 29, 0, 7, 8, 9, 7]:
-            np.testing.assert_array_equal(clip.frame(n), in_order[n])
 
 
 def test_frames_are_decoded_once_for_all_clips_of_a_file() -> None:
@@ -183,21 +179,3 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
     write(tmp_path, "frame_{:04d}.png", {400: 0})
     with pytest.raises(ClipError, match=r"frame_0003\.png: .* missing, .* frame_0400\.png"):
         Clip.open(tmp_path / "frame_####.png")
-
-
-@pytest.mark.parametrize(
-    ("name", "why"),
-    [
-        ("other_####.png", "no such pictures"),
-        ("#_##.png", "no such pictures"),
-        ("frame_0000.png", "no such file"),
-        ("still.png", "no such file"),
-        ("frame_*.png", r"give numbered pictures as frame_####\.png"),
-        ("frame_%04d.png", r"give numbered pictures as frame_####\.png"),
-    ],
-)
-def test_pictures_that_are_not_there_are_named(tmp_path: Path, name: str, why: str) -> None:
-    write(tmp_path, "frame_{:04d}.png", by_tens([1, 2]))
-    with pytest.raises(ClipError, match=why) as refused:
-        Clip.open(tmp_path / name)
-    assert str(refused.value).startswith(f"{tmp_path / name}: ")

@@ -56,11 +56,11 @@ def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path)
     with Clip.open(tmp_path / "a#.png", fps=24) as clip:
         half = 128 / 255
         np.testing.assert_allclose(clip.frame(3)[20, 15], srgb_to_linear(40 / 255) * half + 1 - half, rtol=1e-5)
-        for given in (None, Background(color=(0.0, 0.0, 0.0))):
+        for given in (None, Background(color=(0.0, 0.0, 0.0)), Background(strokes=tmp_path / "no.png")):
             found = find_backdrop(clip, None, given)
             assert found.background == Background(color=(1.0, 1.0, 1.0))
             assert (found.plates.at(2).image == 1).all()
-            assert found.source == "alpha"
+            assert (found.source, found.strokes) == ("alpha", None)
 
 
 # pictures in codes, to the last bit those of the linear picture

@@ -88,15 +88,12 @@ def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path: Path) 
         Clip.open(clip, mask=tmp_path / "mask_#.png")
 
 
-LINE = np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1))
-
-
 @pytest.mark.parametrize(
     ("values", "said"),
     [
         ({}, r"mask\.png: no such file"),
         ({"mask.png": np.zeros((4, 4))}, r"mask\.png: .* too little"),
-        ({"mask.png": LINE}, r"mask\.png: .* too little"),
+        ({"mask.png": np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1))}, r"mask\.png: .* too little"),
         ({"mask.png": None}, r"mask\.png: cannot be read"),
         ({"mask.png": np.full((HEIGHT, 2 * WIDTH), 255)}, "another shape"),
         ({f"mask_{n:02d}.png": np.full((4, 4), 255) for n in range(COUNT) if n != 3}, r"mask_03.* is missing"),

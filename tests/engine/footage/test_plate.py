@@ -13,20 +13,6 @@ from smokelift.footage.plate import evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
 
 
-def test_a_known_black_background(tmp_path: Path) -> None:
-    black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
-    clip = film(tmp_path, black, puff, 0.5, 0.0)
-    plate = known_plate((0.0, 0.0, 0.0), clip)
-    assert plate.confidence.min() == 1.0
-    np.testing.assert_allclose(plate.noise.total, 1 / 255, rtol=1e-3)
-    for n in (4, 12, 20):
-        assert overlap(matte(clip.frame(n), plate).mask, puff(n) > 0.002) > 0.75
-    estimated = plate_of(clip)
-    assert codes_apart(estimated.image, black).max() < 1.0
-    picture = known_plate(wall(0.2, 0.5)[::2, ::2], clip)
-    assert picture.image.shape == (HEIGHT, WIDTH, 3)
-
-
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
@@ -40,43 +26,36 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
             known_plate(background, clip)
 
 
-def test_a_plate_for_every_frame(tmp_path: Path) -> None:
+def test_a_plate_for_every_frame_of_the_clips_file(tmp_path: Path) -> None:
     """Each frame has its own, the noise is that of the difference, and the smoke is found before it."""
-    (tmp_path / "clip").mkdir()
-    (tmp_path / "plate").mkdir()
-    wide = passing_wall()
-    clip = pan(tmp_path / "clip", wide, 1.0)
-    plates = pan(tmp_path / "plate", wide, 0.0)
-    changing = known_plate(plates, clip)
-    for n in (4, 12, 20):
-        plate = changing.at(n)
-        assert codes_apart(plate.image, wide[:, 2 * n : 2 * n + WIDTH]).max() < 6
-        assert plate.noise.total.mean() < 2.5 / 255
-        mask = matte(clip.frame(n), plate).mask
-        assert mask[puff(n) > 0.3].mean() > 0.95
-        assert mask[puff(n) == 0.0].mean() < 0.08
-
-
-def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
     for name in ("clip", "plate"):
         (tmp_path / name).mkdir()
     wide = passing_wall()
     pan(tmp_path / "clip", wide, 1.0)
     plates = pan(tmp_path / "plate", wide, 0.0)
-    late = Clip.open(tmp_path / "clip" / "frame_###.png", fps=24, frames=(10, 15))
-    assert codes_apart(known_plate(plates, late).at(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
+    for first in (0, 4):
+        clip = Clip.open(tmp_path / "clip" / "frame_###.png", fps=24, frames=(first, 20))
+        changing = known_plate(plates, clip)
+        for n in (4, 12, 20):
+            plate = changing.at(n - first)
+            assert codes_apart(plate.image, wide[:, 2 * n : 2 * n + WIDTH]).max() < 6
+            assert plate.noise.total.mean() < 2.5 / 255
+            mask = matte(clip.frame(n - first), plate).mask
+            assert mask[puff(n) > 0.3].mean() > 0.95
+            assert mask[puff(n) == 0.0].mean() < 0.08
     few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
-    with pytest.raises(ValueError, match="has 13 of the frames 0 to 15 that are needed"):
-        known_plate(few, late)
+    with pytest.raises(ValueError, match="has 13 of the frames 0 to 20 that are needed"):
+        known_plate(few, clip)
 
 
-@pytest.mark.parametrize("codes", [13.0, 25.0, 51.0])
+@pytest.mark.parametrize("codes", [0.0, 13.0, 51.0])
 def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> None:
     """Noise that is clipped at black raises its mean, which is neither smoke nor a lack of certainty."""
     clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3), np.float32), puff, 0.5, codes)
     plate = known_plate((0.0, 0.0, 0.0), clip)
+    assert plate.confidence.min() == 1.0
     np.testing.assert_allclose(codes_apart(plate.image, np.zeros_like(plate.image)), 0.4 * codes, rtol=0.1)
-    assert plate.noise.lasting.max() * 255 < 0.15 * codes
+    assert plate.noise.lasting.max() * 255 < max(0.15 * codes, 1.001)
     quiet = without_noise_light(clip, plate.noise)
     behind = replace(known_plate((0.0, 0.0, 0.0), quiet), noise=plate.noise)
     for n in (8, 12):
@@ -86,26 +65,16 @@ def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> No
             assert mask[puff(n) == 0.0].mean() < 0.1
 
 
-def unsteady(clip: Clip) -> Clip:
-    """With a step in the middle, and a flash."""
-    return clip.changed(lambda n, picture: picture * (1.5 if n == 4 else 1.0 if n < COUNT // 2 else 0.7))
-
-
 def test_every_frame_gets_the_exposure_of_its_background(tmp_path: Path) -> None:
-    """And the smoke of no frame is lost."""
+    """After a step in the middle and in a flash, and the smoke of no frame is lost; known gains are not measured."""
     truth = wall(0.2, 0.5)
     clip = film(tmp_path, truth, puff, 0.6)
-    changing = unsteady(clip)
+    changing = clip.changed(lambda n, picture: picture * (1.5 if n == 4 else 1.0 if n < COUNT // 2 else 0.7))
     known, found = known_plate(truth, changing), plate_of(changing)
     even, estimated = evened(changing, known), evened(changing, found)
     for n in (4, 8, 20):
         assert np.median(codes_apart(even.frame(n), clip.frame(n))) < 1.5
         assert overlap(matte(estimated.frame(n), found).mask, puff(n) > 0.05) > 0.7
-
-
-def test_frames_whose_exposure_is_known_are_not_examined(tmp_path: Path) -> None:
-    truth = wall(0.2, 0.5)
-    clip = film(tmp_path, truth, puff, 0.6)
     even = evened(clip, known_plate(truth, clip), {2: np.ones(3, np.float32), 3: np.full(3, 2, np.float32)})
     assert np.array_equal(even.frame(2), clip.frame(2))
     assert np.array_equal(even.frame(3), clip.frame(3) / 2)
