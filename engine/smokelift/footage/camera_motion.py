@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -304,9 +305,10 @@ def find_motion(proxy: Proxy) -> CameraMotion | Literal["other"] | None:
     count = len(proxy.numbers)
     texture = Texture(proxy.pictures[count // 2])
     some = np.unique(np.linspace(0, count - 1, min(count, JUDGED)).round().astype(int))
-    if not _some_move([texture.match(proxy.pictures[n]) for n in some]):
+    match = cache(lambda n: texture.match(proxy.pictures[n]))
+    if not _some_move([match(n) for n in some]):
         return None
-    found = _registered_to_median(proxy, [texture.match(picture) for picture in proxy.pictures])
+    found = _registered_to_median(proxy, [match(n) for n in range(count)])
     if found is None:
         black = (brightest_channel(proxy.encoded) <= BLACK).mean() >= MIN_BLACK
         return None if black else "other"
