@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import renderer_reference as reference
 
 from smokelift import render, render_gradient
 from smokelift.render import image as image_module
@@ -37,20 +36,13 @@ def test_examples_of_the_documentation_run():
     assert doctest.testmod(image_module).failed == 0
 
 
-@pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
-def test_render_gradient_of_every_model(density, target, scattering):
-    scene = replace(SCENE, scattering=scattering)
-    loss, gradient, image = render_gradient(density, scene, target)
+def test_the_loss_and_its_gradient_are_those_of_the_image(density, target):
+    loss, gradient, image = render_gradient(density, SCENE, target)
     assert loss == pytest.approx(np.sum((image.astype(np.float64) - target) ** 2), rel=1e-6)
-    np.testing.assert_array_equal(image, render(density, scene))
-
-    def exact(values):
-        shown = reference.render(values, scene.camera, scene.domain, scene.medium, (SUN,), np.zeros(3), scattering)
-        return np.sum((shown - target) ** 2)
-
-    for voxel in np.random.default_rng(7).choice(np.argwhere(density > 0), 3, replace=False):
-        expected = reference.complex_step(exact, density, voxel)
-        assert gradient[tuple(voxel)] == pytest.approx(expected, rel=1e-3, abs=1e-6 * float(np.abs(gradient).max()))
+    np.testing.assert_array_equal(image, render(density, SCENE))
+    step = np.float32(1e-3) * np.sign(gradient) * (density > 0)
+    after, before = (render_gradient(density + sign * step, SCENE, target)[0] for sign in (1, -1))
+    assert after - before == pytest.approx(2 * float(np.sum(gradient * step, dtype=np.float64)), rel=1e-3)
 
 
 def test_losses_of_several_views_add_up(density, target):
@@ -73,14 +65,20 @@ def test_a_complete_scene_shows_the_same_as_its_description(density):
     np.testing.assert_array_equal(render(density, without, ASIDE), render(density, SCENE, ASIDE))
 
 
+@pytest.mark.parametrize("value", [1e38, np.inf, np.nan])
+def test_a_density_without_a_finite_depth_is_refused(value):
+    with pytest.raises(ValueError):
+        render(np.full(SHAPE, value, np.float32), SCENE)
+
+
 def test_incomplete_scenes_and_other_shapes_are_refused(density, target):
-    with pytest.raises(ValueError):
-        render(density, replace(SCENE, camera=None))
-    with pytest.raises(ValueError):
-        render(density, replace(SCENE, domain=None))
-    with pytest.raises(ValueError):
-        render(density[1:], SCENE)
-    with pytest.raises(ValueError):
-        render_gradient(density, SCENE, target[1:])
-    with pytest.raises(ValueError):
-        render_gradient(density, SCENE, np.full_like(target, np.nan))
+    for smoke, scene in (
+        (density, replace(SCENE, camera=None)),
+        (density, replace(SCENE, domain=None)),
+        (density[1:], SCENE),
+    ):
+        with pytest.raises(ValueError):
+            render(smoke, scene)
+    for wanted in (target[1:], np.full_like(target, np.nan)):
+        with pytest.raises(ValueError):
+            render_gradient(density, SCENE, wanted)

@@ -18,8 +18,8 @@ SCENE = completed(Scene(camera=CAMERA, domain=DOMAIN, medium=Medium(4.0, 0.8, 0.
 
 
 def test_optics_are_those_of_the_scene() -> None:
-    scene = replace(SCENE, scattering="unshadowed")
-    assert scene_optics(scene) == Optics(DOMAIN, scene.medium, (SUN,), "unshadowed")
+    scene = replace(SCENE, scattering="unshadowed", lights=(SUN, LAMP))
+    assert scene_optics(scene) == Optics(DOMAIN, scene.medium, (SUN, LAMP), "unshadowed")
 
 
 def test_unshadowed_source_is_the_radiance_of_thin_smoke() -> None:
@@ -37,10 +37,6 @@ def test_a_moving_camera_needs_a_frame() -> None:
     moving = replace(CAMERA, matrices=(CAMERA.matrix, CAMERA.matrix))
     with pytest.raises(ValueError):
         scene_renderer(replace(SCENE, camera=moving))
-
-
-def test_simple_lights_stay_in_their_order() -> None:
-    assert sampled_lights(replace(SCENE, lights=(SUN, LAMP))) == (SUN, LAMP)
 
 
 def test_an_environment_becomes_parallel_lights_in_its_place(light_of) -> None:
