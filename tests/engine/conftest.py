@@ -94,6 +94,13 @@ def plume(tmp_path_factory: pytest.TempPathFactory) -> Plume:
 
 
 @pytest.fixture(scope="session")
+def small(plume: Plume) -> Scene:
+    """Its scene without a clip, with a picture as fine as the grid."""
+    assert plume.scene.camera is not None
+    return replace(plume.scene, camera=plume.scene.camera.resized(30, 42), clip=None)
+
+
+@pytest.fixture(scope="session")
 def tracked(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     """The same blob from a camera that goes by, closer, upward and rolling a little."""
     camera = plume.scene.camera

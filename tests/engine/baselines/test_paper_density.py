@@ -1,7 +1,5 @@
 """The paper's density fit, depth prior and temporal prior."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,12 +7,6 @@ from smokelift.baselines.density import FixedRateDescent, OrthogonalCopy
 from smokelift.density import FittedDensity, Observation, ViewSet
 from smokelift.render import DeviceError, device, render, scene_optics
 from smokelift.scene import Scene, completed, orbit
-
-
-@pytest.fixture(scope="module")
-def small(plume) -> Scene:
-    """The plume's scene with a picture as fine as the grid."""
-    return replace(plume.scene, camera=plume.scene.camera.resized(30, 42), clip=None)
 
 
 def fitted(

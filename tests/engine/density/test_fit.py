@@ -8,12 +8,10 @@ import pytest
 
 import smokelift._core as _core
 from smokelift.density import DensitySettings, Observation, ObservedView, reconstruct_density
-from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
-from smokelift.density.profile import DepthProfile, inflated
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise, linear_per_srgb
@@ -25,12 +23,6 @@ QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)
 FRONT = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(24, 32)).matrix
 GRID = Camera("orthographic", FRONT, (24, 32), 20.0, 20.0, 12.0, 16.0)
 """Sees each column of voxels along y in one pixel of its own."""
-
-
-@pytest.fixture(scope="module")
-def small(plume) -> Scene:
-    """The plume's scene with a picture as fine as the grid."""
-    return replace(plume.scene, camera=plume.scene.camera.resized(30, 42), clip=None)
 
 
 def noisy_plate(picture: np.ndarray) -> Plate:
@@ -78,72 +70,6 @@ def test_a_faint_rim_fades() -> None:
         across = np.flatnonzero(found.hull[:, :, height].any(1))
         densest = found.density[:, :, height].max(1)[across]
         assert densest[-3:].max() < np.median(densest[-9:-4])
-
-
-def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
-    found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
-    deep = found.hull.sum(1) >= 8
-    first, last = found.hull.argmax(1)[deep], 23 - found.hull[:, ::-1].argmax(1)[deep]
-    rays = np.moveaxis(found.density, 1, 2)[deep]
-    ends = sum(np.take_along_axis(rays, at[:, None], 1)[:, 0] for at in (first, last))
-    assert ends.sum() < 0.002 * rays.sum()
-
-
-# profile
-
-
-def profile_of(amount, domain, axis=None):
-    """The profile at every voxel."""
-    everywhere = np.ones(domain.resolution, np.bool_)
-    places = project_voxels(GRID, domain).places(everywhere)
-    profile = DepthProfile(amount, GRID, domain, axis or SmokeAxis.upright())
-    return profile.at(places, everywhere).reshape(domain.resolution)
-
-
-def amount_of(width: int) -> np.ndarray:
-    """A picture of a pillar so many pixels wide."""
-    amount = np.zeros((32, 24), np.float32)
-    amount[:, 12 - width // 2 : 12 + width // 2] = 1
-    return amount
-
-
-def test_wider_rows_are_deeper(plume) -> None:
-    domain = plume.scene.domain
-    amount = amount_of(4)
-    amount[:16] = amount_of(12)[:16]
-    profile = profile_of(amount, domain)
-    y = (np.arange(24) - 11.5) * domain.voxel_size
-    depth = np.sqrt((profile * y[None, :, None] ** 2).sum(1) / profile.sum(1))[12]
-    # rows count from the top, voxels from the bottom; the spread is blurred near the step
-    low, high = depth[:10].mean(), depth[-10:].mean()
-    assert high == pytest.approx(3 * low, rel=0.2)
-    assert low == pytest.approx(4 * domain.voxel_size / np.sqrt(12), rel=0.2)
-
-
-def test_columns_behind_one_another_make_it_deeper(plume) -> None:
-    domain = plume.scene.domain
-    h = domain.voxel_size
-    y = (np.arange(24) - 11.5) * h
-    depths = []
-    for apart in (0.0, 8 * h):
-        nothing = np.zeros((1, 1))
-        axis = SmokeAxis(np.zeros(1), np.zeros(1), nothing, np.full((1, 1), apart), nothing)
-        profile = profile_of(amount_of(6), domain, axis)[12, :, 16]
-        depths.append(np.sqrt((profile * y**2).sum() / profile.sum()))
-    assert depths[1] > 1.8 * depths[0]
-
-
-def test_balls_fill_a_silhouette() -> None:
-    rows, columns = np.indices((61, 61)) - 30
-    distance = np.hypot(rows, columns)
-    half = inflated(distance < 20)
-    expected = np.sqrt(np.maximum(20**2 - distance**2, 0))
-    near = distance < 18
-    np.testing.assert_allclose(half[near], expected[near], atol=2)
-    assert not half[distance >= 20].any()
-    bar = np.zeros((61, 61), np.bool_)
-    bar[25:36, 4:57] = True
-    np.testing.assert_allclose(inflated(bar)[30, 10:50], 6, atol=0.6)
 
 
 def test_smoke_through_floor_and_ceiling_makes_no_spikes() -> None:

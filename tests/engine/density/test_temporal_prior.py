@@ -49,15 +49,6 @@ def test_a_fraction_is_taken_over(moment) -> None:
     np.testing.assert_allclose(start.density, (moment.prior + moment.true) / 2, rtol=1e-6)
 
 
-def test_a_wrong_density_fades_from_frame_to_frame(moment) -> None:
-    """Carried on without a motion, an error is down to the power of that fraction."""
-    density = 5 * np.roll(moment.true, 6, axis=2)
-    error = np.linalg.norm(density - moment.prior)
-    for _ in range(5):
-        density = moment.start(density).density
-    assert np.linalg.norm(density - moment.prior) == pytest.approx(BLEND**5 * error, rel=1e-4)
-
-
 @pytest.mark.parametrize("empty", ["prior", "carried"])
 def test_without_smoke_the_priors_density_stays(moment, empty) -> None:
     nothing = np.zeros_like(moment.true)
