@@ -85,15 +85,6 @@ def test_both_solvers_reach_the_constrained_minimum(orders, closed):
     assert figures["iterations"] < 2000
 
 
-def test_the_quadratic_is_symmetric_and_positive():
-    rng = np.random.default_rng(2)
-    problem = tiny_problem(rng)
-    a, b = tiny_faces(rng), tiny_faces(rng)
-    ab, ba = flat(problem.apply(a)) @ flat(b), flat(problem.apply(b)) @ flat(a)
-    assert ab == pytest.approx(ba, rel=1e-5)
-    assert flat(problem.apply(a)) @ flat(a) > 0
-
-
 @pytest.mark.parametrize("closed", [OPEN, [True] * 6, [True, False, False, True, True, True]])
 def test_the_preconditioner_knows_long_lines(closed):
     """With kinetic energy alone the minimum is the part of the center without divergence; the rest is a gradient.
