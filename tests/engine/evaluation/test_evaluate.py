@@ -85,19 +85,19 @@ def evaluate(capsys, *words: object) -> dict:
 
 def test_smoke_that_has_left_the_truths_box(plume, perfect, truth, tmp_path, capsys) -> None:
     domain = plume.scene.domain
-    boxes = [domain, *[domain.grown((8, 0, 0), (0, 0, 8))] * 4]
+    boxes = [domain, domain.grown((8, 0, 0), (0, 0, 8))]
     wholes = [np.full(box.shape, 0.5, np.float32) for box in boxes]
-    for whole, box, density in zip(wholes, boxes, plume.densities, strict=True):
+    for whole, box, density in zip(wholes, boxes, plume.densities[:2], strict=True):
         whole[domain.slices_in(box)] = density
     out = write(tmp_path / "out", plume.scene, wholes, boxes)
     assert evaluate(capsys, out, "--truth", truth)["truth"]["density_error"] < 1e-3
 
 
 def test_frames_are_those_of_the_clip(plume, truth, tmp_path, capsys) -> None:
-    scene = replace(plume.scene, clip=replace(plume.scene.clip, frames=(2, 4)))
-    part = write(tmp_path / "part", scene, plume.densities[2:])
+    scene = replace(plume.scene, clip=replace(plume.scene.clip, frames=(3, 4)))
+    part = write(tmp_path / "part", scene, plume.densities[3:])
     assert evaluate(capsys, part, "--truth", truth)["truth"]["density_error"] < 1e-3
-    beginning = write(tmp_path / "beginning", plume.scene, plume.densities[2:])
+    beginning = write(tmp_path / "beginning", plume.scene, plume.densities[3:])
     assert evaluate(capsys, beginning, "--truth", truth)["truth"]["density_error"] > 0.3
 
 

@@ -7,6 +7,8 @@ from smokelift.evaluation.orbit_scores import AZIMUTHS, orbit_scores
 from smokelift.evaluation.orbit_shapes import BANDS, SHAPES
 from smokelift.scene import CompleteScene, completed
 
+FRAMES = 3
+
 
 @pytest.fixture(scope="module")
 def scene(plume) -> CompleteScene:
@@ -16,7 +18,7 @@ def scene(plume) -> CompleteScene:
 @pytest.fixture(scope="module")
 def perfect(plume, scene) -> dict:
     truth = plume.densities.__getitem__
-    return orbit_scores(scene, 5, truth, truth)
+    return orbit_scores(scene, FRAMES, truth, truth)
 
 
 def drawn_out(density: np.ndarray) -> np.ndarray:
@@ -28,7 +30,7 @@ def drawn_out(density: np.ndarray) -> np.ndarray:
 def flat(plume, scene) -> dict:
     """Scores of smoke that is drawn out."""
     truth = plume.densities.__getitem__
-    return orbit_scores(scene, 5, lambda frame: drawn_out(truth(frame)), truth)
+    return orbit_scores(scene, FRAMES, lambda frame: drawn_out(truth(frame)), truth)
 
 
 def test_the_truth_is_perfect(perfect):
@@ -58,7 +60,7 @@ def test_shapes_along_the_cameras_rays_stand_beside_the_truths(plume, scene, per
     assert 2 <= len(there) < BANDS and all(found > 1.5 * true for found, true in there)
     across = flat["shape_azimuths"].index(90)
     assert flat["ray_length_by_azimuth"][across] < flat["ray_length"]
-    turned = orbit_scores(scene, 5, lambda frame: np.ascontiguousarray(np.rot90(truth(frame), 1, (0, 1))))
+    turned = orbit_scores(scene, FRAMES, lambda frame: np.ascontiguousarray(np.rot90(truth(frame), 1, (0, 1))))
     for name in SHAPES:
         assert turned[f"{name}_by_azimuth"][across] == pytest.approx(perfect[name], rel=1e-3, abs=1e-3)
     assert "scatter_truth" not in turned
@@ -66,7 +68,7 @@ def test_shapes_along_the_cameras_rays_stand_beside_the_truths(plume, scene, per
 
 def test_without_the_truth_it_is_unlike_its_front_as_well(plume, scene):
     truth = plume.densities.__getitem__
-    own, other = (orbit_scores(scene, 5, density) for density in (truth, lambda frame: drawn_out(truth(frame))))
+    own, other = (orbit_scores(scene, FRAMES, density) for density in (truth, lambda frame: drawn_out(truth(frame))))
     assert own["reference"] == "front" and own["halo"] is own["patches_own_by_azimuth"] is None
     assert own["patches"] < 0.5 * other["patches"]
     assert own["patches_own"] > 0
