@@ -40,8 +40,8 @@ class PaperVelocity:
         """Estimate as by `smokelift.velocity.estimate_velocity`; a prediction is not used."""
         pair = checked(pair)
         rest = StaggeredGrid.zero(pair.before.shape, 1.0, pair.closed)
-        smooth, _ = blurred(pair.before, pair.after, self.blur)
-        linear = linearize(smooth.before, smooth.after, motion_weight(rest.shape, pair.inflow), rest)
+        before, after = (blurred(density, self.blur) for density in (pair.before, pair.after))
+        linear = linearize(before, after, motion_weight(rest.shape, pair.inflow), rest)
         if linear is None:
             return Velocity.zero(rest.shape, pair.voxel_size, pair.closed)
         problem = least_squares(linear, rest, first_order=self.smoothness, kinetic=self.kinetic)

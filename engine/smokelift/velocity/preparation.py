@@ -12,8 +12,7 @@ are smooth ones.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -34,9 +33,6 @@ SMOOTH = 0.045
 """Noise in the same unit below which densities are smooth already, and neither blurred nor compressed
 (docs/experiments/velocity-solver.md)."""
 
-NOISE_WIDTHS = (1.0, 1.5, 2.0)
-"""Standard deviations (voxels) to choose from where the usual blur leaves too much noise."""
-
 MAD = 0.6745
 """Median magnitude of a normal variable, in standard deviations."""
 
@@ -52,26 +48,35 @@ class PreparedPair:
     before: Array
     after: Array
     noise: float
-    reduced: bool = False
+    reduced: bool
 
     def density_dissipation(self, fraction: float) -> float:
         """The fraction of the density that dissolves where a fraction of the values does."""
         return float(1 - (1 - fraction) ** (4 / 3)) if self.reduced else fraction
 
 
+ATTEMPTS = (
+    (False, 0.0, SMOOTH),
+    (True, BLUR, NOISE),
+    (False, BLUR, NOISE),
+    (False, 1.0, NOISE),
+    (False, 1.5, NOISE),
+    (False, 2.0, NOISE),
+)
+"""Whether contrast is reduced, the standard deviation of the blur (voxels), and the noise that may be left: the first
+that leaves no more is taken, else the last. Smooth densities stay as they are, and noisy ones are only blurred."""
+
+
 def prepare(before: Array, after: Array) -> PreparedPair:
-    """Blur two densities and reduce their contrast; leave smooth ones as they are, and only blur noisy ones."""
-    smooth, enough = blurred(before, after, 0.0, SMOOTH)
-    if enough:
-        return smooth
-    sharp, enough = blurred(reduced_contrast(before), reduced_contrast(after), BLUR, NOISE)
-    if enough:
-        return replace(sharp, reduced=True)
-    for width in (BLUR, *NOISE_WIDTHS):
-        noisy, enough = blurred(before, after, width, NOISE)
-        if enough:
+    """Blur two densities and reduce their contrast, as the first of `ATTEMPTS` that leaves little noise."""
+    for reduced, width, allowed in ATTEMPTS:
+        first, second = (reduced_contrast(a) if reduced else a for a in (before, after))
+        smoke = second > SMOKE_THRESHOLD * second.max()
+        raw = float(np.hypot(noise_level(first, smoke), noise_level(second, smoke)))
+        first, second, left = blurred(first, width), blurred(second, width), raw * _passed(width)
+        if left <= allowed * rms_gradient(gradient(second), smoke):
             break
-    return noisy
+    return PreparedPair(first, second, left**2, reduced)
 
 
 def reduced_contrast(density: Array) -> Array:
@@ -95,16 +100,9 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
     return float(np.median(np.abs(finest[inside]))) / MAD
 
 
-def blurred(before: Array, after: Array, width: float, allowed: float = math.inf) -> tuple[PreparedPair, bool]:
-    """Blur two densities by a standard deviation in voxels, 0 for none; and whether the noise that is left is allowed.
-
-    What is ``allowed`` is in root mean square gradients.
-    """
-    smoke = after > SMOKE_THRESHOLD * after.max()
-    raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
-    first, second = (_core.blur(a, width, 4.0) if width > 0 else a for a in (before, after))
-    left = raw * _passed(width)
-    return PreparedPair(first, second, left**2), left <= allowed * rms_gradient(gradient(second), smoke)
+def blurred(density: Array, width: float) -> Array:
+    """A density blurred by a standard deviation in voxels, 0 for none."""
+    return _core.blur(density, width, 4.0) if width > 0 else density
 
 
 def _passed(width: float) -> float:
