@@ -10,19 +10,7 @@ sample's weights always add up to one.
 
 import taichi as ti
 
-from smokelift.render.gpu.light_kernels import (
-    affine,
-    faces_voxel,
-    integers3,
-    ndarray2,
-    ndarray3,
-    ndarray4,
-    parallel_at_voxel,
-    phase,
-    point_at_voxel,
-    vec2,
-    vec3,
-)
+from smokelift.render.gpu.light_kernels import integers3, ndarray2, ndarray3, ndarray4, vec3
 
 
 @ti.func
@@ -35,70 +23,34 @@ def _way(index, size, travel, voxel_size):
     return voxel_size * shortest * travel.norm()
 
 
-@ti.func
-def _write(inscatter: ti.template(), index, energy, lit, way, channels: ti.template(), add):
-    for c in ti.static(range(channels)):
-        here = energy[c] * lit
-        shadowed = here * way
-        if add != 0:
-            here += inscatter[index[0], index[1], index[2], c]
-            shadowed += inscatter[index[0], index[1], index[2], channels + c]
-        inscatter[index[0], index[1], index[2], c] = here
-        inscatter[index[0], index[1], index[2], channels + c] = shadowed
-
-
 @ti.kernel
-def shade_parallel(
-    columns: ndarray3,
+def add_light(
+    lit: ndarray4,
     inscatter: ndarray4,
-    axis: ti.template(),
-    slope_b: ti.f32,
-    slope_c: ti.f32,
-    first: ti.i32,
-    step: ti.f32,
-    direction: vec3,
-    energy: vec3,
-    to_eye: affine,
-    anisotropy: ti.f32,
-    albedo: ti.f32,
+    light: vec3,
+    parallel: ti.template(),
     voxel_size: ti.f32,
     channels: ti.template(),
     add: ti.i32,
 ):
-    """Write, or ``add``, J = albedo p E V and J x way of a parallel light from its sweep."""
+    """Write, or ``add``, J = albedo p E V and J x way of one light, whose J is in the channels of ``lit``.
+
+    ``light`` is the direction of parallel light, or the point that it comes from.
+    """
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
-        lit = phase(index, to_eye, direction, anisotropy, albedo)
-        lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
-        _write(inscatter, index, energy, lit, _way(index, size, direction, voxel_size), channels, add)
-
-
-@ti.kernel
-def shade_point(
-    columns: ndarray3,
-    inscatter: ndarray4,
-    axis: ti.template(),
-    travel: ti.i32,
-    first: ti.i32,
-    far: ti.f32,
-    begin: vec2,
-    position: vec3,
-    energy: vec3,
-    to_eye: affine,
-    anisotropy: ti.f32,
-    albedo: ti.f32,
-    voxel_size: ti.f32,
-    channels: ti.template(),
-    add: ti.i32,
-):
-    """Write, or ``add``, the same of a point light, for the voxels of one face's sweep."""
-    size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
-    for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
-        if faces_voxel(axis, travel, position, index):
-            away = index - position
-            lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
-            lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
-            _write(inscatter, index, energy, lit, _way(index, size, away, voxel_size), channels, add)
+        travel = light
+        if ti.static(not parallel):
+            travel = index - light
+        way = _way(index, size, travel, voxel_size)
+        for c in ti.static(range(channels)):
+            here = lit[index[0] + 1, index[1] + 1, index[2] + 1, c + 1]
+            shadowed = here * way
+            if add != 0:
+                here += inscatter[index[0], index[1], index[2], c]
+                shadowed += inscatter[index[0], index[1], index[2], channels + c]
+            inscatter[index[0], index[1], index[2], c] = here
+            inscatter[index[0], index[1], index[2], channels + c] = shadowed
 
 
 @ti.func

@@ -44,7 +44,7 @@ from smokelift.render.gpu import taichi_runtime as taichi
 # what imports Taichi comes after the runtime, which suppresses its greeting
 from smokelift.baselines import kernels
 from smokelift.render.gpu import camera_kernels
-from smokelift.render.gpu.backend import LightColumns, energy, face_rays, slopes
+from smokelift.render.gpu.backend import LightSweeps
 from smokelift.render.light_sweeps import ParallelSweep
 from smokelift.render.plan import plan_render
 from smokelift.render.renderer import Image, Volume
@@ -78,11 +78,11 @@ class PaperRenderer:
         self._color = setup.color if self._lights else np.zeros((1, 3))
         self._channels = len(self._color)
         x, y, z = domain.resolution
-        self._to_eye = taichi.matrix(setup.to_eye)
         self._extinction = taichi.zeros((x + 2, y + 2, z + 2, 1))
+        self._lit = taichi.zeros((x + 2, y + 2, z + 2, 1 + self._channels))
         self._inscatter = taichi.zeros((x, y, z, 2 * self._channels))
-        self._columns = LightColumns(domain.resolution)
         self._voxels = taichi.upload(setup.marked)
+        self._sweeps = LightSweeps(setup, self._voxels)
         if self._lights and not self._shadows:
             self._shade()  # with no extinction yet
         first, step, count = _samples(camera, domain)
@@ -127,20 +127,13 @@ class PaperRenderer:
 
     def _shade(self) -> None:
         """Make the volume of in-scattered radiance, by the exact renderer's sweeps."""
-        medium = self.medium
-        further = (self._to_eye, medium.anisotropy, medium.albedo, self.domain.voxel_size, self._channels)
         for number, light in enumerate(self._lights):
-            if isinstance(light, ParallelSweep):
-                columns = self._columns.parallel(self._extinction, light, light.travel)
-                kernels.shade_parallel(
-                    columns, self._inscatter, *slopes(light), light.step, taichi.vector(light.direction),
-                    energy(light), *further, number,
-                )  # fmt: skip
-                continue
-            for face in light.faces:
-                columns = self._columns.point(self._extinction, light, face)
-                rays = face_rays(light, face)
-                kernels.shade_point(columns, self._inscatter, *rays, energy(light), *further, number)
+            self._sweeps.scatter(light, self._extinction, self._lit, 0)
+            place = light.direction if isinstance(light, ParallelSweep) else light.position
+            kernels.add_light(
+                self._lit, self._inscatter, taichi.vector(place), isinstance(light, ParallelSweep),
+                self.domain.voxel_size, self._channels, number,
+            )  # fmt: skip
 
 
 def _samples(camera: Camera, domain: Domain) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:

@@ -13,7 +13,7 @@ from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
 from smokelift.render.gpu import taichi_runtime as taichi
-from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep, Shape
+from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep, Sweep
 from smokelift.render.plan import RenderPlan
 
 
@@ -38,8 +38,7 @@ class GpuBackend:
         self._record: Any = None
         self._gradient: Any = None
         self._scratch: Any = None
-        self._to_eye = taichi.matrix(plan.to_eye)
-        self._columns = LightColumns(plan.shape)
+        self._sweeps = LightSweeps(plan, self._near)
         self._diffuse = DiffuseLight(plan, _core.Support(plan.marked)) if plan.diffuse else None
         if self._channels and not plan.shadows:
             self._shade()
@@ -94,14 +93,8 @@ class GpuBackend:
         return result
 
     def _shade(self) -> None:
-        add = 0
-        for sweep in self._plan.lights:
-            if isinstance(sweep, ParallelSweep):
-                self._scatter(sweep, self._medium, self._medium, add, adjoint=False)
-            else:
-                for face in sweep.faces:
-                    self._scatter_face(sweep, face, self._medium, self._medium, add, adjoint=False)
-            add = 1
+        for number, sweep in enumerate(self._plan.lights):
+            self._sweeps.scatter(sweep, self._medium, self._medium, number)
         camera.extend_into_border(self._medium)
 
     def _shade_adjoint(self) -> None:
@@ -109,55 +102,61 @@ class GpuBackend:
             self._scratch = taichi.zeros((*self._padded, 1))
         for sweep in self._plan.lights:
             if isinstance(sweep, ParallelSweep):
-                self._scatter(sweep, self._gradient, self._scratch, 0, adjoint=True)
+                self._sweeps.scatter_parallel(sweep, self._medium, self._gradient, self._scratch, adjoint=True)
                 # the adjoint of the sweep is that of the light that travels the other way
-                columns = self._columns.parallel(self._scratch, sweep, -sweep.travel)
-                light.add_parallel_shadow(columns, self._near, self._gradient, *slopes(sweep), sweep.step)
+                columns = self._sweeps.columns(sweep, self._scratch, -sweep.travel)
+                light.add_parallel_shadow(columns, self._near, self._gradient, *_slopes(sweep), sweep.step)
                 continue
             for face in sweep.faces:
-                columns = self._scatter_face(sweep, face, self._gradient, self._scratch, 0, adjoint=True)
-                rays = face_rays(sweep, face)
+                columns = self._sweeps.scatter_face(
+                    sweep, face, self._medium, self._gradient, self._scratch, adjoint=True
+                )
+                rays = _face_rays(sweep, face)
                 light.gather_rays(self._scratch, columns, *rays, sweep.voxel_size)
                 light.add_point_shadow(columns, self._near, self._gradient, *rays)
 
-    def _scatter(self, sweep: ParallelSweep, source: Any, result: Any, add: int, *, adjoint: bool) -> None:
-        columns = self._columns.parallel(self._medium, sweep, sweep.travel)
+
+class LightSweeps:
+    """Lights swept through the voxels of a plan that are marked in ``near``; columns of one shape share memory."""
+
+    def __init__(self, plan: RenderPlan, near: Any) -> None:
+        self._shape, self._near = plan.shape, near
+        self._phase = taichi.matrix(plan.to_eye), plan.medium.anisotropy, plan.medium.albedo
+        self._columns: dict[tuple[int, ...], Any] = {}
+
+    def scatter(self, sweep: Sweep, medium: Any, result: Any, add: int) -> None:
+        """Write, or ``add``, the radiance of a light that a medium scatters, in the channels after its first one."""
+        if isinstance(sweep, ParallelSweep):
+            self.scatter_parallel(sweep, medium, result, result, add)
+            return
+        for face in sweep.faces:
+            self.scatter_face(sweep, face, medium, result, result, add)
+
+    def scatter_parallel(
+        self, sweep: ParallelSweep, medium: Any, source: Any, result: Any, add: int = 0, *, adjoint: bool = False
+    ) -> None:
+        """Do `light_kernels.scatter_parallel` with the columns of a parallel light."""
         light.scatter_parallel(
-            columns, self._near, source, result, *slopes(sweep), sweep.step, taichi.vector(sweep.direction),
-            energy(sweep), self._to_eye, *self._phase, add, adjoint,
+            self.columns(sweep, medium, sweep.travel), self._near, source, result, *_slopes(sweep), sweep.step,
+            taichi.vector(sweep.direction), _energy(sweep), *self._phase, add, adjoint,
         )  # fmt: skip
 
-    def _scatter_face(self, sweep: PointSweep, face: Face, source: Any, result: Any, add: int, *, adjoint: bool) -> Any:
-        """Scatter through one face of a point light, and return its columns."""
-        columns = self._columns.point(self._medium, sweep, face)
+    def scatter_face(
+        self, sweep: PointSweep, face: Face, medium: Any, source: Any, result: Any, add: int = 0, *,
+        adjoint: bool = False,
+    ) -> Any:  # fmt: skip
+        """Do `light_kernels.scatter_point` through one face of a point light, and return its columns."""
+        columns, rays = self._of_shape(face.planes, face.columns_b[1], face.columns_c[1]), _face_rays(sweep, face)
+        light.accumulate_rays(medium, columns, *rays, sweep.voxel_size)
         light.scatter_point(
-            columns, self._near, source, result, *face_rays(sweep, face),
-            energy(sweep), self._to_eye, *self._phase, add, adjoint,
+            columns, self._near, source, result, *rays, _energy(sweep), *self._phase, add, adjoint,
         )  # fmt: skip
         return columns
 
-    @property
-    def _phase(self) -> tuple[float, float]:
-        return self._plan.medium.anisotropy, self._plan.medium.albedo
-
-
-class LightColumns:
-    """The columns of lights over a box of voxels, whose memory lights with columns of one shape use in turn."""
-
-    def __init__(self, shape: Shape) -> None:
-        self._shape = shape
-        self._columns: dict[tuple[int, ...], Any] = {}
-
-    def parallel(self, voxels: Any, sweep: ParallelSweep, travel: int) -> Any:
+    def columns(self, sweep: ParallelSweep, voxels: Any, travel: int) -> Any:
         """Sums over voxels along the columns of a parallel light, one way or the other along its axis."""
         columns = self._of_shape(*(n + (axis != sweep.axis) for axis, n in enumerate(self._shape)))
         light.accumulate_columns(voxels, columns, sweep.axis, travel, *sweep.slope, sweep.first)
-        return columns
-
-    def point(self, medium: Any, sweep: PointSweep, face: Face) -> Any:
-        """Optical depths along the columns through a face of a point light."""
-        columns = self._of_shape(face.planes, face.columns_b[1], face.columns_c[1])
-        light.accumulate_rays(medium, columns, *face_rays(sweep, face), sweep.voxel_size)
         return columns
 
     def _of_shape(self, *shape: int) -> Any:
@@ -166,17 +165,17 @@ class LightColumns:
         return self._columns[shape]
 
 
-def energy(sweep: ParallelSweep | PointSweep) -> Any:
+def _energy(sweep: Sweep) -> Any:
     """The energy of a light in three channels, as kernels take it."""
     return taichi.vector(np.resize(sweep.energy, 3))
 
 
-def slopes(sweep: ParallelSweep) -> tuple[int, float, float, int]:
+def _slopes(sweep: ParallelSweep) -> tuple[int, float, float, int]:
     """The columns of a parallel light, as kernels take them."""
     return sweep.axis, *sweep.slope, sweep.first
 
 
-def face_rays(sweep: PointSweep, face: Face) -> tuple[Any, ...]:
+def _face_rays(sweep: PointSweep, face: Face) -> tuple[Any, ...]:
     """The columns through a face of a point light, as kernels take them."""
     begin = np.array([face.columns_b[0], face.columns_c[0]])
     return face.axis, face.travel, face.first, face.far, taichi.vector(begin), taichi.vector(sweep.position)
