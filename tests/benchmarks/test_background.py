@@ -1,18 +1,14 @@
 """Clips before known backgrounds: what they show, and the figures of a background and of a run."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from benchmarks.background.__main__ import plate_score as score
 from benchmarks.background.cases import CASES, with_column
 from benchmarks.baked import Baked
-from benchmarks.measure import optical_mass, view_figures
-from smokelift import Medium
+from benchmarks.measure import optical_mass
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.plate import known_plate
-from smokelift.scene import completed
 from tests.benchmarks.ball import cameras, scene
 
 COUNT, GRID, SIZE = 40, (8, 8, 12), (32, 48)
@@ -50,16 +46,3 @@ def test_the_true_background_has_no_error_and_a_bright_one_takes_light(ball) -> 
     assert true["plate"] < 0.5 and true["lost"] < 0.01 and true["missed"] < 0.01
     wrong = score(clip, known_plate(background + np.float32(0.05), clip), background, clean)
     assert wrong["plate"] > 5 and wrong["lost"] > 0.2
-
-
-def test_true_volumes_have_the_true_views_and_mass(ball) -> None:
-    def seen(view: str, frame: int) -> np.ndarray:
-        return ball.views[view].at([frame]).before(np.full(3, 0.2))[0]
-
-    whole, frames, gray = completed(ball.scene), range(0, COUNT, 10), np.full(3, 0.2, np.float32)
-    figures = view_figures(whole, lambda k: 1.01 * ball.densities[k], ball.cameras, seen, frames, gray)
-    assert figures["psnr_new"] == figures["psnr_90"] > 50
-    doubled = view_figures(whole, lambda k: 2 * ball.densities[k], ball.cameras, seen, frames)
-    assert doubled["psnr_new"] < 30
-    halved = replace(ball.scene, medium=Medium(1.5, 0.8))
-    assert optical_mass(ball.scene, ball.densities) == pytest.approx(2 * optical_mass(halved, ball.densities))

@@ -10,15 +10,6 @@ def picture(size: int) -> np.ndarray:
     return np.zeros((size, size, 3), np.float32)
 
 
-@pytest.mark.parametrize("size", [32, 64])
-@pytest.mark.parametrize("share", [0.05, PLUME, 0.6])
-def test_share_of_voxels_with_smoke(size, share):
-    density = plume(size, share)
-    assert density.dtype == np.float32
-    assert np.mean(density > 0) == pytest.approx(share, abs=0.0005)
-    assert np.all(density >= 0)
-
-
 def test_optical_depth():
     scene = bench_scene(plume(32, PLUME), picture(32))
     depth = scene.medium.extinction * scene.density.sum(1).max() * scene.domain.voxel_size

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.process import apart
-from benchmarks.renderer import peers, reference, worker
+from benchmarks.renderer import reference, worker
 from benchmarks.renderer.__main__ import EXACT
-from benchmarks.renderer.peers import OURS, PEERS, Peer
+from benchmarks.renderer.peers import OURS, PEERS
 from benchmarks.renderer.scene import bench_scene, plume
 
 SIZE = 9
@@ -48,16 +48,6 @@ def test_a_peer_is_measured_in_a_process_of_its_own(stage, peer):
     image, true_gradient = reference.image_and_gradient(scene)
     assert distance(found, image) < (0.2 if peer == "paper" else 1e-6)
     assert (distance(gradient, true_gradient) < EXACT / 10) == (peer != "paper")
-
-
-def test_a_peer_says_what_it_needs(monkeypatch):
-    """Dr.Jit aborts the process where it finds no LLVM, so that is asked before."""
-    python = Peer("a module that there is", "ours", ("numpy",))
-    monkeypatch.setattr(peers, "finds_llvm", lambda: True)
-    assert not python.needs and not PEERS[OURS].needs
-    assert replace(python, packages=("nowhere",)).needs == "not installed: pip install nowhere"
-    monkeypatch.setattr(peers, "finds_llvm", lambda: False)
-    assert python.needs.startswith("Dr.Jit finds no LLVM") and not PEERS[OURS].needs
 
 
 def test_failure_in_a_peer_is_one_sentence(stage):

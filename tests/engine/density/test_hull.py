@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density.hull import common_hull, project_voxels, visual_hull
+from smokelift.density.hull import project_voxels
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 
@@ -64,14 +64,3 @@ def test_pictures_are_read_as_scipy_reads_them(camera):
     places = project_voxels(camera, DOMAIN).places(everywhere)
     expected = ndimage.map_coordinates(picture, (places.rows, places.columns), order=1, mode="nearest")
     np.testing.assert_array_equal(places.read(picture), expected)
-
-
-def test_one_pictures_hull_is_the_common_one():
-    camera = CAMERAS["in front"]
-    mask = np.zeros(SIZE[::-1], np.bool_)
-    mask[5:9, 6:12] = True
-    projection = project_voxels(camera, DOMAIN)
-    hull = visual_hull(mask, projection)
-    assert 0 < hull.sum() < projection.visible.sum()
-    np.testing.assert_array_equal(common_hull([mask], [projection]), hull)
-    np.testing.assert_array_equal(common_hull([mask, mask], [projection, projection]), hull)
