@@ -25,7 +25,6 @@ TESTS = (
     "tests/engine/transport",
     "tests/engine/velocity",
     "tests/engine/render/test_renderer.py",
-    "tests/engine/render/test_renderer_stability.py",
     "-k",
     "not memory",  # which the sanitizers take for themselves
 )
