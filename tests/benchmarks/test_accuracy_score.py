@@ -1,8 +1,5 @@
 """Figures of a run whose densities are known: the truth's own, and its front drawn out in depth."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -46,26 +43,8 @@ def known(tmp_path_factory) -> KnownScene:
     )
 
 
-@pytest.fixture(scope="module")
-def drawn_out(tmp_path_factory) -> Path:
-    """A run whose every ray is constant in depth."""
-    folder = tmp_path_factory.mktemp("drawn-out")
-    SCENE.save(folder / "scene.toml")
-    about = {"seconds": 1.0, "solves": 2.0, "memory_mib": 3.0, "method": "default"}
-    (folder / "run.json").write_text(json.dumps(about | {"scattering": "single", "resolution": SHAPE}))
-    for frame in range(FRAMES):
-        np.savez(folder / f"{frame + 1:04d}.npz", density=np.repeat(density(frame).mean(1, keepdims=True), 16, 1))
-    return folder
-
-
 def test_the_truth_has_the_truth_s_orbit(known, tmp_path) -> None:
     row = score(known, "truth", tmp_path)
     assert row["ssim_new"] == pytest.approx(1)
     assert row["patches"] == 0 < row["patches_own"]
     assert (row["edges"], row["flicker"]) == pytest.approx((1, 1))
-
-
-def test_a_front_drawn_out_in_depth_shows_in_its_orbit(known, drawn_out) -> None:
-    row = score(known, "draft", drawn_out)
-    assert row["patches_worst"] > row["patches"] > row["patches_own"]
-    assert row["halo"] > 0.02
