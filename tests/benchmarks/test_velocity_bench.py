@@ -1,19 +1,20 @@
-"""``python -m benchmarks.velocity``: errors of whole estimates, and how they are timed."""
+"""``python -m benchmarks.velocity``: errors of whole estimates, and its built-in scene."""
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from benchmarks.velocity.__main__ import ESTIMATORS, against_truth
-from benchmarks.velocity.flow import built_in_pair
+from benchmarks.velocity.flow import Flow, built_in_pair
 from benchmarks.velocity.pairs import Pair, pair_of_truth
 from smokelift.velocity import CoarseToFine
 from tests.benchmarks.ball import truth
 
-SHAPE = (16, 16, 24)
+SHAPE, FINE = (16, 16, 24), (32, 32, 48)
 
 
 def test_more_iterations_are_nearer_to_the_truth():
-    pairs = [built_in_pair((32, 32, 48), seed) for seed in range(2)]
+    pairs = [built_in_pair(FINE, seed) for seed in range(2)]
     few, many = (against_truth(pairs, ESTIMATORS[f"{n} iterations"])[0] for n in (2, 20))
     assert many < few < 0.5
 
@@ -28,3 +29,27 @@ def test_a_baked_pair_has_its_motion_in_voxels_a_frame():
     smoke = built_in_pair(SHAPE, 0).before
     pair = pair_of_truth(truth(np.stack([smoke, np.roll(smoke, 1, axis=2)]), 0.1, speed=0.1 * 24), 0)
     np.testing.assert_allclose(pair.motion[pair.counted].mean(0), (0, 0, 1), atol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return built_in_pair(FINE, 0)
+
+
+def points(count: int) -> np.ndarray:
+    return np.random.default_rng(1).uniform(-0.25, 0.25, (3, count)).astype(np.float32)
+
+
+def test_the_velocity_has_no_divergence():
+    velocity, x, h = Flow.random(np.random.default_rng(0), 96).velocity, points(500), np.float32(2e-3)
+    axes = np.eye(3, dtype=np.float32)[:, :, None]
+    gradient = np.stack([(velocity(x + h * axis) - velocity(x - h * axis)) / (2 * h) for axis in axes])
+    divergence = np.trace(gradient)
+    assert np.sqrt(np.mean(divergence**2)) < 2e-3 * np.sqrt(np.mean(np.sum(gradient**2, (0, 1))))
+
+
+def test_the_motion_carries_the_one_density_into_the_other(pair):
+    origin = np.indices(FINE) - np.moveaxis(pair.motion, -1, 0)
+    carried = ndimage.map_coordinates(pair.before, origin, order=3)
+    left, change = (np.linalg.norm((a - pair.after)[pair.counted]) for a in (carried, pair.before))
+    assert left < 0.1 * change
