@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import DensityPair, checked, in_meters, motion_weight, predict_velocity
+from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity
 from smokelift.velocity.linearization import least_squares, linearize
 from smokelift.velocity.preparation import blurred
 from smokelift.velocity.solver import PrimalDual, Solver
@@ -38,7 +38,6 @@ class PaperVelocity:
 
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """Estimate as by `smokelift.velocity.estimate_velocity`; a prediction is not used."""
-        pair = checked(pair)
         rest = StaggeredGrid.zero(pair.before.shape, 1.0, pair.closed)
         before, after = (blurred(density, self.blur) for density in (pair.before, pair.after))
         linear = linearize(before, after, motion_weight(rest.shape, pair.inflow), rest)

@@ -10,14 +10,7 @@ import numpy as np
 from smokelift.checks import require_kind
 from smokelift.scene.checks import integer
 from smokelift.transport import Array, StaggeredGrid, Velocity, require_same_shape, without_divergence
-from smokelift.velocity.estimator import (
-    DensityPair,
-    checked,
-    in_meters,
-    motion_weight,
-    predict_velocity,
-    refine,
-)
+from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity, refine
 from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, linearize
 from smokelift.velocity.momentum import fit_center
 from smokelift.velocity.preparation import PreparedPair, prepare
@@ -93,7 +86,6 @@ class CoarseToFine:
 
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
         """See `smokelift.velocity.estimate_velocity`."""
-        pair = checked(pair)
         require_kind(prediction, Velocity | None, "prediction", "a Velocity")
         peaks = sorted((float(pair.before.max()), float(pair.after.max())))
         seen = peaks[0] > SMOKE_THRESHOLD * peaks[1]  # between smoke and none there is no motion to be seen

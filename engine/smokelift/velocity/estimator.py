@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy import ndimage
 from smokelift.checks import numbers, require_kind
 from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
+from smokelift.scene.checks import set_fields
 from smokelift.scene.domain import checked_sides
 from smokelift.transport import (
     Array,
@@ -45,7 +46,7 @@ class DensityPair:
     Attributes
     ----------
     before, after : (nx, ny, nz)
-        Densities >= 0.
+        Densities >= 0, kept as float32.
     dt
         Time between them in seconds.
     voxel_size
@@ -54,6 +55,11 @@ class DensityPair:
         Sides of the box that are walls.
     inflow : (nx, ny, nz)
         True where smoke enters; None where that is not known.
+
+    Raises
+    ------
+    ValueError
+        For what no estimator takes: see `smokelift.velocity.estimate_velocity`.
     """
 
     before: Density
@@ -62,6 +68,16 @@ class DensityPair:
     voxel_size: float
     closed: tuple[Side, ...] = ()
     inflow: Mask | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("dt", self.dt)
+        require_positive("voxel_size", self.voxel_size)
+        first, second = _density("before", self.before), _density("after", self.after)
+        require_same_shape("after", second.shape, first.shape)
+        require_kind(self.inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
+        if self.inflow is not None:
+            require_same_shape("inflow", self.inflow.shape, first.shape)
+        set_fields(self, before=first, after=second, closed=checked_sides(self.closed))
 
 
 class VelocityEstimator(Protocol):
@@ -124,18 +140,6 @@ def in_meters(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float])
     for component in u.faces:
         component *= np.float32(pair.voxel_size / pair.dt)
     return Velocity(u.faces, pair.voxel_size, u.closed, figures={**figures, "divergence": largest})
-
-
-def checked(pair: DensityPair) -> DensityPair:
-    """The pair with its densities as float32; ValueError for what no estimator takes."""
-    require_positive("dt", pair.dt)
-    require_positive("voxel_size", pair.voxel_size)
-    first, second = _density("before", pair.before), _density("after", pair.after)
-    require_same_shape("after", second.shape, first.shape)
-    require_kind(pair.inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
-    if pair.inflow is not None:
-        require_same_shape("inflow", pair.inflow.shape, first.shape)
-    return replace(pair, before=first, after=second, closed=checked_sides(pair.closed))
 
 
 def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:

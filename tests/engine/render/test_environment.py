@@ -87,10 +87,9 @@ def test_smooth_sums_over_the_sphere_converge(light_of) -> None:
     """
     directions, solid_angle = texels(64, 128)
     sharpness = np.array([1.0, 3.0])[:, None, None]
-    axes, radiance = np.concatenate([np.eye(3), -np.eye(3)]), soft_lamps(0)
-    exact = np.exp(sharpness * (axes @ directions.reshape(-1, 3).T)) @ (radiance * solid_angle[..., None]).reshape(
-        -1, 3
-    )
+    axes, radiance = np.concatenate([np.eye(3), -np.eye(3)]), soft_lamps()
+    flux = (radiance * solid_angle[..., None]).reshape(-1, 3)
+    exact = np.exp(sharpness * (axes @ directions.reshape(-1, 3).T)) @ flux
     light, errors = light_of(radiance), []
     for count in (16, 64):
         lights = environment_lights(light, count)
