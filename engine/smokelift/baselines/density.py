@@ -84,7 +84,6 @@ class FixedRateDescent:
             return empty_density(views)
         optics = views.optics
         seen = depth.views.views
-        everywhere = [np.ones(view.mask.shape, np.bool_) for view in views.views]
         renderers = [
             PaperRenderer(
                 view.camera, optics.domain, optics.medium, optics.lights, view.background[..., :3], optics.scattering
@@ -94,11 +93,8 @@ class FixedRateDescent:
         pictures = [view.image[..., :3] for view in seen]
         start = depth.density if initial is None else initial
         density, residuals, done = self._descend(renderers, pictures, start, depth.density)
-        judged = replace(
-            views,
-            views=tuple(replace(view, influenced=every) for view, every in zip(views.views, everywhere, strict=True)),
-            hull=np.ones_like(views.hull),
-        )
+        everywhere = tuple(replace(view, influenced=np.ones(view.mask.shape, np.bool_)) for view in views.views)
+        judged = replace(views, views=everywhere, hull=np.ones_like(views.hull))
         return FittedDensity(without_traces(density, judged.where), judged.hull, fit_figures(judged, residuals, done))
 
     def _descend(
