@@ -14,7 +14,7 @@ from urllib.parse import quote
 from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, is_finished, read_index
 from smokelift.checks import counted
-from smokelift.checks.whole_files import atomic_path
+from smokelift.checks.whole_files import write_text
 
 _STYLE = """
 body { background: #1a1a1c; color: #e8e8e8; font: 15px sans-serif; margin: 1.5em }
@@ -85,8 +85,7 @@ def write_report(path: Path, title: str, records: Mapping[BatchShot, Record]) ->
         f"<p>{counted(len(records), 'shot')}: {', '.join(f'{count} {status}' for status, count in counts)}.</p>\n"
         f"<table>\n<tr>{''.join(f'<th>{each}</th>' for each in _HEADINGS)}</tr>\n{rows}</table>\n</body></html>\n"
     )
-    with atomic_path(path) as aside:
-        aside.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _cells(shot: BatchShot, record: Record) -> str:

@@ -1,4 +1,4 @@
-"""The work on one shot, wherever it is done, by a process of the engine; and what is known of it, ``NAME.json``.
+"""The work on one shot, by a process of the engine; what is known of it, ``NAME.json``; and many on this machine.
 
 Several processes on several machines may work on the same shot: one does the work, the others wait for it. What
 decides is on the storage that they share: the lock, the record and the sequence.
@@ -11,7 +11,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from typing import Any, Literal
 import psutil
 
 from smokelift.batch.shots import BatchShot
-from smokelift.checks.whole_files import atomic_path
+from smokelift.checks.whole_files import write_text
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.lock import Lock
 from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
@@ -30,6 +31,9 @@ ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
 
 POLL_SECONDS, GRACE_SECONDS = 0.25, 20.0
 """Between two measurements of a running engine, and for a cancelled one to end, which kills itself before that."""
+
+WAKE_SECONDS = 0.5
+"""Python handles no signal while it waits on some systems, so that no wait for a shot is longer."""
 
 RETRIES, PAUSE_SECONDS, PATIENCE_SECONDS = 2, 30.0, 3600.0
 """New tries after a crash. Seconds between tries while a disk is full, say, and in all without a new frame."""
@@ -61,8 +65,7 @@ class Record:
 
     def write(self, shot: BatchShot) -> None:
         """Write the file; OSError if that fails."""
-        with atomic_path(shot.file("json")) as aside:
-            aside.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
+        write_text(shot.file("json"), json.dumps(asdict(self), indent=1) + "\n")
 
 
 Task = Callable[[BatchShot, threading.Event], Record]
@@ -148,6 +151,28 @@ def finish_shot(
             waited += pause
         else:
             return record
+
+
+def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterator[tuple[BatchShot, Record]]:
+    """Run shots side by side, `workers` at most, and yield each when it has ended.
+
+    A shot starts as soon as its part of `memory` is left, in the order of the list; a small one may overtake a large
+    one. What needs more than all of it runs alone. When the caller leaves early the work ends, and is waited for.
+    """
+    stop = threading.Event()
+    waiting, running = list(shots), dict[Future[Record], tuple[BatchShot, int]]()
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            while waiting or running:
+                for shot, needed in list(waiting):
+                    taken = sum(each for _, each in running.values())
+                    if not running or (len(running) < workers and taken + needed <= memory):
+                        waiting.remove((shot, needed))
+                        running[pool.submit(task, shot, stop)] = shot, needed
+                for future in wait(running, WAKE_SECONDS, FIRST_COMPLETED).done:
+                    yield running.pop(future)[0], future.result()
+        finally:
+            stop.set()
 
 
 def _reconstruct(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> Record:

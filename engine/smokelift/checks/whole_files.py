@@ -33,6 +33,12 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         raise
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all; OSError if that fails."""
+    with atomic_path(path) as aside:
+        aside.write_text(text, encoding="utf-8")
+
+
 def read_text(path: Path) -> str:
     """Read a text file in UTF-8.
 

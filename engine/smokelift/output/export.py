@@ -25,7 +25,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from smokelift.checks.whole_files import atomic_path
+from smokelift.checks.whole_files import write_text
 from smokelift.output.archive import FLAME
 from smokelift.output.files import INDEX, frame_path, proxy_path
 from smokelift.output.host import HOSTS, Host, HostName
@@ -131,12 +131,12 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
         _clear(out)
         export = _Export(sequence, settings, _peak(sequence, sequence.frames, settings))
         note = {**export.note(), "complete": False}
-        _write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
+        write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
         for number in sequence.frames:
             yield number, export.write_frame(number, out)
         if not export.host.left_handed:  # USD has no such axes
-            _write_text(out / USD, export.usd())
-        _write_text(out / NOTE, json.dumps({**note, "complete": True}, indent=1) + "\n")
+            write_text(out / USD, export.usd())
+        write_text(out / NOTE, json.dumps({**note, "complete": True}, indent=1) + "\n")
     except OSError as error:
         raise SequenceError(f"{out}: cannot be written: {error}") from error
 
@@ -318,8 +318,3 @@ def _clear(out: Path) -> None:
     for path in out.iterdir():
         if _OWN.fullmatch(path.name) or path.name == USD:
             path.unlink()
-
-
-def _write_text(path: Path, text: str) -> None:
-    with atomic_path(path) as aside:
-        aside.write_text(text, encoding="utf-8")

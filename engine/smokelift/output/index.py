@@ -16,7 +16,7 @@ from typing import Any, get_origin, get_type_hints
 import numpy as np
 
 from smokelift.checks import shown
-from smokelift.checks.whole_files import atomic_path, read_text
+from smokelift.checks.whole_files import read_text, write_text
 from smokelift.output.files import INDEX, MAX_START_NUMBER
 from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
@@ -127,8 +127,7 @@ class Index:
         """Write the file; OSError if that fails."""
         parts = {name: _json(value) for name, value in {"format": FORMAT, **vars(self)}.items()}
         parts["frames"] = _lines({number: _json(figures) for number, figures in self.frames.items()})
-        with atomic_path(directory / INDEX) as aside:
-            aside.write_text(_lines(parts) + "\n", encoding="utf-8")
+        write_text(directory / INDEX, _lines(parts) + "\n")
 
     @staticmethod
     def read(directory: Path) -> Index:

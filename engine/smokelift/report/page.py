@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from smokelift.checks import UNDETERMINED, Finding
-from smokelift.checks.whole_files import atomic_path
+from smokelift.checks.whole_files import atomic_path, write_text
 from smokelift.report.views import fact, sentence
 
 PAGE_KINDS = (".png", ".html")
@@ -62,11 +62,11 @@ class Page:
 
 def write_page(path: Path, page: Page) -> None:
     """Write a page as the suffix says, one of `PAGE_KINDS`. It appears whole or not at all."""
+    if path.suffix.lower() == ".html":
+        write_text(path, _as_html(page))
+        return
     with atomic_path(path) as aside:
-        if path.suffix.lower() == ".html":
-            aside.write_text(_as_html(page), encoding="utf-8")
-        else:
-            _as_picture(page).save(aside, format="PNG", compress_level=PNG_COMPRESSION)
+        _as_picture(page).save(aside, format="PNG", compress_level=PNG_COMPRESSION)
 
 
 def tile_size(width: int, height: int) -> tuple[int, int]:

@@ -1,7 +1,5 @@
 """The work on one shot: nothing is lost, and nothing is done twice."""
 
-import os
-import subprocess
 import sys
 import threading
 import time
@@ -11,9 +9,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-import smokelift
 from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import ENGINE, finish_shot, inspect_shot, is_finished, read_index, read_record
+from smokelift.batch.work import Record, finish_shot, inspect_shot, is_finished, read_index, read_record, run_here
 
 PYTHON = (sys.executable, "-c")
 
@@ -22,19 +19,13 @@ def finished(shot: BatchShot) -> bool:
     return is_finished(shot, read_record(shot))
 
 
-def test_a_finished_shot_is_not_run_again(make_shot, fake, ledger) -> None:
+def test_a_finished_shot_is_run_again_only_if_its_options_or_its_clip_changed(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=3)
     record = finish_shot(shot, threading.Event(), engine=fake)
     assert (record.status, record.sentence, record.notes) == ("done", "Finished.", ["A fake."])
-    assert finished(shot)
     again = finish_shot(shot, threading.Event(), engine=fake)
     assert (again.runs, ledger(shot)) == (1, [1, 2, 3])
-
-
-def test_a_shot_whose_options_changed_is_run_again(make_shot, fake) -> None:
-    shot = make_shot()
-    finish_shot(shot, threading.Event(), engine=fake)
-    assert not finished(replace(shot, options=("--quality=fine",)))
+    assert finished(shot) and not finished(replace(shot, options=("--quality=fine",)))
     shot.input.write_text(shot.input.read_text() + " ")
     assert not finished(shot)
 
@@ -129,11 +120,61 @@ def test_a_log_that_cannot_be_written_stops_nothing(make_shot) -> None:
     assert finish_shot(shot, threading.Event(), engine=engine).sentence == "Made."
 
 
-def test_the_real_command_ends_when_its_standard_input_closes() -> None:
-    environment = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
-    command = [*ENGINE, "reconstruct", "/dev/null", "--out", "never"]
-    done = subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, env=environment, check=False, timeout=60
-    )
-    assert done.returncode == 130
-    assert done.stderr.endswith(b"Cancelled.\n")
+# shots side by side on one machine
+
+DONE = Record(of={}, status="done")
+
+
+@pytest.fixture
+def shots(make_shot):
+    """Make shots that need so much memory each."""
+
+    def make(*needs: int):
+        return [(make_shot(f"shot{n}"), memory) for n, memory in enumerate(needs)]
+
+    return make
+
+
+class Worker:
+    """Works on a shot for a moment, and notes how many did so at a time."""
+
+    def __init__(self) -> None:
+        self.order: list[str] = []
+        self.most = self._now = 0
+        self._lock = threading.Lock()
+
+    def __call__(self, shot, stop) -> Record:
+        with self._lock:
+            self.order.append(shot.name)
+            self._now += 1
+            self.most = max(self.most, self._now)
+        time.sleep(0.05)
+        with self._lock:
+            self._now -= 1
+        return DONE
+
+
+@pytest.mark.parametrize(("memory", "at_a_time", "most"), [(30, 8, 3), (100, 2, 2), (5, 8, 1)])
+def test_as_many_run_as_there_is_room_for(shots, memory, at_a_time, most) -> None:
+    work = Worker()
+    ended = list(run_here(shots(*[10] * 6), work, memory, at_a_time))
+    assert sorted(shot.name for shot, _ in ended) == [f"shot{n}" for n in range(6)]
+    assert work.most == most
+
+
+def test_a_small_shot_overtakes_a_large_one(shots) -> None:
+    work = Worker()
+    list(run_here(shots(60, 60, 30), work, 100, 8))
+    assert work.order == ["shot0", "shot2", "shot1"]
+
+
+def test_leaving_early_stops_the_work(shots) -> None:
+    def wait(shot, stop) -> Record:
+        if shot.name != "shot0":
+            assert stop.wait(10)
+        return DONE
+
+    began = time.monotonic()
+    for _ in run_here(shots(1, 1), wait, 10, 2):
+        break
+    assert time.monotonic() - began < 5

@@ -14,10 +14,9 @@ import psutil
 from smokelift.app.commands import reconstruct
 from smokelift.app.options import Command, add_device, named_path, whole_number
 from smokelift.app.progress import Reporter
-from smokelift.batch.local import run_here
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
 from smokelift.batch.shots import BatchShot, read_shots
-from smokelift.batch.work import Record, ShotMemory, Task, finish_shot, inspect_shot, read_record
+from smokelift.batch.work import Record, ShotMemory, Task, finish_shot, inspect_shot, read_record, run_here
 from smokelift.checks import counted
 from smokelift.report.cost import memory_free
 

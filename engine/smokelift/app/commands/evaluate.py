@@ -7,7 +7,7 @@ import json
 
 from smokelift.app.options import Command, named_path, require_folder
 from smokelift.app.progress import Reporter
-from smokelift.checks.whole_files import atomic_path
+from smokelift.checks.whole_files import write_text
 from smokelift.evaluation.evaluate import evaluate
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
@@ -51,8 +51,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     if options.picture is not None:
         found.write_picture(options.picture)
     if options.json is not None:
-        with atomic_path(options.json) as aside:
-            aside.write_text(text + "\n", encoding="utf-8")
+        write_text(options.json, text + "\n")
         text = f"{options.json} written."
     say.finish(text, found.figures)
 
