@@ -8,7 +8,7 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
@@ -23,6 +23,7 @@ from smokelift.report.views import message, sentence
 
 Style = Literal["text", "json"]
 Made = TypeVar("Made")
+Shown = Callable[[], Mapping[str, Any]]
 
 FORECAST_FRAMES = 10
 """Newest frames by whose seconds the rest is forecast. The forecast before the first counts as one of them until that
@@ -74,13 +75,10 @@ class Reporter:
     def note(self, said: Finding | str) -> None:
         """Something that was assumed or noticed."""
 
-    def start(
-        self, total: int, done: int, seconds: float | None = None, forecast: Mapping[str, Any] | None = None
-    ) -> None:
+    def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
         """Frames begin: ``total`` of them, ``done`` already.
 
-        ``seconds`` is a forecast of the rest, and ``forecast`` of what else a program shows of the shot, if there is
-        one.
+        ``seconds`` is a forecast of the rest, if there is one; ``shown`` gives what else a program shows of the shot.
         """
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
@@ -187,9 +185,7 @@ class _Text(Reporter):
         with _output():
             self._console.print(printable_lines(_words(said)), markup=False, soft_wrap=True)
 
-    def start(
-        self, total: int, done: int, seconds: float | None = None, forecast: Mapping[str, Any] | None = None
-    ) -> None:
+    def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
         with _output():
             self._bar.update(self._task, total=total, completed=done)
             self._bar.start_task(self._task)
@@ -226,15 +222,13 @@ class _Json(Reporter):
     def note(self, said: Finding | str) -> None:
         self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)
 
-    def start(
-        self, total: int, done: int, seconds: float | None = None, forecast: Mapping[str, Any] | None = None
-    ) -> None:
+    def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
         self._total, self._done, self._before = total, done, time.monotonic()
         known = {}
         if seconds is not None and total > done:
             self._seconds.append(seconds / (total - done))
             known = {"seconds_left": round(seconds, 1)}
-        self._say("start", total=total, done=done, **known, **(forecast or {}))
+        self._say("start", total=total, done=done, **known, **shown())
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         self._done += 1

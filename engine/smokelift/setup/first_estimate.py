@@ -94,11 +94,9 @@ class SmokeSamples:
 class Fire:
     """What shines by itself.
 
-    ``fraction`` is that of the smoke's pixels. ``light`` is a clip of the added light in the place of smoke; ``color``
-    is its color in the clip.
+    ``light`` is a clip of the added light in the place of smoke; ``color`` is its color in the clip.
     """
 
-    fraction: float
     light: Clip
     color: Vector
 
@@ -137,7 +135,7 @@ def first_estimate(
     if hot.burn or (flame_color is not None and hot.fraction):
         doused = without_fire(exposed, found.plates)
         light = firelight(exposed, doused)
-        fire, exposed = Fire(hot.fraction, light, flame_color or fire_color(exposed, light)), doused
+        fire, exposed = Fire(light, flame_color or fire_color(exposed, light)), doused
         samples = replace(sample_smoke(doused, found.plates), gains=samples.gains)
     plates, source = with_source(found, exposed, samples.smoky)
     if plates is not found.plates:

@@ -60,10 +60,10 @@ def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: D
         found.append(colored)
     found += several_colors(samples)
     if fire is not None:
-        red, green, blue = color = fire.color
-        figures = {"fraction": fire.fraction, "red": red, "green": green, "blue": blue}
-        found.append(Finding("fire", figures, about="fire", value=fire.fraction, source="measured"))
-        medium = replace(medium, flame_color=color)
+        (red, green, blue), fraction = fire.color, estimate.hot.fraction
+        figures = {"fraction": fraction, "red": red, "green": green, "blue": blue}
+        found.append(Finding("fire", figures, about="fire", value=fraction, source="measured"))
+        medium = replace(medium, flame_color=fire.color)
     return medium, found
 
 

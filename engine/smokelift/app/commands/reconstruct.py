@@ -73,9 +73,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             say.note(finding)
         finished, new = _finished(options), set[int]()
         prepared = Preparation(time.monotonic() - began, time.process_time() - worked, peak_memory())
-        known = facts(shot, scene, estimate_cost(resolution, work, prepared))
         seconds = frames_seconds(resolution, work) * (1 - finished / shot.length)
-        say.start(shot.length, finished, seconds, forecast_of(shot, known, work, prepared))
+        say.start(
+            shot.length,
+            finished,
+            seconds,
+            lambda: forecast_of(shot, facts(shot, scene, estimate_cost(resolution, work, prepared)), work, prepared),
+        )
         report = _report(shot, options.thumbnail, say, new)
         sequence = reconstruction.write(
             options.out, npz=options.npz, resume=options.resume, start_number=options.start_number, on_frame=report
