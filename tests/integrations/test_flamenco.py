@@ -76,7 +76,6 @@ def test_the_model_refuses_what_the_manager_refuses(settings) -> None:
 
 
 def test_the_commands_run(tmp_path) -> None:
-    """A shot of two frames; the check fails before it is finished."""
     if importlib.util.find_spec("bpy") is None:
         pytest.skip("there is no bpy module, and so no OpenVDB and no Cycles")
     for path in EXAMPLE.parent.glob("*.[mp]*"):
@@ -87,7 +86,6 @@ def test_the_commands_run(tmp_path) -> None:
     script = str(FOLDER / "cycles_preview.py")
     few = {"frames": "30:31", "quality": "draft", "preview_frames": 1, "preview_samples": 1}
     reconstruct, check, preview = compiled(input=str(scene), output=str(out), preview_script=script, **few)["tasks"]
-    assert run(check).returncode == 2
     done = run(reconstruct)
     assert done.returncode == 0, done.stderr
     assert Sequence.open(out).complete

@@ -1,6 +1,5 @@
 """``smokelift inspect``: what is assumed and chosen."""
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +20,6 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
         "resolution", "scattering", "velocity grid coarsening",
         "axis depth",
     ]  # fmt: skip
-    assert json.loads((finished / "sequence.json").read_text())["choices"] == list(kept)
     assert command("inspect", shot, "--progress", "json", *QUICK) == 0
     *notes, done = events(capsys.readouterr().out)
     assert done["choices"] == list(kept)
@@ -30,8 +28,6 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
     (scattering,) = (choice for choice in kept if choice["what"] == "scattering")
     assert scattering["chosen"] == Sequence.open(finished).scene.scattering == "single"
     assert scattering["measured"]["error_unshadowed"] > scattering["tolerance"]
-    assert command("inspect", shot, *QUICK) == 0
-    assert scattering["reason"] in "".join(capsys.readouterr().out.splitlines())
 
 
 def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:

@@ -9,7 +9,7 @@ from command_line import QUICK, command, events, names, refused
 from smokelift.output.sequence import Sequence
 from smokelift.scene import completed
 from smokelift.setup.settings import QUALITIES
-from tests.engine.output.small_sequence import needs_vdb
+from tests.engine.output.small_sequence import has_vdb
 
 
 def test_reconstruct_writes_a_sequence(finished, plume) -> None:
@@ -17,36 +17,26 @@ def test_reconstruct_writes_a_sequence(finished, plume) -> None:
     assert sequence.complete
     assert sequence.frames == (1, 2, 3, 4, 5)
     assert sequence.scene == completed(plume.scene)
-    assert {f"smoke_000{n}.npz" for n in range(1, 6)} <= set(names(finished))
+    kinds = ("npz", "vdb") if has_vdb() else ("npz",)
+    assert names(finished) == ["sequence.json", *(f"smoke_000{n}.{kind}" for n in range(1, 6) for kind in kinds)]
     assert all(sequence.figures(n)["psnr"] >= 35 for n in sequence.frames)
 
 
-@needs_vdb
-def test_reconstruct_writes_vdb_files(shot, tmp_path, capsys) -> None:
-    assert command("reconstruct", shot, "--out", tmp_path / "out", "--frames", "0:1", *QUICK) == 0
-    assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.vdb", "smoke_0002.vdb"]
-    out = "".join(capsys.readouterr().out.splitlines())
-    assert "2 frames in" in out
-    assert Sequence.open(tmp_path / "out").density(2).any()
-
-
-def test_files_are_numbered_as_the_clip_and_every_command_goes_on(shot, finished, tmp_path, capsys) -> None:
+def test_files_are_numbered_as_the_clip_and_every_command_goes_on(shot, tmp_path, capsys) -> None:
     out, more = tmp_path / "out", tmp_path / "more"
-    assert command("reconstruct", shot, "--out", out, "--npz", "--start-number", 1001, *QUICK) == 0
-    sequence, usual = Sequence.open(out), Sequence.open(finished)
-    assert sequence.frames == usual.frames
-    assert {f"smoke_100{n}.npz" for n in range(1, 6)} <= set(names(out))
-    np.testing.assert_array_equal(sequence.density(4), usual.density(4))
-    for words in (
+    words = ("reconstruct", shot, "--out", out, "--npz", "--frames", "0:3", "--start-number", 1001, *QUICK)
+    for each in (
+        words,
         ("check", out),
-        ("evaluate", out),
         ("render", out, "--frame", 3, "--out", tmp_path / "a.png"),
         ("continue", out, "--frames", 2, "--out", more, "--npz"),
-        ("reconstruct", shot, "--out", out, "--npz", "--resume", "--start-number", 1001, *QUICK),
+        (*words, "--resume"),
     ):
-        assert command(*words) == 0, capsys.readouterr().err
+        assert command(*each) == 0, capsys.readouterr().err
+    assert Sequence.open(out).frames == (1, 2, 3, 4)
+    assert {f"smoke_100{n}.npz" for n in range(1, 5)} <= set(names(out))
     assert Sequence.open(more).start_number == 1001
-    assert {f"smoke_100{n}.npz" for n in range(1, 8)} <= set(names(more))
+    assert {f"smoke_100{n}.npz" for n in range(1, 7)} <= set(names(more))
     for wrong in ("-1", "1.5", "99999999"):
         assert command("reconstruct", shot, "--out", out, "--start-number", wrong) == 2
         assert "expected a whole number from 0 to 1000000" in capsys.readouterr().err
@@ -79,13 +69,6 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     assert (sent[-1]["kind"], sent[-1]["figures"]["psnr"]) == ("reconstructed", pytest.approx(middle))
 
 
-def test_further_views_of_a_scene_file_are_named(two_views, tmp_path, capsys) -> None:
-    two_views.save(tmp_path / "scene.toml")
-    sent = "View 1: frame_####.png, 90 degrees from the input, frames 3 to 4."
-    assert command("inspect", tmp_path / "scene.toml", "--frames", "2:3", *QUICK) == 0
-    assert sent in " ".join(capsys.readouterr().out.split())
-
-
 def test_one_picture_alone_is_enough_before_one_color(plume, tmp_path, capsys) -> None:
     picture = plume.write(tmp_path / "clip", plume.densities[:1]).clip.path.with_name("frame_0000.png")
     picture = picture.rename(tmp_path / "photograph.png")
@@ -99,19 +82,15 @@ def test_one_picture_alone_is_enough_before_one_color(plume, tmp_path, capsys) -
     assert not sequence.velocity(1).centres().any()
 
 
-def test_what_is_made_up_is_chosen_said_and_kept(shot, finished, tmp_path, capsys) -> None:
-    out, words = tmp_path / "out", ("--npz", "--frames", "0:1", *QUICK)
-    assert command("reconstruct", shot, "--out", out, "--detail", "0.5", "--seed", "3", *words) == 0
+def test_what_is_made_up_is_chosen_said_and_kept(shot, tmp_path, capsys) -> None:
+    out, words = tmp_path / "out", ("--npz", "--frames", "0:0", "--detail", "0.5", *QUICK)
+    assert command("reconstruct", shot, "--out", out, "--seed", "3", *words) == 0
     sequence = Sequence.open(out)
     assert (sequence.settings["detail"], sequence.settings["seed"]) == (0.5, 3)
     (part,) = (part for part in sequence.provenance if part["origin"] == "made up")
     assert part["settings"] == {"detail": 0.5, "seed": 3}
     assert part["how"] in " ".join(capsys.readouterr().out.split())
-    sentence = refused(capsys, "reconstruct", shot, "--out", out, "--resume", "--detail", "0.5", "--seed", "4", *words)
-    assert "settings.seed was 3 and is now 4" in sentence
-    plain = Sequence.open(finished)
-    assert (plain.settings["detail"], plain.settings["seed"]) == (1.0, 0)
-    assert "made up" in {part["origin"] for part in plain.provenance}
+    assert "settings.seed" in refused(capsys, "reconstruct", shot, "--out", out, "--resume", "--seed", "4", *words)
 
 
 def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:

@@ -27,22 +27,15 @@ def score(*changes: np.ndarray) -> np.ndarray:
     return inlet_score(changes, np.ones(SHAPE, bool))
 
 
-def test_an_inlet_stands_out_from_motion_that_is_wrong() -> None:
-    found = score(residual(inlet=0.5))
-    assert found[10, 10, 7] == 1
-    assert found[FRONT].max() < 0.1
+def test_an_inlet_stands_out_from_motion_that_is_wrong_and_from_what_passes() -> None:
+    alone, front = score(residual(inlet=0.5)), score(residual(front=0.05))
+    assert alone[10, 10, 7] == 1 and alone[FRONT].max() < 0.1
     assert score(residual()).max() < 0.1
-
-
-def test_a_weak_front_beside_an_inlet_is_none() -> None:
-    alone, beside = score(residual(front=0.05)), score(residual(front=0.05, inlet=1.0))
-    assert alone[12, 12, 26] > 0.9
-    assert (beside[12, 12, 26], beside[10, 10, 7]) == (0, 1)
-
-
-def test_what_passes_counts_less_than_what_lasts() -> None:
+    assert front[12, 12, 26] > 0.9, "a weak front beside an inlet is none"
+    beside = score(residual(front=0.05, inlet=1.0))
     lasting = score(*[residual(inlet=0.5)] * 8, residual(inlet=0.5, front=0.2))
-    assert (lasting[10, 10, 7], lasting[12, 12, 26]) == (1, 0)
+    for found in (beside, lasting):
+        assert (found[12, 12, 26], found[10, 10, 7]) == (0, 1)
 
 
 def test_the_inlet_of_a_plume_is_found():

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import SmokeState, loop_sequence, open_source
+from smokelift.direct import SmokeState, loop_sequence
 from smokelift.direct.looping import mix_by_edges, seam
 from smokelift.output.sequence import Sequence
 from smokelift.scene import SIDES, Domain
 from smokelift.transport import Velocity
 from tests.engine.direct import rising
-from tests.engine.direct.rising import DOMAIN, DT, blob, write_plume
+from tests.engine.direct.rising import DOMAIN, DT, blob
 
 
 def test_a_seam_moves_a_shape_instead_of_fading_it(monkeypatch):
@@ -46,9 +46,7 @@ def test_smoke_that_one_end_has_alone_goes_by_its_edges():
     assert not mix_by_edges(nothing, nothing, 0.5).any()
 
 
-def test_a_loop_ends_where_it_begins(tmp_path):
-    write_plume(tmp_path / "smoke", 10)
-    source = open_source(tmp_path / "smoke")
+def test_a_loop_ends_where_it_begins(source, tmp_path):
     for number, _ in loop_sequence(source, tmp_path / "loop", 2, 10, 3, npz=True):
         if number == 2:
             break
@@ -68,9 +66,8 @@ def test_a_loop_ends_where_it_begins(tmp_path):
     assert step(source.density(7), source.density(2)) > 2 * usual
 
 
-@pytest.mark.parametrize(("first", "last", "overlap"), [(0, 10, 3), (2, 11, 3), (2, 10, 0), (2, 10, 5), (4, 6, 1)])
-def test_loops_that_cannot_be_are_refused(tmp_path, first, last, overlap):
-    write_plume(tmp_path / "smoke", 10)
-    with pytest.raises(ValueError):
-        list(loop_sequence(open_source(tmp_path / "smoke"), tmp_path / "out", first, last, overlap, npz=True))
+def test_loops_that_cannot_be_are_refused(source, tmp_path):
+    for first, last, overlap in ((0, 10, 3), (2, 11, 3), (2, 10, 0), (2, 10, 5), (4, 6, 1)):
+        with pytest.raises(ValueError):
+            list(loop_sequence(source, tmp_path / "out", first, last, overlap, npz=True))
     assert not (tmp_path / "out").exists()

@@ -11,7 +11,7 @@ from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.direct.turbulence import INTENSITY, small_eddy_speed, with_small_eddies
 from smokelift.transport import Velocity, at_centres, divergence, project
-from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
+from tests.engine.direct.rising import DT, course
 
 STILL = Velocity.zero((40, 40, 40), 0.05)
 SHAPE = (32, 32, 40)
@@ -55,14 +55,6 @@ def test_a_seed_makes_the_same_eddies_on_any_grid():
     middles = fine[::2].reshape(41, 40, 2, 40, 2).mean(axis=(2, 4))
     assert np.abs(middles - coarse).max() < 0.05
     assert abs(correlation(eddies(Turbulence(0.5, 0.4, 7)), eddies(Turbulence(0.5, 0.4, 8)))) < 0.2
-
-
-def test_a_hundred_frames_keep_the_speed_of_the_eddies():
-    around = Surroundings(wind=(0.3, 0.0, 0.0), turbulences=(Turbulence(0.5, 0.5, 1),))
-    nothing = SmokeState(np.zeros(DOMAIN.shape, np.float32), at_rest(blob()).velocity)
-    states = course(free(Physics(0.0, 0.0), around), nothing, 100)
-    assert speed(states[-1].velocity) == pytest.approx(np.hypot(0.3, 0.5), rel=0.25)
-    assert max(speed(m.velocity) for m in states) < 1.3 * np.hypot(0.3, 0.5)
 
 
 def stirred(*sizes: float) -> SmokeState:

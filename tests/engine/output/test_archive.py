@@ -1,6 +1,8 @@
 """Reading archives: a damaged file, or one that lies about its size, ends in one sentence."""
 
+import gc
 import io
+import sys
 import zipfile
 from pathlib import Path
 
@@ -95,3 +97,18 @@ def test_any_damage_gives_the_arrays_or_an_error(tmp_path: Path, kind: int) -> N
         else:
             np.testing.assert_array_equal(found, DENSITY)
     assert refused > 100
+
+
+def test_an_interrupt_while_writing_is_quiet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """NumPy's own writer leaves an open zip file, which raises a second error when it is collected."""
+    cries: list[object] = []
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "unraisablehook", cries.append)
+    monkeypatch.setattr(np.lib.format, "write_array", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_arrays(tmp_path / "a.npz", {"density": DENSITY})
+    gc.collect()
+    assert not cries and not list(tmp_path.iterdir())

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, needs_vdb, write
+from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
 
 from smokelift.output import export, vdb
 from smokelift.output.export import ExportSettings, export_sequence
@@ -41,28 +41,15 @@ def grids(path: Path) -> dict[str, object]:
 
 
 @needs_vdb
-def test_the_files_of_an_export(sequence: Sequence, tmp_path: Path) -> None:
-    written = exported(sequence, tmp_path / "out", proxy=2)
-    names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    frames = [f"{kind}_{number:04d}.vdb" for kind in ("proxy", "smoke") for number in (1, 2, 3)]
-    assert names == sorted([*frames, "export.json", "smoke.usda"])
-    assert sum(size for _, size in written) == sum((tmp_path / "out" / name).stat().st_size for name in frames)
-    note = json.loads((tmp_path / "out" / "export.json").read_text())
-    assert note["complete"] and note["frames"] == [1, 3] and note["medium"]["extinction"] == EXTINCTION
-
-
-@needs_vdb
-def test_an_export_has_the_numbers_of_the_files(tmp_path: Path) -> None:
+def test_an_export_has_files_with_the_numbers_of_the_sequences(tmp_path: Path) -> None:
     write(tmp_path / "smoke", [1, 2], start_number=1001)
-    exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", proxy=2)
-    files = {path.name for path in (tmp_path / "out").iterdir()}
-    assert files == {
-        "export.json",
-        "smoke.usda",
-        *(f"{kind}_100{n}.vdb" for kind in ("proxy", "smoke") for n in (1, 2)),
-    }
-    assert json.loads((tmp_path / "out" / "export.json").read_text())["frames"] == [1001, 1002]
-    usd = (tmp_path / "out" / "smoke.usda").read_text()
+    written, out = exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", proxy=2), tmp_path / "out"
+    frames = [f"{kind}_100{n}.vdb" for kind in ("proxy", "smoke") for n in (1, 2)]
+    assert names(out) == sorted([*frames, "export.json", "smoke.usda"])
+    assert sum(size for _, size in written) == sum((out / name).stat().st_size for name in frames)
+    note = json.loads((out / "export.json").read_text())
+    assert note["complete"] and note["frames"] == [1001, 1002] and note["medium"]["extinction"] == EXTINCTION
+    usd = (out / "smoke.usda").read_text()
     assert "startTimeCode = 1001" in usd and "1002: @./smoke_1002.vdb@" in usd
 
 
@@ -91,14 +78,11 @@ def test_quantized_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: P
 
 @needs_vdb
 def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> None:
-    with pytest.raises(SequenceError):
-        exported(sequence, sequence.directory)
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "holiday.jpg").touch()
-    with pytest.raises(SequenceError):
-        exported(sequence, tmp_path / "out")
-    with pytest.raises(SequenceError):
-        exported(sequence, tmp_path / "out" / "holiday.jpg")
+    for out in (sequence.directory, tmp_path / "out", tmp_path / "out" / "holiday.jpg"):
+        with pytest.raises(SequenceError):
+            exported(sequence, out)
     with pytest.raises(SequenceError):
         export.require_space(tmp_path / "new" / "er", 10**15)
 

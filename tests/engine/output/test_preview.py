@@ -11,7 +11,6 @@ from smokelift.output.files import PICTURES
 from smokelift.output.framing import MIN_ASPECT, frame_smoke
 from smokelift.output.images import write_image
 from smokelift.output.preview import (
-    ORBIT_ANGLES,
     ORBIT_COLUMNS,
     SHEET_ANGLES,
     SHEET_HEIGHT,
@@ -45,13 +44,13 @@ def test_an_orbit_shows_one_frame_from_twelve_angles(plume, tmp_path) -> None:
     rows, titles, labels = shown.orbit()
     assert [len(row) for row in rows] == [ORBIT_COLUMNS] * 2 == [len(titles)] * len(labels)
     pictures = [picture for row in rows for picture in row]
-    assert len(pictures) == len(ORBIT_ANGLES) and all(picture.max() > 0.13 for picture in pictures)
+    assert all(picture.max() > 0.13 for picture in pictures)
     camera = shown.framing.camera(sequence.scene.camera, SHEET_HEIGHT)
     np.testing.assert_allclose(pictures[0], Viewer(sequence.scene, camera).image(4, plume.densities[3]), atol=1e-4)
     assert np.abs(pictures[0] - pictures[6][:, ::-1]).max() > 0.02
 
 
-@pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 5), (14, STRIP_FRAMES)])
+@pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 5), (9, STRIP_FRAMES)])
 def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, columns) -> None:
     densities = [plume.densities[min(n, 4)] for n in range(count)]
     scene = plume.write(tmp_path / "clip", densities, plume.scene)
@@ -62,7 +61,7 @@ def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, 
     assert all(picture.max() > 0.13 for picture in (*filmed, *side))
     top = [np.flatnonzero(picture.max((1, 2)) > 0.13)[0] for picture in side]
     assert top == sorted(top, reverse=True)
-    rise = {1: 0, 5: 9.6, 14: 0}[count]  # in the clip's pixels
+    rise = {1: 0, 5: 9.6, 9: 7.2}[count]  # in the clip's pixels
     assert top[0] - top[-1] == pytest.approx(rise * SHEET_HEIGHT / shown.framing.height, abs=10)
 
 
@@ -116,13 +115,9 @@ def test_the_smoke_of_every_frame_is_in_the_part_from_all_sides(plume, tmp_path)
             assert edges.max() < 0.05 * shown.max()
 
 
-def test_a_column_gets_room_beside_it(plume, tmp_path) -> None:
+def test_a_column_gets_room_beside_it_and_without_smoke_the_box_is_shown(plume, tmp_path) -> None:
     column = np.zeros_like(plume.densities[0])
+    assert frame_smoke(at_rest(plume.scene, [column], tmp_path / "none")).box == plume.scene.domain
     column[15:17, 15:17, 4:40] = 1
-    framing = frame_smoke(at_rest(plume.scene, [column], tmp_path / "out"))
+    framing = frame_smoke(at_rest(plume.scene, [column], tmp_path / "column"))
     assert framing.width >= MIN_ASPECT * framing.height - 2
-
-
-def test_without_smoke_the_box_is_shown(plume, tmp_path) -> None:
-    sequence = at_rest(plume.scene, [np.zeros_like(plume.densities[0])], tmp_path / "out")
-    assert frame_smoke(sequence).box == plume.scene.domain

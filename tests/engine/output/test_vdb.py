@@ -98,9 +98,7 @@ def test_a_frame_without_smoke_holds_both_grids_empty(tmp_path: Path) -> None:
     vdb.write_vdb(tmp_path / "a.vdb", np.zeros(DOMAIN.shape), np.ones((*DOMAIN.shape, 3)), DOMAIN)
     grids = vdb.vdb_module().readAll(str(tmp_path / "a.vdb"))[0]
     assert sorted((grid.name, grid.activeVoxelCount()) for grid in grids) == [("density", 0), ("velocity", 0)]
-    rho, u = (vdb.read_grid(tmp_path / "a.vdb", name, DOMAIN) for name in ("density", "velocity"))
-    assert not rho.any()
-    assert not u.any()
+    assert not any(vdb.read_grid(tmp_path / "a.vdb", name, DOMAIN).any() for name in ("density", "velocity"))
 
 
 @needs_vdb
@@ -109,12 +107,9 @@ def test_what_cannot_be_written_is_refused_and_leaves_the_old_file(tmp_path: Pat
     path = tmp_path / "a.vdb"
     vdb.write_vdb(path, density, velocity, DOMAIN)
     before = path.read_bytes()
-    with pytest.raises(ValueError):
-        vdb.write_vdb(path, -density, velocity, DOMAIN)
-    with pytest.raises(ValueError):
-        vdb.write_vdb(path, density * np.nan, velocity, DOMAIN)
-    with pytest.raises(ValueError):
-        vdb.write_vdb(path, density[1:], velocity, DOMAIN)
+    for wrong in (-density, density * np.nan, density[1:]):
+        with pytest.raises(ValueError):
+            vdb.write_vdb(path, wrong, velocity, DOMAIN)
     with pytest.raises(OSError):
         vdb.write_vdb(tmp_path / "nowhere" / "a.vdb", density, velocity, DOMAIN)
     assert path.read_bytes() == before

@@ -46,15 +46,13 @@ def test_only_what_the_pictures_show_is_measured(shot) -> None:
 
 def test_damaged_frames_have_one_number_wherever_they_are_named(shot, tmp_path) -> None:
     """That of the clip's file from 0, as the range of its frames has it."""
-    for n in range(7):
+    for n in (0, 1, 2, 4, 6):
         write_image(tmp_path / f"frame_{n}.png", np.full((4, 4, 3), 0.5))
     (tmp_path / "frame_3.png").write_bytes(b"nothing")
-    (tmp_path / "frame_5.png").unlink()
     with Clip.open(tmp_path / "frame_#.png", fps=24, frames=(1, 6)) as clip:
-        other = replace(shot, views=(replace(shot.views[0], clip=clip),))
-        said = [found for found in clip.findings() if found.kind == "damaged frames"]
-        assert [found.figures["frames"] for found in said] == ["frames 3 and 5 are"]
-        assert said[0] in provenance(other)
+        (said,) = [found for found in clip.findings() if found.kind == "damaged frames"]
+        assert said.figures["frames"] == "frames 3 and 5 are"
+        assert said in provenance(replace(shot, views=(replace(shot.views[0], clip=clip),)))
 
 
 def test_made_up_detail_names_its_settings(shot) -> None:
@@ -66,10 +64,9 @@ def test_made_up_detail_names_its_settings(shot) -> None:
 
 
 def test_nothing_is_made_up_where_cameras_stand_all_around(shot) -> None:
-    front = shot.views[0]
-    near = front.working.camera
+    front, domain = shot.views[0], shot.optics.domain
     around = [
-        replace(front, working=replace(front.working, camera=orbit(near, shot.optics.domain, degrees)))
+        replace(front, working=replace(front.working, camera=orbit(front.working.camera, domain, degrees)))
         for degrees in range(0, 180, 20)
     ]
     assert made_up(replace(shot, views=tuple(around))) == []

@@ -11,6 +11,7 @@ from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.scene import Background, ClipSource, Scene, View, completed, look_at_matrix, orbit
 from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
 
@@ -31,11 +32,16 @@ def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
     assert shot.scene == completed(two_views)
 
 
-@pytest.mark.parametrize(("used", "asked", "first"), [((0, 4), (0, 4), 1), ((1, 3), (2, 3), 3)])
-def test_a_further_view_follows_the_clip_that_is_used(two_views, draft, used, asked, first) -> None:
-    with Clip.open(two_views.clip, frames=asked) as clip:
-        _, view = prepare_shot(clip, two_views.with_frames(*used), draft).views
-    assert (view.clip.numbers[0], len(view.clip)) == (first, asked[1] - asked[0] + 1)
+def test_a_further_view_follows_the_clip_that_is_used(two_views, as_filmed) -> None:
+    with Clip.open(two_views.clip, frames=(2, 3)) as clip:
+        _, view = prepare_shot(clip, two_views.with_frames(1, 3), as_filmed).views
+    assert (view.clip.numbers[0], len(view.clip)) == (3, 2)
+
+
+@pytest.fixture
+def as_filmed(draft) -> Settings:
+    """What is wrong is no exposure."""
+    return replace(draft, measure=False)
 
 
 def behind(shot: Shot, view: int, frame: int = 0) -> float:
@@ -43,10 +49,9 @@ def behind(shot: Shot, view: int, frame: int = 0) -> float:
     return float(shot.observe(frame)[view].plate.image.mean())
 
 
-def test_a_further_views_background(two_views, draft, tmp_path) -> None:
+def test_a_further_views_background(two_views, as_filmed, tmp_path) -> None:
     """Its own, else the scene's color, else estimated from its clip; a picture of the input's is not its."""
     (view,) = two_views.views
-    as_filmed = replace(draft, measure=False)  # what is wrong is no exposure
     gray = replace(two_views, views=(replace(view, background=Background(color=(0.5, 0.5, 0.5))),))
     assert behind(shot_of(gray, as_filmed), 1) == pytest.approx(0.5, abs=1e-3)
     write_image(tmp_path / "wall.png", np.full((56, 40, 3), 0.5, np.float32))
@@ -62,14 +67,14 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("wrong", ["camera", "background"])
-def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
+def test_views_that_do_not_agree_are_noted(two_views, as_filmed, wrong) -> None:
     (view,) = two_views.views
     if wrong == "camera":
         lower = look_at_matrix((4, 0, 0.2), (0, 0, 0.2), (0, 0, 1))
         view = replace(view, camera=replace(view.camera, matrix=lower))
     else:
         view = replace(view, background=Background(color=(0.5, 0.5, 0.5)))
-    remarks = shot_of(replace(two_views, views=(view,)), draft).findings
+    remarks = shot_of(replace(two_views, views=(view,)), as_filmed).findings
     assert [remark.figures["agreed"] < 0.8 for remark in remarks if remark.kind == "disagreeing views"] == [True]
 
 

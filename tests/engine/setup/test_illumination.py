@@ -139,37 +139,30 @@ def test_thick_white_smoke_scatters_light_many_times(plume, draft, tmp_path) -> 
     assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").figures
 
 
-def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
-    """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
-    own = {"single": 0.028, "multiple": 0.026}
-    monkeypatch.setattr(
-        illumination, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4)
-    )
-    choice = chosen(shot_of(plume.scene, draft), "scattering")
-    assert choice.value == "single"
-    own["single"] = 0.035  # by less than a cheaper model may add, which is no question here
-    assert chosen(shot_of(plume.scene, draft), "scattering").value == "multiple"
-
-
-@pytest.mark.parametrize(("near", "asked"), [(0.05, {(8, 4), (16, 64)}), (0.01, {(8, 4)})])
-def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
-    plume, draft, monkeypatch, near, asked
-) -> None:
-    """The errors of a coarse grid, and of few steps, hide the medium's; where they do not, nothing more is spent."""
+@pytest.mark.parametrize(
+    ("coarse", "fine", "asked", "model"),
+    [
+        ((0.05, 0.05), (0.05, 0.01), {(8, 4), (16, 64)}, "multiple"),
+        ((0.05, 0.01), (0.05, 0.01), {(8, 4)}, "multiple"),
+        ((0.028, 0.026), (0.028, 0.026), {(8, 4), (16, 64)}, "single"),
+        ((0.035, 0.026), (0.035, 0.026), {(8, 4)}, "multiple"),  # by less than a cheaper model may add
+    ],
+)
+def test_multiple_scattering_has_to_be_clearly_nearer(plume, draft, monkeypatch, coarse, fine, asked, model) -> None:
+    """It finds half as dense a smoke for the same picture. Where coarse frames do not tell, finer ones are asked."""
     fitted_on = set()
 
     def known(frames, fitted, judge, settings) -> HeldOut:
         voxels = max(frames[0].scene.domain.resolution)
         fitted_on.add((voxels, settings.descent_iterations))
-        errors = {"single": 0.05, "multiple": near if voxels == 8 else 0.01}
+        errors = dict(zip(("single", "multiple"), coarse if voxels == 8 else fine, strict=True))
         return HeldOut(errors[judge] if fitted == judge else 0.4)
 
     monkeypatch.setattr("smokelift.setup.coarse.COARSE_SIDE", 8)
     monkeypatch.setattr(illumination, "held_out", known)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
-    assert fitted_on == asked
-    assert choice.value == "multiple"
-    assert choice.figures["error_multiple"] == 0.01
+    assert (choice.value, fitted_on) == (model, asked)
+    assert choice.figures["error_multiple"] == (fine if len(asked) == 2 else coarse)[1]
 
 
 def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
@@ -178,9 +171,9 @@ def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
     assert {"error_absorption", "error_unshadowed", "error_single", "error_multiple"} < set(choice.figures)
 
 
-@pytest.mark.parametrize("model", ["absorption", "unshadowed", "single", "multiple"])
+@pytest.mark.parametrize("model", ["absorption", "multiple"])
 def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
-    shot = shot_of(thin if model in ("single", "multiple") else plume.scene, replace(draft, scattering=model))
+    shot = shot_of(thin if model == "multiple" else plume.scene, replace(draft, scattering=model))
     choice = chosen(shot, "scattering")
     assert (shot.scene.scattering, choice.source, choice.figures) == (model, "given", {})
 

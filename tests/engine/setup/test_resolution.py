@@ -14,7 +14,7 @@ from smokelift.scene.projection import voxel_width
 from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
 from tests.engine.footage.films import clear_plate, clip_of
-from tests.engine.setup.shots import shot_of
+from tests.engine.setup.shots import geometry_of
 
 SIZE = (192, 256)
 
@@ -51,18 +51,18 @@ AUTO = Settings.preset("draft", resolution="auto")
 
 
 def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
-    sharp, soft, blurred = (shot_of(filmed(blur), AUTO) for blur in (0.0, 4.0, 12.0))
-    sides = [max(shot.scene.domain.resolution) for shot in (sharp, soft, blurred)]
+    sharp, soft, blurred = (geometry_of(filmed(blur), AUTO) for blur in (0.0, 4.0, 12.0))
+    sides = [max(found.domain.resolution) for found in (sharp, soft, blurred)]
     assert sides[0] >= LIMITS["draft"].most - 3
     assert sides[0] > sides[1] >= sides[2]
     assert sides[2] <= 36
-    for shot in (sharp, soft, blurred):
-        (choice,) = (choice for choice in shot.findings if choice.about == "resolution")
-        assert choice.value == shot.scene.domain.resolution
+    for found in (sharp, soft, blurred):
+        (choice,) = (choice for choice in found.findings if choice.about == "resolution")
+        assert choice.value == found.domain.resolution
         assert choice.figures["lost_beside_finest"] <= choice.figures["tolerance"]
         assert (choice.kind, choice.source) == ("resolution", "measured")
-        assert (shot.scene.domain.min, shot.scene.domain.max) == ((-1, -1, 0), (1, 1, 3))
-        x, y, z = shot.scene.domain.resolution
+        assert (found.domain.min, found.domain.max) == ((-1, -1, 0), (1, 1, 3))
+        x, y, z = found.domain.resolution
         assert x == y == z / 3 * 2
 
 
@@ -78,30 +78,28 @@ def test_noise_is_no_detail() -> None:
 
 def test_a_given_resolution_wins(filmed) -> None:
     scene = filmed(12.0)
-    assert shot_of(scene, Settings.preset("draft")).scene.domain == scene.domain
+    assert geometry_of(scene, Settings.preset("draft")).domain == scene.domain
     for domain, resolution, top in (
         (scene.domain, (20, 20, 30), 3.0),
         (Box((-1, -1, 0), (1, 1, 3)), (20, 20, 30), 3.0),
         (Box((-1, -1, 0), (1, 1, 3)), (20, 20, 40), 4.0),
     ):
-        shot = shot_of(replace(scene, domain=domain), Settings.preset("draft", resolution=resolution))
-        assert Finding("given", about="resolution", value=resolution, source="given") in shot.findings
-        np.testing.assert_allclose(
-            [shot.scene.domain.min, shot.scene.domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9
-        )
+        found = geometry_of(replace(scene, domain=domain), Settings.preset("draft", resolution=resolution))
+        assert Finding("given", about="resolution", value=resolution, source="given") in found.findings
+        np.testing.assert_allclose([found.domain.min, found.domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9)
 
 
 @pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
 def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> None:
     box = Box((-size[0] / 2, -1, 0), (size[0] / 2, 1, size[2]))
     scene = replace(filmed(0.0), domain=box)
-    shot = shot_of(scene, Settings.preset("draft"))
-    domain = shot.scene.domain
+    found = geometry_of(scene, Settings.preset("draft"))
+    domain = found.domain
     assert LIMITS["draft"].most - 8 <= max(domain.resolution) <= LIMITS["draft"].most
-    assert [found.source for found in shot.findings if found.about == "resolution"] == ["measured"]
+    assert [each.source for each in found.findings if each.about == "resolution"] == ["measured"]
     over = np.subtract(domain.max, box.max)
     assert np.all((over > -1e-6) & (over < domain.voxel_size)) and domain.min[2] == 0
-    assert (np.abs(over).max() > 1e-6) == ("grown box" in [remark.kind for remark in shot.findings])
+    assert (np.abs(over).max() > 1e-6) == ("grown box" in [remark.kind for remark in found.findings])
 
 
 @pytest.mark.parametrize("box", [True, False])
@@ -110,10 +108,10 @@ def test_final_has_a_voxel_a_pixel(filmed, box) -> None:
     for blur in (0.0, 12.0):
         scene = filmed(blur, grain=0.3)
         scene = scene if box else Scene(clip=scene.clip, background=scene.background)
-        shot = shot_of(scene, Settings.preset("final", resolution="auto"))
-        (choice,) = (choice for choice in shot.findings if choice.about == "resolution")
+        found = geometry_of(scene, Settings.preset("final", resolution="auto"))
+        (choice,) = (choice for choice in found.findings if choice.about == "resolution")
         pixels = choice.figures["pixels"]
-        across = voxel_width(shot.scene.camera, shot.scene.domain) * max(choice.value)
+        across = voxel_width(found.camera, found.domain) * max(choice.value)
         assert pixels == pytest.approx(across, rel=1e-3)
         if blur:
             assert max(choice.value) < 0.6 * pixels
