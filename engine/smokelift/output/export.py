@@ -227,10 +227,11 @@ class _Export:
             found = sequence.flame(number)
             flame = np.zeros_like(rho) if found is None else found
         if self.settings.precision == "quantized":
-            rho = _rounded(rho, density_step(domain, extinction))
-            velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, sequence.fps))
+            rho = _rounded(rho, _density_step(domain, extinction))
+            step = _power_of_two(VELOCITY_STEP * domain.voxel_size * sequence.fps)
+            velocity = None if velocity is None else _rounded(velocity, step)
             # radiance adds up along a ray as optical depth does
-            flame = None if flame is None else _rounded(flame, density_step(domain, 1.0))
+            flame = None if flame is None else _rounded(flame, _density_step(domain, 1.0))
         if host.eight_bits:
             rho = _rounded(thinned / np.float32(self.peak), 1 / 255)
         paths = [frame_path(out, sequence.file_number(number), "vdb")]
@@ -288,15 +289,10 @@ def write_proxies(sequence: Sequence) -> Iterator[int]:
         yield number
 
 
-def density_step(domain: Domain, extinction: float) -> float:
+def _density_step(domain: Domain, extinction: float) -> float:
     """Step of a quantized density: the largest power of two whose rounding does not show (see the module)."""
     longest = max(domain.resolution)
     return _power_of_two(HALF_CODE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
-
-
-def velocity_step(domain: Domain, fps: float) -> float:
-    """Step of a quantized velocity in m/s (see the module)."""
-    return _power_of_two(VELOCITY_STEP * domain.voxel_size * fps)
 
 
 def _thinned(density: Array, domain: Domain, extinction: float) -> Array:

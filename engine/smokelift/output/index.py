@@ -194,23 +194,15 @@ def _scene(index: Index) -> Any:
     return without_folders(index.scene) if index.sources else index.scene
 
 
-def _own_settings(index: Index) -> dict[str, Any]:
-    """The settings of the whole run, without those of its parts, which follow from a scene too."""
-    return {key: value for key, value in index.settings.items() if not isinstance(value, dict)}
-
-
-def _versions(index: Index) -> dict[str, Any]:
-    """The versions of what changes a result, which a patch of Python does not."""
-    return {name: found for name, found in index.versions.items() if name != "python"}
-
-
 COMPARED: tuple[tuple[str, Callable[[Index], Any]], ...] = (
     ("sources", lambda index: index.sources),
-    ("settings", _own_settings),
+    # those of the whole run: settings of its parts follow from a scene too
+    ("settings", lambda index: {key: value for key, value in index.settings.items() if not isinstance(value, dict)}),
     ("start_number", lambda index: index.start_number),
     ("scene", _scene),
     ("settings", lambda index: index.settings),
-    ("versions", _versions),
+    # a patch of Python changes no result
+    ("versions", lambda index: {name: found for name, found in index.versions.items() if name != "python"}),
 )
 """What has to be the same where a run goes on: the name that is said, and what of an index is compared. Causes come
 before what follows from them: another clip, say, makes another scene, and another scene other settings of a part."""

@@ -85,7 +85,8 @@ def frames_after(before: Frame | None, shot: Shot, method: Method) -> Iterator[F
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
             frame = _frame(index, before, shot, method, follows=follows)
-        before = carried_on(frame)
+        # what the next one needs: not the velocity on the fine grid, which takes much memory, nor fire
+        before = replace(frame, velocity=frame.estimated, figures={}, flame=None)
         if index == 0 and count > 1:
             first = frame
             continue
@@ -94,11 +95,6 @@ def frames_after(before: Frame | None, shot: Shot, method: Method) -> Iterator[F
             first = None
         yield frame
         del frame  # velocities take most of the memory
-
-
-def carried_on(frame: Frame) -> Frame:
-    """What the next frame needs of one: not its velocity on the fine grid, which takes much memory, nor its fire."""
-    return replace(frame, velocity=frame.estimated, figures={}, flame=None)
 
 
 def _frame(index: int, before: Frame | None, shot: Shot, method: Method, *, follows: bool) -> Frame:
