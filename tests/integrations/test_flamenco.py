@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -11,16 +10,12 @@ from typing import Any
 
 import pytest
 
-import smokelift
+from smokelift.app.cli import main
 from smokelift.output.sequence import Sequence
 
 FOLDER = Path(__file__).resolve().parents[2] / "integrations" / "flamenco"
 MODEL = Path(__file__).with_name("flamenco_model.js")
 EXAMPLE = FOLDER.parents[1] / "tests" / "plume" / "scene.toml"
-ENVIRONMENT = {
-    **os.environ,
-    "PYTHONPATH": os.pathsep.join([str(Path(smokelift.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
-}
 NODE = shutil.which("node")
 
 pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed")
@@ -43,14 +38,6 @@ def compiled(**settings: Any) -> dict[str, Any]:
     if done.returncode:
         raise ValueError(done.stderr)
     return json.loads(done.stdout)
-
-
-def run(task: dict[str, Any]) -> subprocess.CompletedProcess[str]:
-    """Run a task's command as a worker does."""
-    (command,) = task["commands"]
-    variables = {"{smokelift}": ["-m", "smokelift"], "{blender}": ["-c", BLENDER]}
-    words = [sys.executable, *variables[command["parameters"]["exe"]], *command["parameters"]["args"]]
-    return subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
 
 
 def test_a_job_is_reconstruct_then_check() -> None:
@@ -85,12 +72,12 @@ def test_the_commands_run(tmp_path) -> None:
     out = tmp_path / "smoke"
     script = str(FOLDER / "cycles_preview.py")
     few = {"frames": "30:31", "quality": "draft", "preview_frames": 1, "preview_samples": 1}
-    reconstruct, check, preview = compiled(input=str(scene), output=str(out), preview_script=script, **few)["tasks"]
-    done = run(reconstruct)
-    assert done.returncode == 0, done.stderr
+    tasks = compiled(input=str(scene), output=str(out), preview_script=script, **few)["tasks"]
+    reconstruct, check, preview = (task["commands"][0]["parameters"] for task in tasks)
+    assert (reconstruct["exe"], check["exe"], preview["exe"]) == ("{smokelift}", "{smokelift}", "{blender}")
+    assert main(reconstruct["args"]) == main(check["args"]) == 0
     assert Sequence.open(out).complete
-    done = run(check)
-    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"All of {out} is as it was written: 2 frames.")
-    done = run(preview)
+    blender = [sys.executable, "-c", BLENDER, *preview["args"]]
+    done = subprocess.run(blender, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert [path.name for path in (tmp_path / "smoke_preview").iterdir()] == ["frame_0002.png"]
