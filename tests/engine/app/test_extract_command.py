@@ -60,11 +60,11 @@ def test_a_directory_and_a_video_are_taken_too(before_wall, tmp_path) -> None:
 
 
 def test_an_element_is_reconstructed_again(before_wall, draft, tmp_path) -> None:
-    assert command("extract", before_wall, "--frames", "1:3", "--out", tmp_path / "element_####.exr") == 0
+    assert command("extract", before_wall, "--frames", "1:1", "--out", tmp_path / "element_####.exr") == 0
     scene = replace(Scene.load(before_wall), clip=None, background=None)
     with Clip.open(tmp_path / "element_####.exr", fps=24) as clip:
-        frames = list(reconstruct(clip, scene, draft))
-    assert len(frames) == 3 and all(frame.figures["psnr"] > 30 for frame in frames)
+        (frame,) = reconstruct(clip, scene, draft)
+    assert frame.figures["psnr"] > 30
 
 
 @pytest.mark.parametrize(

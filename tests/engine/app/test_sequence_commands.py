@@ -44,8 +44,7 @@ def test_every_frame_gets_a_coarse_copy(finished, tmp_path, capsys) -> None:
     assert command("proxy", there, "--progress", "json") == 0
     start, *frames, done = events(capsys.readouterr().out)
     assert start["total"] == len(frames) == done["frames"]
-    new = set(names(there)) - set(names(finished))
-    assert new == {f"proxy_{frame['frame']:04d}.vdb" for frame in frames}
+    assert set(names(there)) - set(names(finished)) == {f"proxy_{frame['frame']:04d}.vdb" for frame in frames}
     assert "no sequence" in refused(capsys, "proxy", tmp_path)
 
 
@@ -119,7 +118,9 @@ def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys) -> None:
     assert done["seconds"] >= earlier + sum(new) - 0.1
 
 
-def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, monkeypatch) -> None:
+def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys, monkeypatch) -> None:
+    """The box cannot grow, memory does not suffice for it, or a fitted buoyancy contradicts the clip."""
+
     def said(*words: object) -> list[str]:
         start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
         assert command(*start, *words, "--progress", "json") == 0
@@ -127,20 +128,14 @@ def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, 
 
     (sentence,) = said("--room", 1)
     assert "dissolves" in sentence and "more room than 1" in sentence
+    assert said("--room", 1, "--resume") == []
     shutil.rmtree(tmp_path / "out")
-    monkeypatch.setattr(cost, "memory_free", lambda: 0)
-    assert "grows to 1 times" in said()[0]
-    monkeypatch.undo()
-    assert said("--resume") == []
-
-
-def test_one_sentence_says_that_a_buoyancy_contradicts_the_clip(finished, tmp_path, capsys, monkeypatch) -> None:
     figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
     monkeypatch.setattr(directed, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
-    start = ("continue", finished, "--out", tmp_path / "out", "--frames", 2, "--npz", "--progress", "json")
-    assert command(*start) == 0
-    (sentence,) = [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
-    assert "without buoyancy: one of -0.4 m/s2 was fitted, but the smoke of the clip rises" in sentence
+    monkeypatch.setattr(cost, "memory_free", lambda: 0)
+    memory, buoyancy = said()
+    assert "grows to 1 times" in memory
+    assert "without buoyancy: one of -0.4 m/s2 was fitted, but the smoke of the clip rises" in buoyancy
 
 
 @pytest.mark.parametrize(

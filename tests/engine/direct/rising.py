@@ -13,24 +13,16 @@ from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed
+from smokelift.scene import Domain
 from smokelift.transport import Velocity
+from tests.engine.output import small_sequence
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (16, 16, 24))
 DT = 1 / 24
 PHYSICS = Physics(buoyancy=4.0, dissipation=0.3)
 LEFT = 0.8
 """Of the plume's fire after a frame."""
-SCENE = completed(
-    Scene(
-        clip=ClipSource(Path("/footage/smoke.mp4"), 24.0),
-        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(32, 48)),
-        domain=DOMAIN,
-        lights=(DirectionalLight((0, 0, -1), (1, 1, 1)),),
-        closed=("z-",),
-        scattering="unshadowed",
-    )
-)
+SCENE = replace(small_sequence.SCENE, domain=DOMAIN, closed=("z-",))
 
 
 def blob(center=(0.0, 0.0, 0.8), width=0.3) -> np.ndarray:

@@ -29,11 +29,6 @@ def test_physics_of_a_free_blob_is_found():
     assert found.dissipation == pytest.approx(PHYSICS.dissipation, rel=0.01)
 
 
-def test_buoyancy_is_found_from_velocities_that_are_too_slow():
-    states = [slowed(state, 0.6) for state in course(free(), at_rest(blob()), 23)]
-    assert fit_simulation(states, DT).physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.15)
-
-
 def test_a_head_that_dissolves_above_a_base_that_is_fed_rises():
     """Its center of mass sinks."""
     height = np.linspace(0, 1, DOMAIN.resolution[2])
@@ -54,9 +49,10 @@ def test_a_buoyancy_against_the_clips_own_motion_is_not_taken(buoyancy):
     assert against.contradicted_buoyancy == pytest.approx(buoyancy, rel=0.1)
 
 
-def test_earlier_states_show_the_buoyancy_too():
+def test_buoyancy_is_found_from_velocities_that_are_too_slow_and_from_earlier_states():
     states = [slowed(state, 0.6) for state in course(free(), at_rest(blob()), 23)]
     found = fit_simulation(states[-6:], DT, earlier=[coarsen_state(state) for state in states[:-6]]).physics
+    assert found.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.15)
     assert found.buoyancy == pytest.approx(fit_simulation(states, DT).physics.buoyancy)
 
 

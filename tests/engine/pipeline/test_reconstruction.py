@@ -14,7 +14,6 @@ from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Reconstruction, compose, reconstruct
 from smokelift.scene import Background, completed
-from smokelift.setup.prepare import prepare_shot
 
 
 def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None:
@@ -42,14 +41,11 @@ def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None
 def test_frames_in_memory_and_written_are_the_same(plume, draft, tmp_path) -> None:
     """Each way computes them anew, and density and velocity have one type in memory and from files."""
     scene = plume.scene.with_frames(0, 1)
-    written: list[Frame] = []
     with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, draft)
-        run = Reconstruction(shot, compose(shot.settings))
-        sequence = run.write(tmp_path / "out", npz=True, on_frame=written.append)
-        frames = list(run)
+        run = reconstruct(clip, scene, draft)
+        sequence, frames = run.write(tmp_path / "out", npz=True), list(run)
     assert isinstance(sequence, Sequence) and sequence.complete
-    assert [frame.number for frame in written] == [frame.number for frame in frames] == [1, 2]
+    assert [frame.number for frame in frames] == [1, 2]
     for frame in frames:
         density, velocity = sequence.density(frame.number), sequence.velocity(frame.number)
         assert (type(density), type(velocity)) == (type(frame.density), type(frame.velocity))
@@ -62,13 +58,12 @@ def test_frames_in_memory_and_written_are_the_same(plume, draft, tmp_path) -> No
 def test_a_run_is_not_resumed_with_other_parts(plume, draft, tmp_path) -> None:
     scene = plume.scene.with_frames(0, 0)
     with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, draft)
-        usual = compose(shot.settings)
-        other = Reconstruction(shot, replace(usual, temporal_prior=NothingCarried()))
+        usual = reconstruct(clip, scene, draft)
+        other = Reconstruction(usual.shot, replace(usual.method, temporal_prior=NothingCarried()))
         other.write(tmp_path, npz=True)
         assert other.write(tmp_path, npz=True, resume=True).complete
         with pytest.raises(SequenceError, match=r"cannot be resumed: settings.*temporal_prior.*NothingCarried"):
-            Reconstruction(shot, usual).write(tmp_path, npz=True, resume=True)
+            usual.write(tmp_path, npz=True, resume=True)
 
 
 def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, draft, tmp_path) -> None:

@@ -47,8 +47,10 @@ def test_every_finding_has_its_words() -> None:
 
 
 def test_all_words_are_said() -> None:
-    written = re.compile("|".join({pattern for tree in TREES for pattern in texts(tree) if pattern != ".+"}))
-    assert [kind for kind in WORDS if not written.fullmatch(kind)] == []
+    written = {pattern for tree in TREES for pattern in texts(tree)} - {".+"}
+    filled_in = [re.compile(pattern) for pattern in written if ".+" in pattern]
+    unsaid = [kind for kind in WORDS if re.escape(kind) not in written]
+    assert [kind for kind in unsaid if not any(pattern.fullmatch(kind) for pattern in filled_in)] == []
 
 
 def test_sentences_are_whole_and_know_no_scene_file() -> None:

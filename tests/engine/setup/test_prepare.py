@@ -25,7 +25,7 @@ from smokelift.scene import (
 )
 from smokelift.scene.projection import project_points
 from smokelift.setup.first_estimate import first_estimate
-from smokelift.setup.geometry import MIN_SIDE_VOXELS, find_geometry
+from smokelift.setup.geometry import MIN_SIDE_VOXELS, Geometry, find_geometry
 from smokelift.setup.prepare import found_place, velocity_coarsening
 from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
@@ -44,7 +44,7 @@ def bare(scene: Scene) -> Scene:
     return Scene(clip=scene.clip)
 
 
-def middle(scene: Scene) -> float:
+def middle(scene: Scene | Geometry) -> float:
     """The distance of the middle of the box, straight ahead of the camera."""
     return float((np.array(scene.domain.centre) - scene.camera.position) @ view_frame(scene.camera)[1])
 
@@ -91,18 +91,16 @@ def test_all_that_a_clip_lacks_is_noted(estimated, passing, draft) -> None:
 
 def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
     """Every clearly smoky pixel lies in the domain's picture; voxels are cubes, no more than the quality says."""
-    domain = estimated.scene.domain
-    edges = (np.array(domain.max) - domain.min) / domain.resolution
+    camera, domain = estimated.scene.camera, estimated.scene.domain
+    edges = np.array(domain.size) / domain.resolution
     np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
     assert MIN_SIDE_VOXELS <= max(domain.resolution) <= LIMITS[draft.quality].most + 4
-    pixels, depth = project_points(estimated.scene.camera, domain.corners())
+    pixels, depth = project_points(camera, domain.corners())
     assert (depth > 0).all()
     with Clip.open(passing.clip) as clip:
-        smoky = np.max([frame.max(-1) for frame in clip], axis=0) > 0.1
-    rows, columns = np.nonzero(smoky)
-    low, high = np.maximum(pixels.min(0), 0), np.minimum(pixels.max(0), estimated.scene.camera.size)
-    assert (low <= (columns.min() + 1, rows.min() + 1)).all()
-    assert (high >= (columns.max(), rows.max())).all()
+        rows, columns = np.nonzero(np.max([frame.max(-1) for frame in clip], axis=0) > 0.1)
+    assert (np.maximum(pixels.min(0), 0) <= (columns.min() + 1, rows.min() + 1)).all()
+    assert (np.minimum(pixels.max(0), camera.size) >= (columns.max(), rows.max())).all()
 
 
 @pytest.mark.parametrize("tilt", [17, -25])
@@ -241,15 +239,12 @@ def test_a_shot_knows_where_its_smoke_stands(given, plume, draft: Settings) -> N
 def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings) -> None:
     """Of a camera that is not given, and of a box that is not; the smoke stands in the middle of that."""
     for camera in (None, plume.scene.camera):
-        near, far = (
-            shot_of(replace(plume.scene, inlets=(), camera=camera, domain=None), replace(draft, distance=distance))
-            for distance in (3.0, 6.0)
-        )
-        for shot, distance in ((near, 3.0), (far, 6.0)):
-            assert middle(shot.scene) == pytest.approx(distance, rel=1e-3)
-            assert shot.place is not None and shot.place.depth == pytest.approx(0, abs=0.02 * distance)
-        sizes = [np.subtract(shot.scene.domain.max, shot.scene.domain.min) for shot in (near, far)]
-        np.testing.assert_allclose(sizes[1], 2 * sizes[0], rtol=0.05)
+        scene = replace(plume.scene, camera=camera, domain=None)
+        near, far = (geometry_of(scene, replace(draft, distance=distance)) for distance in (3.0, 6.0))
+        assert (middle(near), middle(far)) == (pytest.approx(3, rel=1e-3), pytest.approx(6, rel=1e-3))
+        np.testing.assert_allclose(far.domain.size, 2 * np.array(near.domain.size), rtol=0.05)
+        place = shot_of(scene, replace(draft, distance=3.0)).place
+        assert place is not None and place.depth == pytest.approx(0, abs=0.06)
 
 
 def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(given, plume, draft: Settings) -> None:
