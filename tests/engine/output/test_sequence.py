@@ -110,7 +110,7 @@ def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path: Path, ki
     changed[len(changed) // 2] ^= 1
     path.write_bytes(changed)
     opened = Sequence.open(tmp_path)
-    for read in (opened.density, opened.velocity, opened.render):
+    for read in (opened.density, opened.velocity, opened.render, opened.files):
         with pytest.raises(SequenceError):
             read(2)
     assert opened.density(1).any()
