@@ -8,7 +8,6 @@ majority. So parts may overlap, and a few holes do no harm (after Nooruddin and 
 from __future__ import annotations
 
 import hashlib
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles, Mask
+from smokelift.footage.image_sequence import is_pattern, numbered_files
 from smokelift.scene import Domain
 from smokelift.scene.checks import LARGEST, Vector
 from smokelift.transport import Array, Faces
@@ -80,8 +80,7 @@ class Mesh:
         ValueError
             With the path, if one cannot be read, is damaged or of another kind, or their numbers of triangles differ.
         """
-        is_pattern = "#" in path.name and not path.is_file()
-        places = [_read_stl(file) for file in (_numbered(path) if is_pattern else [path])]
+        places = [_read_stl(file) for file in (numbered_files(path) if is_pattern(path) else (path,))]
         counts = [len(place) for place in places]
         if min(counts) < max(counts):
             raise ValueError(
@@ -132,21 +131,6 @@ class Mesh:
     def _at(self, step: int) -> npt.NDArray[np.float32]:
         place: npt.NDArray[np.float32] = self.places[min(step, len(self.places) - 1)]
         return place
-
-
-def _numbered(path: Path) -> list[Path]:
-    """The files of a pattern by their numbers, one for each from the first to the last."""
-    named = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
-    if named is None or not path.parent.is_dir():
-        raise ValueError(f"{path}: is no file, and no pattern crate_####.stl of numbered files; give one of them.")
-    prefix, hashes, suffix = named.groups()
-    pattern = re.compile(re.escape(prefix) + rf"(\d{{{len(hashes)},}})" + re.escape(suffix))
-    matches = ((pattern.fullmatch(file.name), file) for file in path.parent.iterdir())
-    found = {int(match[1]): file for match, file in matches if match}
-    if not found:
-        raise ValueError(f"{path}: there are no such files; number them as the frames are.")
-    numbers = range(min(found), max(found) + 1)
-    return [found.get(n, path.with_name(f"{prefix}{n:0{len(hashes)}d}{suffix}")) for n in numbers]
 
 
 def _read_stl(path: Path) -> npt.NDArray[np.float32]:

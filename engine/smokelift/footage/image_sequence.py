@@ -41,13 +41,13 @@ _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
 
 
 class ImageSequence(FrameSource):
-    """Numbered pictures on disk, or a single one, as `numbered_pictures` finds them.
+    """Numbered pictures on disk, or a single one, as `numbered_files` finds them.
 
     ``transfer`` is that of `Clip.open`. There is a warning if the user gives no ``fps``.
     """
 
     def __init__(self, path: Path, transfer: Transfer | None, fps: float | None) -> None:
-        self.files = numbered_pictures(path)
+        self.files = numbered_files(path)
         self._transfer = transfer
         self.count = len(self.files)
         if fps is None and self.count > 1:
@@ -98,12 +98,12 @@ def is_video(path: Path) -> bool:
     return not is_pattern(path) and path.suffix.lower() not in READABLE
 
 
-def numbered_pictures(path: Path) -> tuple[Path, ...]:
-    """Return the pictures of a sequence in order, with those missing in between.
+def numbered_files(path: Path) -> tuple[Path, ...]:
+    """Return the files of a sequence, pictures say, in order, with those missing in between.
 
     The path is a pattern ``frame_####.png`` (its last row of #, each a digit at least, or the sign of a negative
-    number), the first picture of a sequence, or one picture without a number. ClipError is raised if there is none, or
-    more are missing than there are.
+    number), the first file of a sequence, or one without a number. ClipError is raised if there is none, or more are
+    missing than there are.
     """
     pattern = is_pattern(path)
     named = re.fullmatch(r"(.*?)(#+)([^#]*)" if pattern else r"(.*?)(\d+)(\.[^.]+)", path.name)
@@ -119,7 +119,7 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
     found = _found(path, prefix, digits, suffix)
     start = min(found, default=0) if pattern else int(number)
     if start not in found:
-        raise ClipError(f"{path}: no such pictures; check the folder and the name")
+        raise ClipError(f"{path}: no such files; check the folder and the name")
     if start < 0 and 0 not in found:
         raise ClipError(
             f"{found[start]}: has a dash before its number, which may be a minus sign; number the pictures from 0 on, "
@@ -133,8 +133,8 @@ def numbered_pictures(path: Path) -> tuple[Path, ...]:
     if last - start + 1 > 2 * sum(n >= start for n in found):
         missing = next(n for n in range(start, last) if n not in found)
         raise ClipError(
-            f"{file(missing)}: this picture is missing, as are most up to {found[last].name}; give the "
-            "first picture of a sequence without such gaps"
+            f"{file(missing)}: this file is missing, as are most up to {found[last].name}; give the "
+            "first of a sequence without such gaps"
         )
     return tuple(file(n) for n in range(start, last + 1))
 

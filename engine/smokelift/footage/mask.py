@@ -20,7 +20,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.footage.frame_source import ClipError, StoredPicture
-from smokelift.footage.image_sequence import is_pattern, is_video, numbered_pictures
+from smokelift.footage.image_sequence import is_pattern, is_video, numbered_files
 from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image, reduced_size
 from smokelift.footage.inpainting import push_pull
 from smokelift.footage.video import Video
@@ -75,7 +75,7 @@ class Mask:
         has another shape than the clip, or hides nearly all of it.
         """
         video = Video(path, "linear") if is_video(path) else None
-        files = numbered_pictures(path) if is_pattern(path) else (path,)
+        files = numbered_files(path) if is_pattern(path) else (path,)
         count = video.count if video else len(files) if is_pattern(path) else None
         if missing := [file for file in files if count and not file.is_file()]:
             raise ClipError(f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all.")

@@ -21,7 +21,7 @@ from smokelift.checks import Source
 from smokelift.direct import new_sequence, playback
 from smokelift.footage.backdrop import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.image_sequence import numbered_pictures
+from smokelift.footage.image_sequence import numbered_files
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.files import INDEX, frame_path, proxy_path
@@ -113,7 +113,7 @@ def test_a_sequence_has_the_pictures_that_the_engine_finds(tmp_path, names) -> N
     for name in names:
         found = image_sequence_from(tmp_path / name)
         try:
-            files = numbered_pictures(tmp_path / name)
+            files = numbered_files(tmp_path / name)
         except ClipError:
             assert found is None
             continue

@@ -331,8 +331,8 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "boxes that are no video's": (written("a.mp4", b"\0\0\0\x08free" * 3), "is not a video"),
     "sound only": (lambda folder: encode_sound(folder / "a.mp4"), "no video stream"),
     "a stray picture far behind": (stray, "f0008.*missing"),
-    "no numbered pictures": (lambda folder: folder / "f####.png", "no such pictures"),
-    "pictures of two numbers": (lambda folder: pictures(folder).with_name("#_##.png"), "no such pictures"),
+    "no numbered pictures": (lambda folder: folder / "f####.png", "no such files"),
+    "pictures of two numbers": (lambda folder: pictures(folder).with_name("#_##.png"), "no such files"),
     "a number that is not there": (lambda folder: pictures(folder).with_name("f0009.png"), "no such file"),
     "a star for numbers": (
         lambda folder: pictures(folder).with_name("f*.png"),
