@@ -11,13 +11,13 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from statistics import median
 from typing import Any, Literal, Self, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from smokelift.checks import Figures, Finding, printable
+from smokelift.output.index import median_psnr, work_seconds
 from smokelift.output.sequence import Sequence
 from smokelift.report.views import message, sentence
 
@@ -134,22 +134,9 @@ def say_frames(say: Reporter, made: Iterable[tuple[int, Made]], total: int, orig
     return things
 
 
-def work_seconds(figures: Mapping[str, Any]) -> float:
-    """Return what a frame took; nothing for one that is copied from its source, whose figures it has."""
-    if figures.get("origin") == "clip":
-        return 0.0
-    return float(figures.get("seconds_density") or 0.0) + float(figures.get("seconds_velocity") or 0.0)
-
-
 def seconds_before(sequence: Sequence, new: Collection[int]) -> float:
     """Return what the frames of a sequence took that a run found finished; ``new`` are the numbers of its own."""
     return sum(work_seconds(sequence.figures(number)) for number in sequence.frames if number not in new)
-
-
-def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
-    """Return the median ``psnr`` (dB) of frames; None if none has one."""
-    decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
-    return median(decibels) if decibels else None
 
 
 def _words(said: Finding | str) -> str:

@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from statistics import fmean, median
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import quote
 
 from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, is_finished, read_index
 from smokelift.checks import counted
 from smokelift.checks.whole_files import write_text
+from smokelift.output.index import median_psnr, work_seconds
 
 _STYLE = """
 body { background: #1a1a1c; color: #e8e8e8; font: 15px sans-serif; margin: 1.5em }
@@ -45,23 +46,19 @@ class Remaining(NamedTuple):
 
 def remaining_work(records: Mapping[BatchShot, Record]) -> tuple[Remaining, ...]:
     """Return what is left of each shot that is not finished and whose clip was inspected, longest first."""
-    known = {shot: (record.forecast, read_index(shot)) for shot, record in records.items() if record.forecast}
+    known = {shot: (record.forecast, read_index(shot).frames) for shot, record in records.items() if record.forecast}
     foretold = {shot: forecast["seconds"] / max(1, forecast["frames"]) for shot, (forecast, _) in known.items()}
-    measured = {shot: fmean(map(_seconds, index.frames.values())) for shot, (_, index) in known.items() if index.frames}
+    measured = {shot: fmean(map(work_seconds, frames.values())) for shot, (_, frames) in known.items() if frames}
     ratios = [seconds / foretold[shot] for shot, seconds in measured.items() if foretold[shot] > 0]
     scale = median(ratios) if ratios else 1.0
     left = []
-    for shot, (forecast, index) in known.items():
+    for shot, (forecast, frames) in known.items():
         if not is_finished(shot, records[shot]):
-            missing = max(0, forecast["frames"] - len(index.frames))
+            missing = max(0, forecast["frames"] - len(frames))
             basis = "measured" if shot in measured else "scaled" if ratios else "foretold"
             seconds = missing * measured.get(shot, scale * foretold[shot])
             left.append(Remaining(shot, missing, seconds, max(forecast["memory"], records[shot].memory), basis))
     return tuple(sorted(left, key=lambda each: -each.seconds))
-
-
-def _seconds(figures: Mapping[str, Any]) -> float:
-    return float(figures.get("seconds_density") or 0) + float(figures.get("seconds_velocity") or 0)
 
 
 def duration(left: Sequence[Remaining], workers: int) -> float:
@@ -92,14 +89,14 @@ def _cells(shot: BatchShot, record: Record) -> str:
     index, notes = read_index(shot), "".join(f"<p>{escape(note)}</p>" for note in record.notes)
     picture = shot.file("png")
     total = f" of {record.forecast['frames']}" if record.forecast is not None and not index.complete else ""
-    psnr = [of["psnr"] for of in index.frames.values() if of.get("psnr") is not None]
+    psnr = median_psnr(index.frames.values())
     details = f"<details><summary>{counted(len(record.notes), 'note')}</summary>{notes}</details>" if notes else ""
     cells = (
         f'<img alt="clip and reconstruction" src="{quote(picture.name)}">' if picture.exists() else "",
         f"<b>{escape(shot.name)}</b><br>{escape(shot.input.name)}<br>{escape(' '.join(shot.options))}",
         f'<span class="{record.status}">{record.status}</span>',
         f"{len(index.frames)}{total}",
-        f"{median(psnr):.1f}" if psnr else "",
+        "" if psnr is None else f"{psnr:.1f}",
         f"{record.seconds:.0f}" if record.seconds else "",
         f"{record.memory / 2**30:.1f}" if record.memory else "",
         escape(record.sentence) + details,

@@ -6,11 +6,12 @@ import json
 import math
 import platform
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from statistics import median
 from typing import Any, get_origin, get_type_hints
 
 import numpy as np
@@ -156,6 +157,19 @@ class Index:
             if not re.fullmatch(r"0|[1-9][0-9]{0,8}", number) or not isinstance(figures, dict):
                 raise SequenceError(f"{path}: is damaged: there can be no frame {shown(number)} of {shown(figures)}")
         return Index(**{key: data[key] for key in kinds})
+
+
+def work_seconds(figures: Mapping[str, Any]) -> float:
+    """Return what a frame took; nothing for one that is copied from its source, whose figures it has."""
+    if figures.get("origin") == "clip":
+        return 0.0
+    return float(figures.get("seconds_density") or 0.0) + float(figures.get("seconds_velocity") or 0.0)
+
+
+def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
+    """Return the median ``psnr`` (dB) of frames; None if none has one."""
+    decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
+    return median(decibels) if decibels else None
 
 
 def _json(value: Any) -> str:

@@ -13,7 +13,7 @@ import pytest
 from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, refused
 
 import smokelift
-from smokelift.app.progress import work_seconds
+from smokelift.output.index import work_seconds
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 

@@ -19,12 +19,13 @@ from smokelift.app.options import (
     settings_of,
     whole_number,
 )
-from smokelift.app.progress import Reporter, median_psnr, seconds_before
+from smokelift.app.progress import Reporter, seconds_before
 from smokelift.checks import Figures, Finding
 from smokelift.checks.whole_files import atomic_path
 from smokelift.footage.clip import Clip
 from smokelift.output.files import INDEX, MAX_START_NUMBER
 from smokelift.output.images import eight_bit
+from smokelift.output.index import median_psnr
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
