@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -178,13 +178,15 @@ def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:
     return scene, scene.clip
 
 
-def require_folder(path: Path | None) -> None:
-    """Check, before anything is spent, that a file can be written.
+def require_file(path: Path | None, kinds: Collection[str] = ()) -> None:
+    """Check, before anything is spent, that a file can be written, whose suffix is one of ``kinds`` if there are any.
 
-    It is a ValueError if its folder is missing or read-only, or if the path is a folder itself.
+    It is a ValueError if it cannot be: also if its folder is missing or read-only, or the path is a folder itself.
     """
     if path is None:
         return
+    if kinds and path.suffix.lower() not in kinds:
+        raise ValueError(f"{path}: is written as {' or '.join(kinds)}; give a name that ends with it.")
     if not path.absolute().parent.is_dir():
         raise ValueError(f"{path}: the folder {path.parent} does not exist.")
     if path.is_dir():

@@ -71,8 +71,8 @@ def test_an_element_is_reconstructed_again(before_wall, draft, tmp_path) -> None
     ("words", "said"),
     [
         (("--out", "a_##.tif"), "elements are written as .exr or .png"),
-        (("--out", "out", "--plate", "plate.tif"), "the plate is written as .exr or .png"),
-        (("--out", "out", "--preview", "check.gif"), "the preview is written as"),
+        (("--out", "out", "--plate", "plate.tif"), "plate.tif: is written as .exr or .png"),
+        (("--out", "out", "--preview", "check.gif"), "check.gif: is written as"),
         (("--out", "out", "--plate", "missing/plate.exr"), "the folder missing does not exist"),
         (("--out", "there.txt"), "is a file"),
     ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from smokelift.app.options import Command, named_path, require_folder
+from smokelift.app.options import Command, named_path, require_file
 from smokelift.app.progress import Reporter
 from smokelift.checks.whole_files import write_text
 from smokelift.evaluation.evaluate import evaluate
@@ -36,10 +36,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Compare, and write the figures and a picture."""
-    for path in (options.json, options.picture):
-        require_folder(path)
-    if options.picture is not None and options.picture.suffix.lower() != ".png":
-        raise ValueError(f"{options.picture}: the picture is written as .png; give a name that ends with it.")
+    require_file(options.json)
+    require_file(options.picture, (".png",))
     if options.truth is not None and options.truth.suffix.lower() != ".npz":
         raise ValueError(
             f"{options.truth}: --truth takes known volumes (truth.npz); the clip of another camera goes with --view."

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.app.options import Command, add_clip_options, named_path, require_folder, scene_of
+from smokelift.app.options import Command, add_clip_options, named_path, require_file, scene_of
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
@@ -64,13 +64,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    require_folder(options.plate)
-    require_folder(options.preview)
-    if options.plate is not None and options.plate.suffix.lower() not in ELEMENT_KINDS:
-        raise ValueError(f"{options.plate}: the plate is written as {' or '.join(ELEMENT_KINDS)}.")
-    kinds = (".png", *VIDEO_KINDS)
-    if options.preview is not None and options.preview.suffix.lower() not in kinds:
-        raise ValueError(f"{options.preview}: the preview is written as {', '.join(kinds)}.")
+    require_file(options.plate, ELEMENT_KINDS)
+    require_file(options.preview, (".png", *VIDEO_KINDS))
     existing = options.out if options.out.is_dir() else options.out.absolute().parent
     if options.out.exists() and not options.out.is_dir():
         raise ValueError(f"{options.out}: is a file; give a pattern such as element_####.exr, or a directory.")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from smokelift.app.options import Command, add_run_options, named_path, require_folder, scene_of, settings_of
+from smokelift.app.options import Command, add_run_options, named_path, require_file, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
@@ -45,11 +45,9 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """Prepare the shot; say what is known of it and what a run takes."""
     passed, worked = time.perf_counter(), time.process_time()
     settings = settings_of(options)
-    for path in (*options.page, options.write):
-        require_folder(path)
+    require_file(options.write)
     for path in options.page:
-        if path.suffix.lower() not in PAGE_KINDS:
-            raise ValueError(f"{path}: the page is written as {' or '.join(PAGE_KINDS)}.")
+        require_file(path, PAGE_KINDS)
     if options.write is not None and options.write.exists():
         raise ValueError(f"{options.write}: is there already; nothing was overwritten, give another name.")
     scene, source = scene_of(options)

@@ -14,7 +14,7 @@ from smokelift.app.options import (
     Command,
     add_run_options,
     named_path,
-    require_folder,
+    require_file,
     scene_of,
     settings_of,
     whole_number,
@@ -125,7 +125,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse what cannot be written to."""
     out, thumbnail = options.out, options.thumbnail
     check_directory(out, resume=options.resume)
-    require_folder(thumbnail)
+    require_file(thumbnail)
     if thumbnail is not None and out.resolve() in thumbnail.resolve().parents:
         raise ValueError(
             f"{thumbnail}: the thumbnail cannot lie in {out}, which is for the sequence alone; choose another folder."

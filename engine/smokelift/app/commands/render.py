@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from smokelift.app.options import Command, named_path, require_folder
+from smokelift.app.options import Command, named_path, require_file
 from smokelift.app.progress import Reporter
 from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.output.sequence import Sequence
@@ -38,14 +38,11 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     sequence = Sequence.open(options.directory)
     scene = sequence.scene
     camera = _camera(options.camera, scene)
-    is_video = options.out.suffix.lower() in VIDEO_KINDS
-    if not is_video and options.out.suffix.lower() not in (".exr", ".png"):
-        raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(VIDEO_KINDS)}).")
+    require_file(options.out, (".exr", ".png", *VIDEO_KINDS))
     if not sequence.frames:
         raise ValueError(f"{options.directory}: there are no finished frames to render yet.")
-    require_folder(options.out)
     device.start(options.device)
-    if is_video:
+    if options.out.suffix.lower() in VIDEO_KINDS:
         numbers = sequence.frames if options.frame is None else (options.frame,)
         viewer = Viewer(scene, camera)
         volumes = ((number, sequence.density(number), sequence.flame(number)) for number in numbers)
