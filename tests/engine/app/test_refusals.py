@@ -90,6 +90,7 @@ def test_what_cannot_be_written_is_refused_before_the_clip_is_read(
         ),
         (("inspect", "https://example.com/smoke"), "is an address"),
         (("evaluate", "smoke", "--truth", "https://example.com/smoke"), "is an address"),
+        (("retime", "smoke", "--out", "out", "--speed", "slow"), "slow: expected a number from"),
         (("inspect", "frame_1.png", "frame_2.png", "frame_3.png"), "3 pictures are named"),
         (("inspect", "a.toml", "--frames", "0:1", "\udcff\udcfe.toml"), r"unrecognized arguments: \udcff\udcfe.toml"),
         (("reconstruct", "a.mp4", "--out", "\udcff"), "the path is no text in UTF-8: rename the file or the folder"),
