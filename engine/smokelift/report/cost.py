@@ -113,6 +113,10 @@ class Workload:
         Numbers: of frames, of cameras, and of pixels in all cameras' pictures of one moment.
     smoky_max, smoky_mean
         Fractions of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all.
+    prepared
+        Seconds that preparing the shot took, without what it waited for a processor; a run prepares it again.
+    peak
+        Bytes of memory at the peak of that, 0 if unknown. For a large clip on a small grid it is as much as the run's.
     """
 
     settings: Settings
@@ -121,10 +125,12 @@ class Workload:
     pixels: int
     smoky_max: float
     smoky_mean: float
+    prepared: float = 0.0
+    peak: int = 0
 
     @staticmethod
-    def of(shot: Shot, settings: Settings) -> Workload:
-        """Measure a shot that was prepared with settings."""
+    def of(shot: Shot, settings: Settings, began: tuple[float, float]) -> Workload:
+        """Measure a shot that was prepared with settings from a `moment` on."""
         fractions = _smoky_fractions(shot, settings)
         smoky = len(shot.smoky) / len(shot.spread(SAMPLE_FRAMES))
         return Workload(
@@ -134,6 +140,8 @@ class Workload:
             pixels=sum(width * height for width, height in (view.clip.size for view in shot.views)),
             smoky_max=max(fractions, default=0.0),
             smoky_mean=smoky * fmean(fractions) if fractions else 0.0,
+            prepared=min(now - then for now, then in zip(moment(), began, strict=True)),
+            peak=peak_memory() or 0,
         )
 
 
@@ -150,28 +158,16 @@ class Cost:
     disk: int
 
 
-@dataclass(frozen=True)
-class Preparation:
-    """What preparing a shot took: seconds that passed, and processor seconds of all cores together.
-
-    ``memory`` is in bytes at the peak, None if unknown. For a large clip on a small grid it is as much as the run's.
-    """
-
-    seconds: float
-    processor: float
-    memory: int | None = None
-
-    @property
-    def work(self) -> float:
-        """Seconds that it takes without other work on the machine, where it need not wait for a processor."""
-        return min(self.seconds, self.processor)
+def moment() -> tuple[float, float]:
+    """Return the time in seconds, and the processor time of all cores together that this process has taken."""
+    return time.monotonic(), time.process_time()
 
 
-def estimate_cost(resolution: Resolution, work: Workload, prepared: Preparation) -> Cost:
+def estimate_cost(resolution: Resolution, work: Workload) -> Cost:
     """Estimate the cost of a run from its grid, its smoke and what preparing it took, in a part of a second."""
     return Cost(
-        seconds=prepared.work + frames_seconds(resolution, work),
-        memory=max(memory_needed(resolution, work), prepared.memory or 0),
+        seconds=work.prepared + frames_seconds(resolution, work),
+        memory=max(memory_needed(resolution, work), work.peak),
         memory_free=memory_free(),
         disk=round(work.frames * work.smoky_mean * math.prod(resolution) * BYTES_PER_SMOKY_VOXEL_ON_DISK),
     )

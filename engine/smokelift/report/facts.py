@@ -10,7 +10,7 @@ import numpy as np
 
 from smokelift.checks import Figure, Figures, Finding, Source
 from smokelift.footage.exposure import shows_exposure, small
-from smokelift.report.cost import Cost, Preparation, Workload, estimate_cost
+from smokelift.report.cost import Cost, Workload, estimate_cost
 from smokelift.report.views import fact
 from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.geometry import PICTURE_HEIGHT
@@ -101,7 +101,7 @@ def boundaries(scene: CompleteScene) -> list[Finding]:
     return [entry, closed]
 
 
-def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload, prepared: Preparation) -> dict[str, Any]:
+def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload) -> dict[str, Any]:
     """Return what a program shows of a shot beside its findings, as JSON holds it.
 
     Those are the facts, the median color of what is behind the smoke (linear), and grid and cost of each quality.
@@ -111,7 +111,7 @@ def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload, prepared: 
         "facts": [fact(line) for line in known],
         "background_color": [float(value) for value in np.median(plate.reshape(-1, 3), axis=0)],
         "qualities": {
-            quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work, prepared))}
+            quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work))}
             for quality, grid in shot.qualities.items()
         },
     }

@@ -14,10 +14,10 @@ from smokelift.report import cost
 from smokelift.report.cost import (
     MAX_SIDE_VOXELS,
     NotEnoughMemoryError,
-    Preparation,
     Workload,
     estimate_cost,
     memory_needed,
+    moment,
     require_memory,
     voxel_solves,
 )
@@ -26,7 +26,7 @@ from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
-WORK = Workload(Settings.preset(), frames=24, views=1, pixels=512 * 768, smoky_max=0.4, smoky_mean=0.2)
+WORK = Workload(Settings.preset(), frames=24, views=1, pixels=512 * 768, smoky_max=0.4, smoky_mean=0.2, prepared=3.0)
 EXAMPLE, BUILT_IN, FULL_HD = 256 * 384, 512 * 768, 1920 * 1080
 MEASURED = [
     ((48, 48, 72), EXAMPLE, 0.073, 182, 13),
@@ -41,7 +41,6 @@ MEASURED = [
 """Voxels, pixels, fraction that may hold smoke, peak (MiB) and processor time of a frame (in the time of a solve for a
 million voxels) of runs, docs/experiments/memory-and-time.md."""
 
-PREPARED = Preparation(3.0, 3.0)
 CUBE = (128, 128, 128)
 
 
@@ -57,7 +56,7 @@ def free(monkeypatch):
 def seconds(monkeypatch):
     """Forecast the seconds of a run on a cube, on a machine of known speed."""
     monkeypatch.setattr(cost, "_seconds_per_voxel", lambda: 1e-8)
-    return lambda work=WORK, prepared=PREPARED: estimate_cost(CUBE, work, prepared).seconds
+    return lambda work=WORK: estimate_cost(CUBE, work).seconds
 
 
 def suggestion(resolution: tuple[int, int, int], given: bool = True) -> tuple[int, int, int]:
@@ -102,7 +101,7 @@ def test_a_box_that_was_found_follows_its_voxels(free) -> None:
 
 def test_more_frames_views_smoke_and_detail_cost_more(seconds) -> None:
     thicker = replace(WORK, smoky_mean=2 * WORK.smoky_mean, smoky_max=2 * WORK.smoky_max)
-    base, longer, more = (estimate_cost(CUBE, work, PREPARED) for work in (WORK, replace(WORK, frames=240), thicker))
+    base, longer, more = (estimate_cost(CUBE, work) for work in (WORK, replace(WORK, frames=240), thicker))
     assert longer.disk == pytest.approx(10 * base.disk)
     assert longer.memory == base.memory < more.memory
     assert longer.seconds > 8 * base.seconds
@@ -118,12 +117,8 @@ def test_more_frames_views_smoke_and_detail_cost_more(seconds) -> None:
 
 
 def test_what_preparing_took_is_taken_again(seconds) -> None:
-    """A clip may take long to prepare; how long it waits for a busy machine tells nothing of the run."""
-    quick = seconds()
-    assert seconds(prepared=Preparation(50.0, 50.0)) - quick == pytest.approx(47)
-    assert seconds(prepared=Preparation(15.0, 3.0)) == quick
-    assert seconds(prepared=Preparation(3.0, 5.0)) == quick, "two cores work at a time"
-    small, large = (estimate_cost(CUBE, WORK, replace(PREPARED, memory=peak)).memory for peak in (2**20, 2**40))
+    assert seconds(replace(WORK, prepared=50.0)) - seconds() == pytest.approx(47)
+    small, large = (estimate_cost(CUBE, replace(WORK, peak=peak)).memory for peak in (2**20, 2**40))
     assert (small, large) == (memory_needed(CUBE, WORK), 2**40)
 
 
@@ -146,15 +141,22 @@ def shot(plume) -> Iterator[Shot]:
 
 
 def test_the_fraction_that_may_hold_smoke_is_that_of_the_run(shot) -> None:
-    found = Workload.of(shot, SMOOTH)
+    found = Workload.of(shot, SMOOTH, moment())
     fractions = [frame.figures["hull_share"] for frame in Reconstruction(shot, compose(shot.settings))]
     assert found.smoky_max == pytest.approx(max(fractions), rel=0.02)
     assert found.smoky_mean == pytest.approx(sum(fractions) / len(fractions), rel=0.1)
     assert (found.frames, found.views, found.pixels) == (len(fractions), 1, 40 * 56)
-    one, none = (Workload.of(replace(shot, smoky=shot.smoky[:n]), SMOOTH) for n in (1, 0))
+    one, none = (Workload.of(replace(shot, smoky=shot.smoky[:n]), SMOOTH, moment()) for n in (1, 0))
     assert one.smoky_mean == pytest.approx(one.smoky_max / shot.length)
     assert none.smoky_max == none.smoky_mean == 0
-    assert Workload.of(shot, Settings.preset(method="paper")).smoky_max == 1, "the paper's densities are anywhere"
+    paper = Workload.of(shot, Settings.preset(method="paper"), moment())
+    assert paper.smoky_max == 1, "the paper's densities are anywhere"
+
+
+def test_what_a_busy_machine_took_longer_does_not_count(shot) -> None:
+    passed, worked = moment()
+    for began in ((passed - 90, worked - 20), (passed - 20, worked - 90)):  # the latter on several cores
+        assert Workload.of(shot, SMOOTH, began).prepared == pytest.approx(20, abs=10)
 
 
 def test_a_large_grid_is_measured_on_a_coarse_one(shot) -> None:
@@ -163,4 +165,4 @@ def test_a_large_grid_is_measured_on_a_coarse_one(shot) -> None:
     assert max(domain.resolution) > MAX_SIDE_VOXELS
     seen, prior = ViewSet.of(large.observe(large.smoky[0]), large.optics), RoundDepth().of_clip(large)
     own = float(prior.estimate(seen).views.hull.mean())
-    assert 1 < Workload.of(replace(large, smoky=large.smoky[:1]), SMOOTH).smoky_max / own < 1.4
+    assert 1 < Workload.of(replace(large, smoky=large.smoky[:1]), SMOOTH, moment()).smoky_max / own < 1.4

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
-from smokelift.report.cost import Preparation, Workload, estimate_cost, peak_memory
+from smokelift.report.cost import Workload, estimate_cost, moment
 from smokelift.report.facts import boundaries, facts, forecast_of
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
@@ -43,7 +42,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Prepare the shot; say what is known of it and what a run takes."""
-    passed, worked = time.perf_counter(), time.process_time()
+    began = moment()
     settings = settings_of(options)
     require_file(options.write)
     for path in options.page:
@@ -59,11 +58,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         findings = [*shot.findings, *expected_shortcomings(shot), *boundaries(shot.scene), *made_up(shot)]
         for finding in findings:
             say.note(finding)
-        work = Workload.of(shot, settings)
-        prepared = Preparation(time.perf_counter() - passed, time.process_time() - worked, peak_memory())
-        cost = estimate_cost(domain.resolution, work, prepared)
+        work = Workload.of(shot, settings, began)
+        cost = estimate_cost(domain.resolution, work)
         known = facts(shot, scene, cost)
-        forecast = forecast_of(shot, known, work, prepared)
+        forecast = forecast_of(shot, known, work)
         files = list(options.page)
         if options.page:
             page = inspection_page(shot, scene, known, findings)

@@ -30,7 +30,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
-from smokelift.report.cost import Preparation, Workload, estimate_cost, frames_seconds, peak_memory, require_memory
+from smokelift.report.cost import Workload, estimate_cost, frames_seconds, moment, require_memory
 from smokelift.report.facts import facts, forecast_of
 from smokelift.report.result import count_empty, expected_shortcomings, made_up, shortcomings
 from smokelift.report.views import sentence
@@ -59,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Reconstruct; say what was assumed, and every frame. ValueError, with empty frames written, if none has smoke."""
-    began, worked = time.monotonic(), time.process_time()
+    began = moment()
     settings = settings_of(options)
     _check_outputs(options)
     scene, source = scene_of(options)
@@ -68,18 +68,17 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         written_kinds(options.npz)  # before the set-up, which takes minutes
         reconstruction = reconstruct(clip, scene, settings)
         shot = reconstruction.shot
-        resolution, work = shot.scene.domain.resolution, Workload.of(shot, settings)
+        resolution, work = shot.scene.domain.resolution, Workload.of(shot, settings, began)
         require_memory(resolution, work, given=isinstance(scene.domain, Domain))
         for finding in (*shot.findings, *expected_shortcomings(shot), *made_up(shot)):
             say.note(finding)
         finished, new = _finished(options), set[int]()
-        prepared = Preparation(time.monotonic() - began, time.process_time() - worked, peak_memory())
         seconds = frames_seconds(resolution, work) * (1 - finished / shot.length)
         say.start(
             shot.length,
             finished,
             seconds,
-            lambda: forecast_of(shot, facts(shot, scene, estimate_cost(resolution, work, prepared)), work, prepared),
+            lambda: forecast_of(shot, facts(shot, scene, estimate_cost(resolution, work)), work),
         )
         report = _report(shot, options.thumbnail, say, new)
         sequence = reconstruction.write(
@@ -95,7 +94,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         )
     for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)
-    seconds = time.monotonic() - began + seconds_before(sequence, new)
+    seconds = time.monotonic() - began[0] + seconds_before(sequence, new)
     fit = median_psnr(figures)
     result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
     done = Finding("written", result) if fit is None else Finding("reconstructed", {**result, "psnr": fit})
