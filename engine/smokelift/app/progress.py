@@ -210,12 +210,13 @@ class _Json(Reporter):
         self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)
 
     def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
-        self._total, self._done, self._before = total, done, time.monotonic()
+        self._total, self._done = total, done
         known = {}
         if seconds is not None and total > done:
             self._seconds.append(seconds / (total - done))
             known = {"seconds_left": round(seconds, 1)}
         self._say("start", total=total, done=done, **known, **shown())
+        self._before = time.monotonic()
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         self._done += 1
