@@ -241,7 +241,6 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     assert sequence.scene == completed(two_views)
     for number in sequence.frames:
         assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
-    goes_on_exactly(two_views, draft, tmp_path / "again", 2, tmp_path / "out")
 
 
 def test_the_papers_loop_takes_all(plume) -> None:
