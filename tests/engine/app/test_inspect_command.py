@@ -44,9 +44,10 @@ def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
     finest = done["qualities"]["final"]
     assert all(said["memory"] <= finest["memory"] for said in done["qualities"].values())
     assert all(said["lost"] >= finest["lost"] for said in done["qualities"].values())
-    own = forecast("--quality", "final")
-    assert finest["resolution"] == own["scene"]["domain"]["resolution"]
-    assert finest["memory"] == pytest.approx(own["memory"], rel=0.01)
+    for quality in ("balanced", "final"):
+        said, own = done["qualities"][quality], forecast("--quality", quality)
+        assert said["resolution"] == own["scene"]["domain"]["resolution"]
+        assert said["memory"] == pytest.approx(own["memory"], rel=0.01)
     given = forecast("--resolution", "12,12,16")["qualities"]
     assert [(name, said["resolution"], said["lost"]) for name, said in given.items()] == [
         (name, [12, 12, 16], None) for name in QUALITIES

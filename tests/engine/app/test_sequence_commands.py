@@ -8,7 +8,6 @@ from command_line import command, events, names, refused
 
 from smokelift.app.commands import directed
 from smokelift.direct import CONTRADICTED, Continuation, continue_sequence, open_source
-from smokelift.output.sequence import Sequence
 from smokelift.report import cost
 from tests.engine.output.small_sequence import needs_vdb
 

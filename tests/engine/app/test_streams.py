@@ -12,6 +12,7 @@ import pytest
 from command_line import ENVIRONMENT, MODULE, command, refused
 
 from smokelift.app.progress import printable_lines
+from smokelift.batch.work import ENGINE
 from smokelift.output.index import SequenceError
 from smokelift.render import device
 
@@ -68,10 +69,14 @@ sys.exit(smokelift_command.main())
     assert (done.returncode, done.stderr) == (130, b"Cancelled.\n")
 
 
-def test_the_engine_loads_while_another_program_holds_its_input() -> None:
-    words = [sys.executable, "-m", "smokelift_command.tethered", "doctor"]
-    with subprocess.Popen(words, env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+def test_the_engine_of_a_batch_loads_while_its_input_is_held_and_ends_with_it() -> None:
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    with subprocess.Popen([*ENGINE, "doctor"], env=ENVIRONMENT, **pipes) as process:
         assert process.wait(timeout=60) == 0
+    words = [*ENGINE, "reconstruct", "/dev/null", "--out", "never"]
+    pipes["stdin"] = subprocess.DEVNULL
+    done = subprocess.run(words, env=ENVIRONMENT, check=False, timeout=60, **pipes)
+    assert done.returncode == 130 and done.stderr.endswith(b"Cancelled.\n")
 
 
 def test_the_end_of_its_input_cancels() -> None:

@@ -11,6 +11,17 @@ from smokelift.output import vdb, writer
 from smokelift.output.export import write_proxies
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Domain
+from smokelift.transport import block_means
+
+
+def test_a_coarser_box_keeps_the_mass() -> None:
+    domain = Domain((0, 0, 0), (0.5, 0.7, 0.9), (5, 7, 9))
+    rho = np.random.default_rng(1).random((5, 7, 9)).astype(np.float32)
+    coarse, wide = block_means(rho, 3), domain.coarser(3)
+    assert coarse.shape == wide.shape == (2, 3, 3)
+    assert wide.max == pytest.approx((0.6, 0.9, 0.9))
+    assert coarse.sum() * 27 == pytest.approx(rho.sum(), rel=1e-5)
 
 
 @needs_vdb
