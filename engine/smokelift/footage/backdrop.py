@@ -128,11 +128,12 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     if given is None:
         found = _estimated(clip, moves)
     else:
-        plate = known_plate(mean_of_frames(frames, clip) if frames else given, clip)
+        plate = known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=bool(frames))
         quiet = without_noise_light(clip, plate.noise)
         if quiet is not clip:
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
-            plate = replace(known_plate(mean_of_frames(frames, quiet) if frames else given, quiet), noise=plate.noise)
+            shown = mean_of_frames(frames, quiet) if frames else given
+            plate = replace(known_plate(shown, quiet, filmed=bool(frames)), noise=plate.noise)
         found = Backdrop("alpha" if gray else "given", quiet, plate, behind, motion=motion)
     plate = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
     found = replace(found, clip=cleared(found.clip, plate), plates=plate)

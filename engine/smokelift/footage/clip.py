@@ -174,6 +174,10 @@ class Clip:
         """Return frame ``n`` as it is stored, of which a part or means cost less than the linear `frame`."""
         return _kept(self._stored, LINEAR_BYTES, self._sound, n)
 
+    def as_held(self, picture: Picture) -> Picture:
+        """Return a linear picture (rows, columns, 3) of the clip's size with its colors as coarse as the file's."""
+        return self._source.as_held(picture)
+
     def seen(self, n: int, width: int, height: int) -> Seen | None:
         """Return which pixels of frame ``n`` no mask hides, (height, width) of them; None of a clip without a mask.
 

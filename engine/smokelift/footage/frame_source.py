@@ -150,6 +150,10 @@ class FrameSource:
         """Return a frame; raise `DamagedFrameError` if it cannot be decoded, ClipError if it differs in size."""
         raise NotImplementedError
 
+    def as_held(self, picture: Picture) -> Picture:
+        """Return a linear picture (rows, columns, 3) with its colors as coarse as the file holds them."""
+        return picture
+
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """Return the frames from one to another, both included, that raise `DamagedFrameError`."""
         damaged = []

@@ -92,11 +92,12 @@ class Plate:
         return small(self.image)
 
 
-def known_plate(background: npt.ArrayLike | Clip, clip: Clip) -> Plate:
+def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = False) -> Plate:
     """Return the plate, with the clip's noise, of a known background.
 
     The background is a linear color (3,), a picture (rows, columns, 3), or a clip with one for each frame of the clip's
-    file; pictures are resized to the clip if need be. Noise that is clipped at black brightens a black one on the mean,
+    file; pictures are resized to the clip if need be. Unless they are ``filmed``, made of the file's own frames, their
+    colors become as coarse as the file holds them. Noise that is clipped at black brightens a black one on the mean,
     and so its plate. ClipError is raised if a frame cannot be read, ValueError if the background is none of these, not
     finite, or has too few frames.
     """
@@ -110,16 +111,16 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip) -> Plate:
             )
 
         def images(frame: int) -> Picture:
-            return area_average(background.frame(clip.numbers.start + frame), width, height)
+            return clip.as_held(area_average(background.frame(clip.numbers.start + frame), width, height))
 
         plate = Plate(images(0), known, NO_NOISE, images=images, files=background.files)
         return replace(plate, noise=noise_about(*_noise_samples(plate, clip)))
     linear = np.asarray(background, np.float32)
-    if linear.shape == (3,):
-        linear = np.broadcast_to(linear, (height, width, 3))
-    if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
+    color = linear.shape == (3,)
+    if not (color or (linear.ndim == 3 and linear.shape[2] == 3)) or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
-    plate = Plate(area_average(linear, width, height), known, NO_NOISE)
+    image = np.tile(linear, (height, width, 1)) if color else area_average(linear, width, height)
+    plate = Plate(image if color or filmed else clip.as_held(image), known, NO_NOISE)
     deviations, blocks = _noise_samples(plate, clip)
     given = linear_to_srgb(plate.image)
     raised = np.maximum(given, clipped_black(deviations, blocks)) - given

@@ -44,14 +44,17 @@ from smokelift.footage.frame_source import (
 )
 from smokelift.footage.images import (
     Layer,
+    Picture,
     Transfer,
     code_values,
     decode,
     decoder,
     encoded_values,
+    linear_to_srgb,
     open_container,
     readable_size,
     size_refusal,
+    srgb_to_linear,
 )
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
@@ -62,6 +65,9 @@ _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 
 SQUARE = 0.01
 """Largest difference of a pixel's shape from 1 that is ignored: half a pixel in fifty."""
+
+_COARSE_COLORS = {(2, 2): "yuv420p16le", (2, 1): "yuv422p16le"}
+"""Layouts of 16 bits that hold one color for so many pixels along rows and columns."""
 
 QUANTIZED_FRAMES = 21
 """Frames at a file's start whose quantizers are read: their median needs no more."""
@@ -117,6 +123,22 @@ class Video(FrameSource):
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
         return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
+
+    def as_held(self, picture: Picture) -> Picture:
+        rows, columns = picture.shape[:2]
+        held = self._stream.codec_context.format
+        layout = held and _COARSE_COLORS.get(
+            (round(columns / (held.chroma_width(columns) or 1)), round(rows / (held.chroma_height(rows) or 1)))
+        )
+        if not layout:
+            return picture
+        shown = np.clip(picture, 0, 1)
+        codes = np.rint(65535 * linear_to_srgb(shown)).astype(np.uint16)
+        frame = av.VideoFrame.from_ndarray(codes, "rgb48le")
+        for each in (layout, "rgb48le"):
+            frame = frame.reformat(columns, rows, each, interpolation=_GROWING, threads=1)
+        coarse = srgb_to_linear(frame.to_ndarray() / np.float32(65535))
+        return picture + (coarse - shown)  # what is beyond black and white stays there
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         if not self._keys:

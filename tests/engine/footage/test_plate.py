@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, overlap, pan, passing_wall, plate_of, puff, wall
+from films import COUNT, HEIGHT, WIDTH, codes_apart, encode, film, overlap, pan, passing_wall, plate_of, puff, wall
 
 from smokelift.footage.clip import Clip
+from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
@@ -46,6 +47,21 @@ def test_a_plate_for_every_frame_of_the_clips_file(tmp_path: Path) -> None:
     few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
     with pytest.raises(ValueError, match="has 13 of the frames 0 to 20 that are needed"):
         known_plate(few, clip)
+
+
+@pytest.mark.parametrize(("pixels", "held"), [("yuv420p", 0.6), ("yuv422p", 0.75), ("yuv444p", 1.0)])
+def test_a_given_plate_has_the_colors_of_the_clips_file(tmp_path: Path, pixels: str, held: float) -> None:
+    """A video with one color for several pixels shows saturated edges elsewhere than the picture that was filmed."""
+    codes = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    codes[HEIGHT // 3 : 2 * HEIGHT // 3 + 1, WIDTH // 3 : 2 * WIDTH // 3 + 1] = (20, 40, 220)
+    clip = Clip.open(encode(tmp_path / "clip.mp4", [codes] * 2, pixels=pixels))
+    picture = srgb_to_linear(codes / np.float32(255))
+    picture[0, 0] = 3.0  # a lamp, brighter than the file's white
+    plate = known_plate(picture, clip)
+    given, left = (np.sqrt(np.mean(codes_apart(each[1:], clip.frame(0)[1:]) ** 2)) for each in (picture, plate.image))
+    assert left <= max(held * given, 1.0)
+    assert plate.image[0, 0].min() > 2.5
+    np.testing.assert_array_equal(known_plate(picture, clip, filmed=True).image, picture)
 
 
 @pytest.mark.parametrize("codes", [0.0, 13.0, 51.0])
