@@ -18,7 +18,7 @@ from smokelift.app.cli import main
 from smokelift.output.files import INDEX
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
-from smokelift_command import CANCELLED, Termination
+from smokelift_command.exits import CANCELLED, Termination
 
 RECONSTRUCT = (
     *("reconstruct", "scene.toml", "--quality", "draft", "--device", "cpu"),

@@ -14,6 +14,7 @@ import time
 from contextlib import suppress
 
 import smokelift_command
+from smokelift_command.exits import CANCELLED
 
 GRACE_SECONDS = 8.0
 """Time to end in order. Files appear whole or not at all, so an end at once does no harm after that."""
@@ -30,14 +31,14 @@ def main() -> int:
         return smokelift_command.main()
     except KeyboardInterrupt:  # before or after the command handles it
         print("Cancelled.", file=sys.stderr)
-        return smokelift_command.CANCELLED
+        return CANCELLED
 
 
 def _end_with_input() -> None:
     _wait_for_end_of_input()
     _thread.interrupt_main()
     time.sleep(GRACE_SECONDS)
-    os._exit(smokelift_command.CANCELLED)
+    os._exit(CANCELLED)
 
 
 def _wait_for_end_of_input() -> None:

@@ -25,7 +25,7 @@ from smokelift.output.files import DISK_FULL
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
-from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE, Termination
+from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE, NO_DEVICE, Termination
 
 _TRANSIENT = {
     getattr(errno, name)

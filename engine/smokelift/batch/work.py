@@ -24,7 +24,7 @@ from smokelift.batch.shots import BatchShot
 from smokelift.checks.whole_files import write_text
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.lock import Lock
-from smokelift_command import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
+from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
 ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
 """The command line, which ends with the process that started it."""

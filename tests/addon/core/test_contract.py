@@ -28,7 +28,7 @@ from smokelift.output.files import INDEX, frame_path, proxy_path
 from smokelift.output.vdb import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
-from smokelift_command import BAD_INPUT, CANCELLED, DONE
+from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE
 
 
 def test_names_are_the_engines() -> None:
