@@ -22,7 +22,7 @@ from smokelift import Clip, Frame, Scene, Settings, metrics, reconstruct
 from smokelift.evaluation.frame_means import VolumeMeans, finite_mean
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.truth import Truth, resampled
-from smokelift.footage.given_background import background_picture
+from smokelift.extraction.given_background import background_picture
 from smokelift.render import device
 from smokelift.scene import CompleteScene
 

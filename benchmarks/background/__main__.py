@@ -25,10 +25,10 @@ from benchmarks.measure import Figures, optical_mass, reconstructed, view_figure
 from benchmarks.plates import BRIGHT
 from benchmarks.tables import line, markdown
 from smokelift import Background, Clip, Domain, Frame, Settings
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate, evened, known_plate, without_noise_light
 from smokelift.footage.images import Picture, linear_to_srgb
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate, evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
 from smokelift.scene import CompleteScene
 

@@ -15,8 +15,8 @@ from benchmarks.plates import PAINTED, backdrop
 from benchmarks.tables import line, markdown
 from smokelift.checks import UNDETERMINED
 from smokelift.checks.array_types import Doubles
+from smokelift.extraction.plate import known_plate
 from smokelift.footage.images import Picture
-from smokelift.footage.plate import known_plate
 from smokelift.setup.first_estimate import sample_smoke
 from smokelift.setup.medium import smoke_color
 

@@ -7,8 +7,8 @@ from benchmarks.background.__main__ import plate_score as score
 from benchmarks.background.cases import CASES, with_column
 from benchmarks.baked import Baked
 from benchmarks.measure import optical_mass
+from smokelift.extraction.plate import known_plate
 from smokelift.footage.images import linear_to_srgb
-from smokelift.footage.plate import known_plate
 from tests.benchmarks.ball import cameras, scene
 
 COUNT, GRID, SIZE = 40, (8, 8, 12), (32, 48)

@@ -42,7 +42,7 @@ from smokelift.scene import (
     scene_to_dict,
 )
 from smokelift.transport import face_shapes
-from tests.engine.footage.films import encode
+from tests.engine.films import encode
 
 SHAPE = (3, 2, 4)
 """Voxels of the grids in sound files."""

@@ -24,8 +24,8 @@ from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
 from smokelift.extraction import extract_element, usual_source
-from smokelift.footage.given_background import backdrop_color, background_picture
-from smokelift.footage.plate import Plate
+from smokelift.extraction.given_background import backdrop_color, background_picture
+from smokelift.extraction.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.device import products_on_one_thread
 from smokelift.scene import CompleteScene, Domain, Scene, completed

@@ -16,10 +16,10 @@ from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.extraction import Element
+from smokelift.extraction.matte import certainty, matte
+from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import area_average, channel_mean
-from smokelift.footage.matte import certainty, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
-from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics, Renderer, Volume
 from smokelift.scene import SHADOWED, Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST

@@ -20,10 +20,10 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks.array_types import Mask
-from smokelift.direct.constraint import FaceMasks, faces_of
 from smokelift.direct.state import SmokeState
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, advect, faces_in
+from smokelift.transport.constraint import FaceMasks, faces_of
 
 BLUR_VOXELS = 2.0
 """Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets. This and the three

@@ -8,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from smokelift.direct.constraint import FaceMasks, project_with_given_faces
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array, Velocity, advect, divergence, on_faces, project
+from smokelift.transport.constraint import FaceMasks, project_with_given_faces
 
 Carried = TypeVar("Carried", Array, Velocity)
 Mix = Callable[[Array, Array, float], Array]

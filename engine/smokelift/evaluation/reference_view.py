@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks import counted
+from smokelift.extraction.given_background import background_picture, open_plates
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import background_picture, open_plates
 from smokelift.footage.images import area_average
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer

@@ -17,9 +17,9 @@ import numpy as np
 
 import smokelift._core as _core
 from smokelift.checks.array_types import Mask
+from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, reduced_size
-from smokelift.footage.plate import Plate, noise_at
 
 FULL_SCALE = 0.12
 """Distance, over the longer side of the picture, at which smoke's opacity has its whole range."""

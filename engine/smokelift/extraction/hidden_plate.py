@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Mask
+from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,
     FINER,
@@ -27,11 +28,10 @@ from smokelift.extraction.element import (
     extracted,
     source_of,
 )
-from smokelift.footage.background_kind import OBJECT
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, reduced_size
 from smokelift.footage.noise import EIGHT_BIT_STEP
-from smokelift.footage.plate import Plate
 
 FRAMES, SIDE, TURNS = 8, 96, 4
 """Frames that are extracted, cells along their longer side, and turns. More frames and turns change T rms by .001,

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smokelift.extraction.given_background import backdrop_color, background_picture
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import backdrop_color, background_picture
 from smokelift.footage.images import area_average
 from smokelift.output.files import CONTACT_SHEET, ORBIT, PREVIEW, STRIP
 from smokelift.output.framing import Framing, frame_smoke

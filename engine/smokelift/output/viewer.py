@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from smokelift.checks import require_kind
-from smokelift.footage.given_background import background_picture, behind, open_plates
+from smokelift.extraction.given_background import background_picture, behind, open_plates
 from smokelift.render import Image, Renderer, Volume, scene_optics
 from smokelift.render.emission import emitted
 from smokelift.scene import Camera, CompleteScene, shared_part
@@ -16,7 +16,7 @@ from smokelift.scene import Camera, CompleteScene, shared_part
 class Viewer:
     """Renders the frames of a sequence for one camera; where nothing moves, one renderer serves all of them.
 
-    `smokelift.footage.given_background.behind` says what another camera than the scene's own sees of a clean plate.
+    `smokelift.extraction.given_background.behind` says what another camera than the scene's own sees of a clean plate.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.matte import matte
+from smokelift.extraction.matte import matte
 from smokelift.render import Image, Optics, Volume
 from smokelift.setup.shot import Shot, ShotView
 

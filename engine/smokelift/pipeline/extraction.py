@@ -8,11 +8,11 @@ from pathlib import Path
 
 from smokelift.checks import require_kind
 from smokelift.extraction import Element, extract_element, plates_and_source
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.plate import Plate, evened
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern
 from smokelift.footage.images import Picture
-from smokelift.footage.plate import Plate, evened
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
 from smokelift.setup.first_estimate import sample_smoke

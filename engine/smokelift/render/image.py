@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import numbers, radiance, require_kind
-from smokelift.footage.given_background import background_picture
+from smokelift.extraction.given_background import background_picture
 from smokelift.render.optics import scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
 from smokelift.scene import Camera, Scene, completed, require_scene

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.given_background import background_picture
+from smokelift.extraction.given_background import background_picture
 from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.renderer import Image, Renderer
 from smokelift.scene import (

@@ -10,9 +10,9 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from smokelift.checks import Finding, counted
+from smokelift.extraction.matte import Matte, matte
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.footage.matte import Matte, matte
-from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit
 from smokelift.report.page import TILE, Page, Panel, tile_size
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from smokelift.checks import Finding
-from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
 from smokelift.footage.video import median_quantizer

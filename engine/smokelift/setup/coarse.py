@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from smokelift.checks.array_types import Doubles
 from smokelift.density import DensitySettings, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import area_average
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate
-from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.shot import ShotView
+from smokelift.setup.working_picture import CameraError, working_picture
 
 COARSE_SIDE = 32
 """Largest number of voxels along the longest side: a few per cent of the work of 96, and every large shadow is there

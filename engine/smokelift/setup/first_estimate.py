@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.extraction import plates_and_source, shows_transmittance
-from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.fire import HotPixels, fire_color, firelight, hot_pixels, without_fire
+from smokelift.extraction.given_background import backdrop_color
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate, evened
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
-from smokelift.footage.fire import HotPixels, fire_color, firelight, hot_pixels, without_fire
-from smokelift.footage.given_background import backdrop_color
 from smokelift.footage.images import Picture, area_average
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate, evened
 from smokelift.scene import Background, Camera, Medium
 from smokelift.scene.checks import Vector
 

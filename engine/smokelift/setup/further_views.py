@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from smokelift.checks import Figures, Finding
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.plate import evened
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_video
-from smokelift.footage.plate import evened
-from smokelift.footage.working_picture import CameraError
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.backdrop_findings import backdrop_findings
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, HeldOut, coarse_frames, held_out
@@ -29,6 +28,7 @@ from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
+from smokelift.setup.working_picture import CameraError
 
 AGREEMENT_SAMPLES = 4
 """Frames in which the views are compared: a wrong one does not decide their median."""

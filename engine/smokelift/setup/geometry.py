@@ -14,12 +14,12 @@ from smokelift.checks import Figures, Finding
 from smokelift.checks.array_types import Doubles
 from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
-from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.resolution import DetailSpectrum, Grid, Shape, choose_grid, smoke_detail
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
+from smokelift.setup.working_picture import CameraError, working_picture
 
 PICTURE_HEIGHT = 2.0
 """Height in meters of an uncalibrated picture where the smoke is, unless its distance is given: a person's size."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from smokelift.checks import UNDETERMINED, Finding
 from smokelift.checks.array_types import Doubles
-from smokelift.footage.fire import CLIPPED_VALUE
+from smokelift.extraction.fire import CLIPPED_VALUE
 from smokelift.footage.images import brightest_channel
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene

@@ -15,9 +15,9 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from smokelift.checks import Figures, Finding
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import linear_to_srgb
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 from smokelift.scene import Domain
 from smokelift.setup.settings import LOST_DETAIL, QUALITIES, Quality, Settings

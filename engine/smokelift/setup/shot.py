@@ -10,13 +10,13 @@ from functools import cached_property
 from smokelift.checks import Finding
 from smokelift.density import AxisEstimate, Observation
 from smokelift.extraction import Element, extract_element
+from smokelift.extraction.plate import Plate, uncovered
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plate, uncovered
-from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
 from smokelift.setup.resolution import Grid
 from smokelift.setup.settings import Quality, Settings
+from smokelift.setup.working_picture import CameraError, WorkingPicture, working_picture
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.commands import directed
 from smokelift.checks import Source
 from smokelift.direct import new_sequence, playback
-from smokelift.footage.backdrop import MOVING_CAMERA
+from smokelift.extraction.backdrop import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import numbered_files
 from smokelift.footage.images import READABLE

@@ -13,9 +13,9 @@ from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.evaluation.metrics import psnr
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise, linear_per_srgb
-from smokelift.footage.plate import Plate
 from smokelift.render import render, scene_optics
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed, orbit
 

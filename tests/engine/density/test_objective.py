@@ -6,9 +6,9 @@ import pytest
 from smokelift.density import Observation
 from smokelift.density.objective import camera_terms, noise_floor
 from smokelift.density.observation import ViewSet
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.noise import Noise, linear_per_srgb
-from smokelift.footage.plate import Plate
 from smokelift.render import scene_optics
 from smokelift.scene import Camera, Domain, Scene, completed
 

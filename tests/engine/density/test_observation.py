@@ -13,8 +13,8 @@ from smokelift.density import DensitySettings, Observation, RoundDepth, ViewSet,
 from smokelift.density.fit import GradientFit
 from smokelift.density.observation import USEFUL_DEVIATION, WHITE, eight_bit_plate
 from smokelift.extraction import Element
+from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import blurred
-from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import render, scene_optics, scene_renderer
 from smokelift.scene import Background, Scene, completed
 

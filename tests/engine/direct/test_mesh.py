@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from smokelift.direct import BoxObstacle, Continuation, Mesh, continue_sequence
-from smokelift.direct.constraint import faces_between
 from smokelift.direct.mesh import HEADER, RECORD
 from smokelift.direct.simulation import Physics
 from smokelift.direct.surroundings import Surroundings, require_place
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.transport import divergence
+from smokelift.transport.constraint import faces_between
 from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
 
 H = DOMAIN.voxel_size

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from smokelift.direct import Ball, SmokeState, complete_velocity
-from smokelift.direct.constraint import faces_of
 from smokelift.direct.state import interpolate
 from smokelift.transport import Velocity, divergence, project
+from smokelift.transport.constraint import faces_of
 from tests.engine.direct.rising import DOMAIN, DT, along_x, at_rest, blob
 
 

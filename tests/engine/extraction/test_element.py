@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smokelift.extraction import Element, extract_element
+from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise
-from smokelift.footage.plate import Plate, noise_at
 
 ROWS, COLUMNS = 72, 96
 SOURCE = np.array([0.35, 0.3325, 0.315], np.float32)

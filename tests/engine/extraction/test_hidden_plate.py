@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from smokelift.extraction.hidden_plate import plate_in_turn
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture, area_average, blurred
 from smokelift.footage.noise import EIGHT_BIT_NOISE
-from smokelift.footage.plate import Plate
 
 COLUMNS, ROWS, FRAMES = 192, 160, 5
 SOURCE = np.array([0.6, 0.58, 0.55], np.float32)

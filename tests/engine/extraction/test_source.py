@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from smokelift.extraction import tells_source, usual_source
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import lasting_noise
-from smokelift.footage.plate import Plate
 from tests.engine.extraction.test_element import (
     PLATES,
     RADIANCE,

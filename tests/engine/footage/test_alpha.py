@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import encode, write_exr
 
 from smokelift.footage.alpha import association
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from tests.engine.films import encode, write_exr
 
 STRAIGHT, IN_LIGHT, IN_CODES = "straight", "premultiplied in linear light", "premultiplied in code values"
 COUNT, HEIGHT, WIDTH = 5, 64, 48

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import Filmed, blanked, encode
 from PIL import Image
 
 from smokelift.checks import Finding
@@ -15,6 +14,7 @@ from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
+from tests.engine.films import Filmed, blanked, encode
 
 LEVELS = [20 + 7 * n for n in range(30)]
 

@@ -12,12 +12,12 @@ import av
 import numpy as np
 import numpy.typing as npt
 import pytest
-from films import blanked, encode, encode_sound, write_exr
 from PIL import Image
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from tests.engine.films import blanked, encode, encode_sound, write_exr
 
 Pictures = npt.NDArray[np.float32]
 """sRGB values from 0 to 1, (frames, rows, columns, 3)."""

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import encode
 from PIL import Image
 
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Layer, StoredPicture, backdrop_of, shown_before
 from smokelift.footage.images import area_average, code_values, linear_to_srgb, srgb_to_linear
 from smokelift.scene import Background
+from tests.engine.films import encode
 
 QUICKTIME = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 

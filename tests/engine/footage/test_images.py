@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
-from films import encode, write_exr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -23,6 +22,7 @@ from smokelift.footage.images import (
     srgb_to_linear,
 )
 from smokelift.output.images import write_image
+from tests.engine.films import encode, write_exr
 
 
 def colors(height: int = 6, width: int = 5) -> np.ndarray:

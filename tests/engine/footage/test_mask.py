@@ -4,17 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 from PIL import Image
 
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
 from smokelift.footage.mask import Mask
-from smokelift.footage.plate import Plate, cleared, known_plate, uncovered
 from smokelift.output.images import write_image, write_video
 from smokelift.scene import Background
+from tests.engine.films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
 SIDE = 44
 """Column from which on the mask of the block is black; smoke stays to the left of it."""

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import coded, encode, film, puff, wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.footage.video import median_quantizer
+from tests.engine.films import coded, encode, film, puff, wall
 
 FRAMES = np.zeros((3, 16, 32, 3), np.uint8)
 

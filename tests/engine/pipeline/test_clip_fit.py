@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from smokelift import Clip, Reconstruction, Scene, reconstruct, render
-from smokelift.footage.matte import matte
+from smokelift.extraction.matte import matte
 from smokelift.pipeline import compose
 from smokelift.pipeline.clip_fit import beside_clip, clip_psnr
 from smokelift.scene import ClipSource
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
 from tests.engine.conftest import Plume
-from tests.engine.footage.films import clip_of
+from tests.engine.films import clip_of
 
 SHARPER = 6
 """Pixels of the clip along one of the plume's."""

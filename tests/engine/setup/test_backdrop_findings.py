@@ -7,16 +7,16 @@ import pytest
 from scipy import ndimage
 
 from smokelift.checks import Finding
-from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.matte import matte
+from smokelift.extraction.strokes import Strokes
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import blurred
-from smokelift.footage.matte import matte
-from smokelift.footage.strokes import Strokes
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_findings import backdrop_findings, doubts, first_findings
 from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
-from tests.engine.footage.films import clear_plate, clip_of, coded, film, puff, wall
+from tests.engine.films import clear_plate, clip_of, coded, film, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True

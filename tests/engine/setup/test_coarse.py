@@ -8,14 +8,14 @@ from hypothesis import example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from smokelift.extraction.plate import Plate, known_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.noise import EIGHT_BIT_NOISE
-from smokelift.footage.plate import Plate, known_plate
-from smokelift.footage.working_picture import working_picture
 from smokelift.output.images import write_image
 from smokelift.scene import Domain, completed
 from smokelift.setup.coarse import COARSE_SIDE, CoarseFrame, coarse_domain, coarse_frame, held_out
 from smokelift.setup.shot import ShotView
+from smokelift.setup.working_picture import working_picture
 
 
 @given(st.tuples(*[st.integers(8, 160)] * 3), st.floats(0.3, 20))

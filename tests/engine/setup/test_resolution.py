@@ -13,7 +13,7 @@ from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
-from tests.engine.footage.films import clear_plate, clip_of
+from tests.engine.films import clear_plate, clip_of
 from tests.engine.setup.shots import geometry_of
 
 SIZE = (192, 256)

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, pan, passing_wall
 
+from smokelift.extraction.given_background import background_picture, mean_of_frames, open_plates, read_background
+from smokelift.extraction.plate import known_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.given_background import background_picture, mean_of_frames, open_plates, read_background
-from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix
+from tests.engine.films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, pan, passing_wall
 
 CAMERA = Camera.look_at((0, -4, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
 

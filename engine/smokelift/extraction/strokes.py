@@ -13,13 +13,13 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks.array_types import Mask
+from smokelift.extraction.plate import Plate, shown_behind
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import small
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_layer, srgb_to_linear
 from smokelift.footage.inpainting import continuation_errors, push_pull
 from smokelift.footage.mask import require_shape
-from smokelift.footage.plate import Plate, shown_behind
 
 PAINTED = 0.5
 """Alpha, difference of a stroke's channels, and fraction of a pixel's area, from which on a pixel is painted: nearer to

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 from PIL import Image
 
-from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, srgb_to_linear
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
+from tests.engine.films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
 ROWS, COLUMNS = np.mgrid[:HEIGHT, :WIDTH]
 GRADIENT = srgb_to_linear(np.stack([0.2 + 0.3 * COLUMNS / WIDTH, 0.25 + 0.2 * ROWS / HEIGHT, 0 * ROWS + 0.4], -1))

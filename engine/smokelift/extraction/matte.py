@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage, special
 
+from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb
 from smokelift.footage.noise import Noise
-from smokelift.footage.plate import Plate
 
 FALSE_ALARMS = 0.01
 """Mean number of patches of noise in a picture that are taken for smoke."""

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
+from smokelift.extraction.matte import matte
 from smokelift.footage.images import linear_to_srgb
-from smokelift.footage.matte import matte
+from tests.engine.films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
 
 @pytest.mark.parametrize(

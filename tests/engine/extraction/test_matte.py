@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import HEIGHT, WIDTH, clear_plate, film, overlap, wall
 from scipy import ndimage
 
+from smokelift.extraction.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
+from smokelift.extraction.plate import known_plate, without_noise_light
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
-from smokelift.footage.plate import known_plate, without_noise_light
+from tests.engine.films import HEIGHT, WIDTH, clear_plate, film, overlap, wall
 
 
 def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:

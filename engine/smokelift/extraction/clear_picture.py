@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Mask
+from smokelift.extraction.matte import smoothing
+from smokelift.extraction.proxy import Proxy
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Edges
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
 from smokelift.footage.inpainting import ISLAND, in_one_piece, mostly_beside, push_pull
-from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
-from smokelift.footage.proxy import Proxy
 
 WINDOW = 6.0
 """Width of the window of a pixel's clear values, in standard deviations of noise: three to either side."""

@@ -14,10 +14,10 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks.array_types import Mask
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, brightest_channel
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate
 from smokelift.scene.checks import Vector
 
 MIN_FLAME_RED = 0.5

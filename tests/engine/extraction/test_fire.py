@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import clip_of
 
-from smokelift.footage.fire import fire_color, firelight, hot_pixels, without_fire
-from smokelift.footage.plate import known_plate
+from smokelift.extraction.fire import fire_color, firelight, hot_pixels, without_fire
+from smokelift.extraction.plate import known_plate
+from tests.engine.films import clip_of
 
 ROWS, COLUMNS = 48, 64
 FLAME, SMOKE = (1.0, 0.45, 0.08), 0.06

@@ -9,12 +9,12 @@ import av
 import numpy as np
 import OpenEXR
 
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, StoredPicture
 from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import lasting_noise
-from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 
 HEIGHT, WIDTH, COUNT = 72, 56, 24

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.clear_picture import spread_out
+from smokelift.extraction.clear_picture import spread_out
+from smokelift.extraction.proxy import Proxy
 from smokelift.footage.images import (
     Picture,
     area_average,
@@ -29,7 +30,6 @@ from smokelift.footage.images import (
 )
 from smokelift.footage.inpainting import DETAIL
 from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, median_of_seen, spread_about
-from smokelift.footage.proxy import Proxy
 
 BLOCKS = 64
 """Blocks along the longer side: means over so many pixels that white noise is gone."""

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import Filmed, codes_apart
 
-from smokelift.footage.backdrop import find_backdrop
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.plate import Plate
+from tests.engine.films import Filmed, codes_apart
 
 COUNT = 16
 SIZE = (80, 1280)

@@ -5,13 +5,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, encode, film, overlap, pan, passing_wall, plate_of, puff, wall
 
+from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import evened, known_plate, without_noise_light
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.matte import matte
-from smokelift.footage.plate import evened, known_plate, without_noise_light
 from smokelift.output.images import write_image
+from tests.engine.films import (
+    COUNT,
+    HEIGHT,
+    WIDTH,
+    codes_apart,
+    encode,
+    film,
+    overlap,
+    pan,
+    passing_wall,
+    plate_of,
+    puff,
+    wall,
+)
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:

@@ -16,17 +16,17 @@ from typing import Literal
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.footage.background_kind import MAX_DEVIATION, color_around, likeliest, within
-from smokelift.footage.camera_motion import CameraMotion, Texture, find_motion, motion_before
-from smokelift.footage.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
+from smokelift.extraction.background_kind import MAX_DEVIATION, color_around, likeliest, within
+from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
+from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
+from smokelift.extraction.given_background import mean_of_frames, read_background
+from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered, without_noise_light
+from smokelift.extraction.proxy import PROXY_SIDE, Proxy
+from smokelift.extraction.strokes import Strokes, stroked_plate, without_others
 from smokelift.footage.clip import Clip
-from smokelift.footage.given_background import mean_of_frames, read_background
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
 from smokelift.footage.inpainting import DETAIL, continuation_errors
 from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, lasting_noise, median_of_seen, noise_of, spread_about
-from smokelift.footage.plate import Plate, cleared, known_plate, uncovered, without_noise_light
-from smokelift.footage.proxy import PROXY_SIDE, Proxy
-from smokelift.footage.strokes import Strokes, stroked_plate, without_others
 from smokelift.scene import Background, Camera
 
 MOSTLY = 0.5

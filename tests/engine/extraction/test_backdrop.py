@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, film, pan, passing_wall, plate_of, puff, wall
 from scipy import ndimage
 
-from smokelift.footage.backdrop import Backdrop, find_backdrop
-from smokelift.footage.background_kind import color_around
+from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.background_kind import color_around
+from smokelift.extraction.matte import matte
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.matte import matte
 from smokelift.output.images import write_image
 from smokelift.scene import Camera
+from tests.engine.films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, film, pan, passing_wall, plate_of, puff, wall
 
 
 def spreading_ink(n: int) -> np.ndarray:

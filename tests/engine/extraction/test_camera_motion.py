@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import clip_of, codes_apart, grainy
 from scipy import ndimage
 
-from smokelift.footage.backdrop import find_backdrop
-from smokelift.footage.camera_motion import CameraMotion, find_motion
+from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.camera_motion import CameraMotion, find_motion
+from smokelift.extraction.proxy import Proxy
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.proxy import Proxy
 from smokelift.footage.registration import Similarity, corners
 from smokelift.output.images import write_image
 from smokelift.scene import Background
+from tests.engine.films import clip_of, codes_apart, grainy
 
 COUNT, SIZE, MARGIN = 12, (120, 160), 40
 STILL = (Similarity(),) * COUNT
