@@ -30,7 +30,7 @@ CLIPPED_LEVEL = np.float32(0.1)
 """Smallest lasting noise over white noise clipped at black, whose mean depends on how the file rounds."""
 
 NOISE_FRAMES = 32
-"""Frames that the noise before a known background is measured on: a median needs no more."""
+"""Frames that the noise before a known background is measured on, and its edges: a median needs no more."""
 
 MIDDLE = np.full(3, 0.5, np.float32)
 """sRGB values at which the brightening by noise is judged."""
@@ -120,7 +120,9 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
     if not (color or (linear.ndim == 3 and linear.shape[2] == 3)) or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
     image = np.tile(linear, (height, width, 1)) if color else area_average(linear, width, height)
-    plate = Plate(image if color or filmed else clip.as_held(image), known, NO_NOISE)
+    plate = Plate(image, known, NO_NOISE)
+    if not (color or filmed):
+        plate = _with_coarse_colors(plate, clip)
     deviations, blocks = _noise_samples(plate, clip)
     given = linear_to_srgb(plate.image)
     raised = np.maximum(given, clipped_black(deviations, blocks)) - given
@@ -129,6 +131,28 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
     noise = noise_about(deviations - some_blocks(raised), blocks - block_means(raised[None]))
     lasting = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
     return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting))
+
+
+def _with_coarse_colors(plate: Plate, clip: Clip) -> Plate:
+    """Return a plate whose colors are as coarse as the clip's file holds them.
+
+    Beside a saturated edge a codec does not hold even these. There each pixel goes on towards the frame that is
+    nearest to it, as far at most as coarse colors have changed it.
+    """
+    held = replace(plate, image=clip.as_held(plate.image))
+    reach = np.abs(held.image - plate.image)
+    edge = (reach > EIGHT_BIT_STEP * linear_per_srgb(linear_to_srgb(held.image))).any(-1)
+    if not edge.any():
+        return held
+    nearest, distance, whole = np.zeros_like(reach[edge]), np.full(np.count_nonzero(edge), np.inf), clip.whole()
+    for number in whole.spread(NOISE_FRAMES):
+        seen = whole.as_seen(number, whole.frame(number))
+        away = (seen / held.gain(number, small(seen)) - held.image)[edge]
+        closer = np.abs(away).max(-1) < distance  # never where it is hidden, and not a number
+        nearest[closer], distance[closer] = away[closer], np.abs(away[closer]).max(-1)
+    image = held.image.copy()
+    image[edge] += np.clip(nearest, -reach[edge], reach[edge])
+    return replace(held, image=image)
 
 
 def _noise_samples(plate: Plate, clip: Clip) -> tuple[Picture, Picture]:

@@ -62,19 +62,23 @@ def test_a_plate_for_every_frame_of_the_clips_file(tmp_path: Path) -> None:
         known_plate(few, clip)
 
 
-@pytest.mark.parametrize(("pixels", "held"), [("yuv420p", 0.6), ("yuv422p", 0.75), ("yuv444p", 1.0)])
-def test_a_given_plate_has_the_colors_of_the_clips_file(tmp_path: Path, pixels: str, held: float) -> None:
+@pytest.mark.parametrize("pixels", ["yuv420p", "yuv422p", "yuv444p"])
+def test_a_given_plate_has_the_colors_of_the_clips_file(tmp_path: Path, pixels: str) -> None:
     """A video with one color for several pixels shows saturated edges elsewhere than the picture that was filmed."""
     codes = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     codes[HEIGHT // 3 : 2 * HEIGHT // 3 + 1, WIDTH // 3 : 2 * WIDTH // 3 + 1] = (20, 40, 220)
-    clip = Clip.open(encode(tmp_path / "clip.mp4", [codes] * 2, pixels=pixels))
+    smoky = codes.copy()
+    smoky[HEIGHT // 2 :, : WIDTH // 2] = codes[HEIGHT // 2 :, : WIDTH // 2] // 4 + 170
+    path = encode(tmp_path / "clip.mp4", [codes] + [smoky] * 11, pixels=pixels)
     picture = srgb_to_linear(codes / np.float32(255))
     picture[0, 0] = 3.0  # a lamp, brighter than the file's white
-    plate = known_plate(picture, clip)
-    given, left = (np.sqrt(np.mean(codes_apart(each[1:], clip.frame(0)[1:]) ** 2)) for each in (picture, plate.image))
-    assert left <= max(held * given, 1.0)
-    assert plate.image[0, 0].min() > 2.5
-    np.testing.assert_array_equal(known_plate(picture, clip, filmed=True).image, picture)
+    with Clip.open(path, frames=(4, 11)) as clip:
+        plate = known_plate(picture, clip)
+        filmed = clip.whole().frame(0)
+        off = [np.sqrt(np.mean(codes_apart(each[1:], filmed[1:]) ** 2)) for each in (picture, plate.image)]
+        assert off[1] <= 0.2 * off[0]
+        assert plate.image[0, 0].min() > 2.5
+        np.testing.assert_array_equal(known_plate(picture, clip, filmed=True).image, picture)
 
 
 @pytest.mark.parametrize("codes", [0.0, 13.0, 51.0])
