@@ -77,7 +77,7 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.active = not may_choose or cycles.volume_biased
     row.prop(smoke.data.render, "step_size", text="Render Step")
     if may_choose and not cycles.volume_biased:
-        text = "Marching has less noise in less time, but its steps make an error."
+        text = "Marching has less noise per sample, but its steps make an error."
         draw_text(column, text, "INFO")
 
 

@@ -113,7 +113,7 @@ def shown_example(sequence: Path, samples: int, frame: int) -> tuple[bpy.types.S
     volume.show(obj, Take(sequence.absolute()))
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
     if hasattr(scene.cycles, "volume_biased"):
-        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
+        scene.cycles.volume_biased = True  # as a set-up does
     scene.frame_set(frame)
     return scene, obj
 
