@@ -144,9 +144,9 @@ def _with_coarse_colors(plate: Plate, clip: Clip) -> Plate:
     edge = (reach > EIGHT_BIT_STEP * linear_per_srgb(linear_to_srgb(held.image))).any(-1)
     if not edge.any():
         return held
-    nearest, distance, whole = np.zeros_like(reach[edge]), np.full(np.count_nonzero(edge), np.inf), clip.whole()
-    for number in whole.spread(NOISE_FRAMES):
-        seen = whole.as_seen(number, whole.frame(number))
+    nearest, distance = np.zeros_like(reach[edge]), np.full(np.count_nonzero(edge), np.inf)
+    for number in clip.spread(NOISE_FRAMES):
+        seen = clip.as_seen(number, clip.frame(number))
         away = (seen / held.gain(number, small(seen)) - held.image)[edge]
         closer = np.abs(away).max(-1) < distance  # never where it is hidden, and not a number
         nearest[closer], distance[closer] = away[closer], np.abs(away[closer]).max(-1)
