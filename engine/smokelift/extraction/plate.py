@@ -110,6 +110,7 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
                 "plate with a picture for every frame of the clip, or a color, as background."
             )
 
+        @lru_cache(maxsize=1)  # each part of a frame's work asks for it
         def images(frame: int) -> Picture:
             return clip.as_held(area_average(background.frame(clip.numbers.start + frame), width, height))
 
