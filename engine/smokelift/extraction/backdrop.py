@@ -128,12 +128,15 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     if given is None:
         found = _estimated(clip, moves)
     else:
-        plate = known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=bool(frames))
+
+        def plate_of(clip: Clip) -> Plate:
+            return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=bool(frames))
+
+        plate = plate_of(clip)
         quiet = without_noise_light(clip, plate.noise)
         if quiet is not clip:
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
-            shown = mean_of_frames(frames, quiet) if frames else given
-            plate = replace(known_plate(shown, quiet, filmed=bool(frames)), noise=plate.noise)
+            plate = replace(plate_of(quiet), noise=plate.noise)
         found = Backdrop("alpha" if gray else "given", quiet, plate, behind, motion=motion)
     plate = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
     found = replace(found, clip=cleared(found.clip, plate), plates=plate)
