@@ -1,7 +1,5 @@
 """The command ``smokelift``, apart from the engine: that takes a second to load, and a signal may come in that time."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

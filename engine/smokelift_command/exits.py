@@ -1,7 +1,5 @@
 """How the command ends: its exit statuses, and the signal that ends it."""
 
-from __future__ import annotations
-
 from types import FrameType
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130

@@ -3,8 +3,6 @@
 A program that holds the other end of the pipe cancels the run by closing it, and a program that is killed lets it go.
 """
 
-from __future__ import annotations
-
 import _thread
 import os
 import signal

@@ -3,8 +3,6 @@
 Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumable).
 """
 
-from __future__ import annotations
-
 import argparse
 import errno
 import io

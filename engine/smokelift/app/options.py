@@ -1,7 +1,5 @@
 """Options that several commands share, and what they say."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

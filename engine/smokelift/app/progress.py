@@ -1,7 +1,5 @@
 """What a command says while it runs: a bar for people, one JSON object per line for programs."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -9,8 +9,6 @@ paper's derivative is none voxel by voxel, so in thick smoke the loss falls at f
 any rate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -34,7 +32,7 @@ FOG_DEPTH = 0.1
 class OrthogonalCopy:
     """The paper's depth prior: thin fog, and a single picture imposed again as if from 90 degrees."""
 
-    def of_clip(self, clip: ObservedClip) -> OrthogonalCopy:
+    def of_clip(self, clip: ObservedClip) -> "OrthogonalCopy":
         """Itself: it does not read the clip."""
         return self
 
@@ -98,7 +96,7 @@ class FixedRateDescent:
         return FittedDensity(without_traces(density, judged.where), judged.hull, fit_figures(judged, residuals, done))
 
     def _descend(
-        self, renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume, thin: Volume
+        self, renderers: "Sequence[PaperRenderer]", pictures: Sequence[Image], density: Volume, thin: Volume
     ) -> tuple[Volume, list[Image], int]:
         """The best density seen, its residuals, and the number of steps."""
         _, slope = _residuals_and_gradient(renderers, pictures, thin)
@@ -131,7 +129,7 @@ def _squares(images: Sequence[Image]) -> float:
 
 
 def _residuals_and_gradient(
-    renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume
+    renderers: "Sequence[PaperRenderer]", pictures: Sequence[Image], density: Volume
 ) -> tuple[list[Image], Volume]:
     residuals, gradient = [], np.zeros_like(density)
     for renderer, picture in zip(renderers, pictures, strict=True):

@@ -30,8 +30,6 @@ steps; the light's transmittance is a volume made once a picture, by the exact r
 trilinearly, and the record is spread with the same weights.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ It minimizes, over velocities u without divergence in voxels per frame,
 with g and s as in `smokelift.velocity`. Source: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from smokelift.transport import StaggeredGrid, Velocity
@@ -52,6 +50,6 @@ class PaperVelocity:
         """The velocity of the next frame if no force acts."""
         return predict_velocity(velocity, dt)
 
-    def of_one_view(self) -> PaperVelocity:
+    def of_one_view(self) -> "PaperVelocity":
         """Return itself."""
         return self

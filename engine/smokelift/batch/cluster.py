@@ -5,8 +5,6 @@ shot that two workers hold is done by one (`smokelift.batch.work`), and after a 
 everything, the shots that are not finished are given to it again.
 """
 
-from __future__ import annotations
-
 import logging
 import threading
 import uuid

@@ -1,7 +1,5 @@
 """What a batch still takes on so many workers, and its page: a row per shot, with its picture."""
 
-from __future__ import annotations
-
 import heapq
 from collections import Counter
 from collections.abc import Mapping, Sequence

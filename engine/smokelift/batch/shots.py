@@ -1,7 +1,5 @@
 """The list of a batch, ``shots.toml``, as ``docs/batch.md`` describes it."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from dataclasses import dataclass

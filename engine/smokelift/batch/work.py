@@ -4,8 +4,6 @@ Several processes on several machines may work on the same shot: one does the wo
 decides is on the storage that they share: the lock, the record and the sequence.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

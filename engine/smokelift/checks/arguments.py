@@ -1,7 +1,5 @@
 """Arguments that are no such thing as a function takes, refused where they are given; and how messages say values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from types import UnionType

@@ -1,7 +1,5 @@
 """What is found of a shot or a result, as a kind and figures: `smokelift.report` has the words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal

@@ -1,7 +1,5 @@
 """Files that appear whole or not at all, and text that is read from no folder, pipe or endless file."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

@@ -10,8 +10,6 @@ they have of it; s is what the rest has more than k of that. So a fire whose smo
 and one that is blown away from its fuel burns out. Figures: docs/experiments/fire.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

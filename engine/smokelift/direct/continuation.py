@@ -1,7 +1,5 @@
 """Continues a sequence on disk: its frames up to one, and then those of a simulation that starts from it."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator

@@ -13,8 +13,6 @@ sinks where a head dissolves while the base is fed. A velocity's change from one
 buoyancy, since estimates err by more than that (docs/experiments/continuation.md).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -5,8 +5,6 @@ nothing is cut. A side that is a wall stays, and so does one beyond which the bo
 camera or a lamp.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ An inlet also stands out from what is left unexplained in the rest of the smoke,
 smoke that is faster than the velocity looks like a wide, weak one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -81,7 +79,7 @@ class Inflow:
         last = len(self.states) - 1
         return self.states[abs(last - step % (2 * last))] if last else self.states[0]
 
-    def forwards(self) -> Inflow:
+    def forwards(self) -> "Inflow":
         """The inflow from the first state on, so that step n replays state n."""
         return replace(self, states=self.states[::-1])
 
@@ -108,7 +106,7 @@ class Inflow:
         ):
             here[inlets] = entering[inlets]
 
-    def cropped(self) -> Inflow:
+    def cropped(self) -> "Inflow":
         """Inflow in the smallest box."""
         box = box_around(self.voxels, 0)
         if not self.voxels.any():

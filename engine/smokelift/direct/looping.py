@@ -1,7 +1,5 @@
 """A sequence that repeats without a seam."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ in which the crossings do not balance passes through a hole of the surface and s
 majority. So parts may overlap, and a few holes do no harm (after Nooruddin and Turk 2003).
 """
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,7 +70,7 @@ class Mesh:
         object.__setattr__(self, "places", self.places.reshape(-1, *self.places.shape[-3:]))
 
     @staticmethod
-    def read(path: Path) -> Mesh:
+    def read(path: Path) -> "Mesh":
         """Read a binary STL file, in meters, Z up, or numbered ones from a pattern ``crate_####.stl`` (a # is a digit).
 
         Raises

@@ -1,7 +1,5 @@
 """Writes what has become of a sequence as another sequence, which opens in Blender as any other."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import replace

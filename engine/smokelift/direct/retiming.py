@@ -1,7 +1,5 @@
 """A sequence at another speed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

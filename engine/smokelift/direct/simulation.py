@@ -15,8 +15,6 @@ Advection keeps the mass, and MacCormack's correction the eddies that the grid s
 interpolation takes (`smokelift.direct.turbulence`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
@@ -101,7 +99,7 @@ class Simulation:
         driven = moved.with_faces(self._with_forces(moved, state, step))
         return project(driven) if solid is None else solid.projected(driven)
 
-    def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
+    def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> "Simulation":
         """The simulation in a larger box with what is placed there.
 
         The low and the high side move outwards by these ends, in voxels, along x, y and z.

@@ -1,7 +1,5 @@
 """The state of moving smoke: how it is read from a sequence, and what lies between two."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -44,7 +42,7 @@ class SmokeState:
     velocity: Velocity
     flame: Array | None = None
 
-    def scaled(self, factor: Array | np.float32) -> SmokeState:
+    def scaled(self, factor: Array | np.float32) -> "SmokeState":
         """The state with its smoke and fire times a factor, (nx, ny, nz) or one number."""
         flame = None if self.flame is None else self.flame * factor
         return replace(self, density=self.density * factor, flame=flame)

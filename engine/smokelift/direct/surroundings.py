@@ -1,7 +1,5 @@
 """What an artist places around the smoke: wind, turbulence, fans and obstacles, and what of it is solid at a step."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -10,8 +10,6 @@ step: random motion, new in each (stochastic backscatter: Mason and Thomson 1992
 faster would keep their directions, in which the smooth velocity has drawn them out.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How near a sequence is to known volumes and other cameras' clips, and whether it looks like smoke from all around."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Metrics of every frame, and their means over the frames: pictures and volumes beside the true ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Smoke on a turntable, lit, before black: the pictures in which it is compared from all around."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether smoke looks like smoke from every azimuth: beside the truth, or beside its own front."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

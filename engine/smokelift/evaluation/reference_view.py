@@ -1,7 +1,5 @@
 """Cameras whose clips a sequence is compared with."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path

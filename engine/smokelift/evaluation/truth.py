@@ -1,7 +1,5 @@
 """Scenes whose flow is known, as benchmarks/truth/bake.py writes them, and volumes on their grid."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -50,7 +48,7 @@ class Truth:
     closed: tuple[Side, ...]
 
     @staticmethod
-    def load(path: Path) -> Truth:
+    def load(path: Path) -> "Truth":
         """Read a truth.npz.
 
         Raises

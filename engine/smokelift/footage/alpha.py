@@ -8,8 +8,6 @@ The right one makes the smoke's own color vary least: how much light smoke sends
 its color does not. That is a fit of one color to each convention, so nothing has to be set.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any, Literal, get_args
 

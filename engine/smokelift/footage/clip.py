@@ -1,7 +1,5 @@
 """Clips: videos and picture sequences as lazily decoded linear frames, counted from 0 in the order of their times."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -81,7 +79,7 @@ class Clip:
         frames: tuple[int, int] | None = None,
         transfer: Transfer | None = None,
         mask: str | Path | None = None,
-    ) -> Clip:
+    ) -> "Clip":
         """Open a video, or a picture sequence.
 
         Parameters
@@ -202,15 +200,15 @@ class Clip:
         numbers = np.unique(np.linspace(0, len(self) - 1, min(count, len(self))).round())
         return [int(number) for number in numbers]
 
-    def whole(self) -> Clip:
+    def whole(self) -> "Clip":
         """Return all of the file, whatever part of it this clip is; of one with a mask a frame, what has one."""
         return self._with(frames=(0, self._count - 1))
 
-    def part(self, first: int, last: int) -> Clip:
+    def part(self, first: int, last: int) -> "Clip":
         """Return the frames of the file from one number to another, both included."""
         return self if self.numbers == range(first, last + 1) else self._with(frames=(first, last))
 
-    def as_filmed(self) -> Clip:
+    def as_filmed(self) -> "Clip":
         """Return the clip with what a mask hides, as the file has it."""
         return self if self.mask is None else self._with(_read=self._filmed, mask=None)
 
@@ -218,7 +216,7 @@ class Clip:
         self,
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
-    ) -> Clip:
+    ) -> "Clip":
         """Return the clip with each frame, by its number, replaced by another.
 
         ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
@@ -233,7 +231,7 @@ class Clip:
 
         return self._with(_read=read)
 
-    def registered(self, motion: Callable[[int, StoredPicture], Similarity]) -> Clip:
+    def registered(self, motion: Callable[[int, StoredPicture], Similarity]) -> "Clip":
         """Return the clip with each frame as a reference shows it; what a frame does not show of that is hidden.
 
         ``motion`` gives that of a frame, by its number in the file and what is stored of it.
@@ -255,13 +253,13 @@ class Clip:
         if self.mask is not None:
             self.mask.close()
 
-    def __enter__(self) -> Clip:
+    def __enter__(self) -> "Clip":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _with(self, frames: tuple[int, int] | None = None, **attributes: Any) -> Clip:
+    def _with(self, frames: tuple[int, int] | None = None, **attributes: Any) -> "Clip":
         """A clip of the same open file with other frames or attributes."""
         clip = copy(self)
         vars(clip).update(attributes)
@@ -278,7 +276,7 @@ class Clip:
         self.numbers = range(first, last + 1)
         self._stored, self._linear = Kept(), Kept()
 
-    def _behind(self, path: Path) -> Clip:
+    def _behind(self, path: Path) -> "Clip":
         """The clip with what a mask hides continued from around it."""
         mask, filmed = Mask.open(path, self.numbers, self.size), self._filmed
         read = partial(_kept, Kept(), STORED_BYTES, lambda number: mask.applied(number, filmed(number)))

@@ -4,8 +4,6 @@ Diffuse white is 1, as in an sRGB picture: BT.2408 puts it at 75 % of the signal
 Highlights exceed 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """What a clip format implements, and its frames: kept as they are stored, read in linear light."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -61,7 +59,7 @@ class StoredPicture:
         """Return the linear picture (rows, columns, 3), which may be read-only."""
         return self.values if self.table is None else look_up(self.table, self.values)
 
-    def cut(self, part: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> StoredPicture:
+    def cut(self, part: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> "StoredPicture":
         """Return the pixels that a function takes, whether they are codes or linear."""
         return StoredPicture(part(self.linear() if self.table is None else self.values), self.table)
 

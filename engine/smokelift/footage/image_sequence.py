@@ -1,7 +1,5 @@
 """Clips of numbered pictures."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -5,8 +5,6 @@ three equal channels. Alpha is shown over black: EXR colors are premultiplied in
 those of integer pictures are read by one of the three conventions of `alpha`.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import re

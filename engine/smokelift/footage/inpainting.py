@@ -1,7 +1,5 @@
 """Pictures of which a part is unknown: continued from what is known around it, and how wrong that is."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import ndimage
 

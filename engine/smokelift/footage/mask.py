@@ -8,8 +8,6 @@ A pixel is hidden or not: the mask's stored value counts as black or white, whic
 meaning: a frame that shows only a part of its smoke would be taken for one of thinner smoke.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -66,7 +64,7 @@ class Mask:
     close: Callable[[], None] = lambda: None
 
     @staticmethod
-    def open(path: Path, needed: range, size: tuple[int, int]) -> Mask:
+    def open(path: Path, needed: range, size: tuple[int, int]) -> "Mask":
         """Open one mask for all frames of a clip's file, or one for each.
 
         The path is a picture, or a video or a pattern ``mask_####.png`` whose frame n belongs to the file's frame n. A

@@ -8,8 +8,6 @@ pixels change from frame to frame: smoke has hardly any detail so fine. Lasting 
 background spread about it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,7 +58,7 @@ class Noise:
         total: Picture = np.sqrt(self.white**2 + self.lasting**2)
         return total
 
-    def averaged(self, pixels: float) -> Noise:
+    def averaged(self, pixels: float) -> "Noise":
         """Return the noise of means over a number of pixels."""
         return Noise(self.white / np.float32(np.sqrt(max(pixels, 1.0))), self.lasting)
 

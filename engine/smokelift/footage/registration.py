@@ -1,7 +1,5 @@
 """Registration: frames as a reference shows them, by a similarity of the picture plane each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -33,11 +31,11 @@ class Similarity:
     turn: complex = 1.0
     shift: complex = 0.0
 
-    def after(self, other: Similarity) -> Similarity:
+    def after(self, other: "Similarity") -> "Similarity":
         """Return this similarity of what another one yields."""
         return Similarity(self.turn * other.turn, self.turn * other.shift + self.shift)
 
-    def inverse(self) -> Similarity:
+    def inverse(self) -> "Similarity":
         """Return what undoes it."""
         return Similarity(1 / self.turn, -self.shift / self.turn)
 

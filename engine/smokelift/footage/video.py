@@ -11,8 +11,6 @@ interlacing (one field of each frame is used) and alpha. The converter is set to
 A video whose rate varies by more than 1 % is read at its mean rate: frame n is the picture on show at n / fps.
 """
 
-from __future__ import annotations
-
 import bisect
 from collections.abc import Iterator
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """NumPy archives that appear whole or not at all, and are read only if they are sound."""
 
-from __future__ import annotations
-
 import math
 import zipfile
 from collections.abc import Callable, Collection, Mapping

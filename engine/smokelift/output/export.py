@@ -11,8 +11,6 @@ What is left out or rounded does not show in a picture of 8 bits:
 Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

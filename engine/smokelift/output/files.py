@@ -1,7 +1,5 @@
 """The files in the directory of a sequence: their names, and their content."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import re

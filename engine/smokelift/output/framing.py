@@ -1,7 +1,5 @@
 """The part of a camera's picture that holds the smoke of all frames, from wherever around the smoke it is seen."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

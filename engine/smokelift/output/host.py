@@ -1,7 +1,5 @@
 """How OpenVDB files are written for the program that reads them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Pictures, sheets of pictures and videos on disk, which appear whole or not at all."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Iterable, Sequence

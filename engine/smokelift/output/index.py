@@ -1,7 +1,5 @@
 """`sequence.json`: what a sequence was made from, and which of its frames are finished."""
 
-from __future__ import annotations
-
 import json
 import math
 import platform
@@ -131,7 +129,7 @@ class Index:
         write_text(directory / INDEX, _lines(parts) + "\n")
 
     @staticmethod
-    def read(directory: Path) -> Index:
+    def read(directory: Path) -> "Index":
         """Read the file of a directory; SequenceError if it is missing, damaged or of another format."""
         path = directory / INDEX
         try:

@@ -3,8 +3,6 @@
 The operating system frees it when its process ends, however it ends, so no lock is ever stale.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import suppress

@@ -4,8 +4,6 @@ All of them show the part of the picture that holds smoke in some frame. The sce
 background behind the smoke, all others one color: the background's own where it has one, else black.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from collections.abc import Sequence as Rows
 from dataclasses import dataclass, replace

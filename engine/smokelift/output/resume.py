@@ -1,7 +1,5 @@
 """What an unfinished run needs to go on: its last frame at full precision, which OpenVDB's 16 bits do not hold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -51,7 +49,7 @@ class ResumeState:
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod
-    def read(path: Path, shape_of: Callable[[int], tuple[int, int, int]]) -> ResumeState | None:
+    def read(path: Path, shape_of: Callable[[int], tuple[int, int, int]]) -> "ResumeState | None":
         """Read the state, or return None if no frame was finished; OSError if the file is damaged.
 
         `shape_of` gives the voxels of a frame, by its number.

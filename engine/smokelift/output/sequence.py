@@ -1,7 +1,5 @@
 """Reads a sequence: the scene, the settings and the frames of a directory that a reconstruction wrote."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -66,7 +64,7 @@ class Sequence:
     _checksums: Mapping[str, str]
 
     @classmethod
-    def open(cls, directory: str | Path) -> Sequence:
+    def open(cls, directory: str | Path) -> "Sequence":
         """Open a directory that a reconstruction wrote.
 
         Raises
@@ -113,7 +111,7 @@ class Sequence:
         self._check(number)
         return self._boxes[int(number)]
 
-    def within(self, box: Domain) -> Sequence:
+    def within(self, box: Domain) -> "Sequence":
         """Return the sequence as it is in a box, with voxels in line with its own; what is outside is left out."""
         return replace(self, scene=replace(self.scene, domain=box))
 

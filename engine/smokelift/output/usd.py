@@ -4,8 +4,6 @@ Source: the schemas UsdVol Volume and OpenVDBAsset, the purposes ``render`` and 
 the material, which USD has no shader of its own for, the nodes of MaterialX 1.39 (`pbrlib`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

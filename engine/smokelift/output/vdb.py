@@ -9,8 +9,6 @@ OpenVDB puts the value of voxel (i, j, k) at its integer coordinates, so the tra
 voxel's center, `min + (i + 1/2) h`.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import json

@@ -1,7 +1,5 @@
 """What a camera sees of a density in a scene: the one way in which results are rendered."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

@@ -4,8 +4,6 @@ A frame counts once `sequence.json` lists it, which is written after the frame's
 at all. So a killed run leaves a directory that opens, and the same run can go on from it.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -126,7 +124,7 @@ class SequenceWriter:
         """The box of a finished frame."""
         return self._index.box(number, self._domain)
 
-    def __enter__(self) -> SequenceWriter:
+    def __enter__(self) -> "SequenceWriter":
         self._kinds = written_kinds(self._npz)
         try:
             self.directory.mkdir(parents=True, exist_ok=True)

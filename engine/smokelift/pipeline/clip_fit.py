@@ -5,8 +5,6 @@ little, rays go through every n-th pixel of every n-th row, n odd: the ray throu
 is that of its middle pixel, so these pixels are rendered exactly, and the mean over them stands for that over all.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

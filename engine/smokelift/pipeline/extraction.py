@@ -1,7 +1,5 @@
 """A clip's smoke as an element: with alpha, apart from what is behind it, before anything is reconstructed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -7,8 +7,6 @@ rho_1, rho_2 from their pictures alone; then for t = 3, 4, ...
     u_t    = VelRecon(rho_t-1, rho_t)               correction of the velocity
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 The default and the paper's method are two compositions; an ablation is a third, by `dataclasses.replace`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy

@@ -1,7 +1,5 @@
 """A clip's reconstruction: checked and prepared when it is made, computed when it is iterated over or written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

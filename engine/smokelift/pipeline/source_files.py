@@ -1,7 +1,5 @@
 """The files that a shot is read from, with what tells them from others of the same names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ run does, so the run takes that time and memory again. What other programs take 
 machine is now does not say how busy it will be. All constants: docs/experiments/memory-and-time.md.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator
@@ -129,7 +127,7 @@ class Workload:
     peak: int = 0
 
     @staticmethod
-    def of(shot: Shot, settings: Settings, began: tuple[float, float]) -> Workload:
+    def of(shot: Shot, settings: Settings, began: tuple[float, float]) -> "Workload":
         """Measure a shot that was prepared with settings from a `moment` on."""
         fractions = _smoky_fractions(shot, settings)
         smoky = len(shot.smoky) / len(shot.spread(SAMPLE_FRAMES))

@@ -1,7 +1,5 @@
 """What is known of a shot before it is reconstructed: what its set-up found, and what the rest of the page says."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any

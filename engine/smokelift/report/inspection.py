@@ -1,7 +1,5 @@
 """The page of a shot before it is reconstructed: pictures of what was found in the clip, above the facts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

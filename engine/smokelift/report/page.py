@@ -1,7 +1,5 @@
 """A page of pictures and facts, as a picture or as HTML that needs no other file."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

@@ -1,7 +1,5 @@
 """What is said of a result: where its parts come from, and which figures say that it may be wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

@@ -5,8 +5,6 @@ formats of their own: a noun is counted, and "place" says a depth in words. Tupl
 numbers or their format ends with " x", else by commas.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 SENTENCES: Mapping[str, str] = {

@@ -1,7 +1,5 @@
 """Findings as others take them: a sentence, a line of a table, and JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from string import Formatter
 from typing import Any

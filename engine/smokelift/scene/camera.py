@@ -1,7 +1,5 @@
 """Cameras: what one is, and how to point one at something or carry it around."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -76,7 +74,7 @@ class Camera:
         *,
         fov_y_degrees: float,
         size: tuple[int, int],
-    ) -> Camera:
+    ) -> "Camera":
         """Return a perspective camera that looks from one point at another.
 
         Parameters
@@ -134,7 +132,7 @@ class Camera:
                     table="camera",
                 )
 
-    def at(self, frame: int) -> Camera:
+    def at(self, frame: int) -> "Camera":
         """Return the camera as it stands in a frame, counted from 0 at the first that is used.
 
         Raises
@@ -150,7 +148,7 @@ class Camera:
             )
         return replace(self, matrix=self.matrices[frame], matrices=())
 
-    def resized(self, width: int, height: int) -> Camera:
+    def resized(self, width: int, height: int) -> "Camera":
         """Return the same camera with another number of pixels over the same field of view."""
         across, down = width / self.size[0], height / self.size[1]
         return replace(
@@ -162,7 +160,7 @@ class Camera:
             cy=self.cy * down,
         )
 
-    def cropped(self, x0: int, y0: int, width: int, height: int) -> Camera:
+    def cropped(self, x0: int, y0: int, width: int, height: int) -> "Camera":
         """Return the camera of a part of the picture whose top left pixel is (x0, y0)."""
         return replace(self, size=(width, height), cx=self.cx - x0, cy=self.cy - y0)
 

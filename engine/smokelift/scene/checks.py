@@ -1,7 +1,5 @@
 """Checks of the values in a scene: what is refused, and in which words."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -8,8 +8,6 @@ Every class of a scene checks its values where it is made, so a scene built in P
 refused for the same reasons; `smokelift.scene.tables` adds the file and the line to the message.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -121,7 +119,7 @@ class Scene:
                     "does not see the domain: no part of the box is in its picture; turn or move it", table=table
                 )
 
-    def with_frames(self, first: int, last: int) -> Scene:
+    def with_frames(self, first: int, last: int) -> "Scene":
         """Return the scene with another range of its clip's frames; the ranges of further views move with it.
 
         Raises
@@ -148,7 +146,7 @@ class Scene:
         return replace(self, clip=replace(self.clip, frames=(first, last)), views=tuple(views))
 
     @staticmethod
-    def load(path: str | Path) -> Scene:
+    def load(path: str | Path) -> "Scene":
         """Read a scene file.
 
         Relative paths in it are relative to the file; the returned ones are absolute.

@@ -1,7 +1,5 @@
 """The box that holds the smoke: its voxels, its walls and the places where smoke enters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -123,12 +121,12 @@ class Domain(Box):
         """Shape of an array of voxels, the same as ``resolution``."""
         return self.resolution
 
-    def about_center(self, resolution: tuple[int, int, int], voxel_size: float) -> Domain:
+    def about_center(self, resolution: tuple[int, int, int], voxel_size: float) -> "Domain":
         """Return the domain about the same center with other voxels, whose size is in meters."""
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
-    def with_at_most(self, longest: int) -> Domain:
+    def with_at_most(self, longest: int) -> "Domain":
         """Return the box, or a little less of it, with larger voxels: so many along its longest side at most."""
         # nor so large that a side has less than one; never beyond the box, where a light may stand
         times = min(max(self.resolution) / longest, min(self.resolution))
@@ -137,7 +135,7 @@ class Domain(Box):
         x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in self.resolution)
         return self.about_center((x, y, z), times * self.voxel_size)
 
-    def grown(self, below: tuple[int, ...], above: tuple[int, ...]) -> Domain:
+    def grown(self, below: tuple[int, ...], above: tuple[int, ...]) -> "Domain":
         """Return the domain with so many voxels more on its low sides and on its high sides, along x, y and z."""
         h = self.voxel_size
         a, b, c = (low - n * h for low, n in zip(self.min, below, strict=True))
@@ -156,14 +154,14 @@ class Domain(Box):
         x, y, z = (slice(first, first + n) for first, n in zip(starts, self.resolution, strict=True))
         return x, y, z
 
-    def coarser(self, times: int) -> Domain:
+    def coarser(self, times: int) -> "Domain":
         """The box with voxels so many times as wide; where they do not divide it evenly, it is larger."""
         x, y, z = (-(-count // times) for count in self.resolution)
         edge = times * self.voxel_size
         a, b, c = (low + count * edge for low, count in zip(self.min, (x, y, z), strict=True))
         return Domain(self.min, (a, b, c), (x, y, z))
 
-    def part(self, voxels: tuple[slice, ...]) -> Domain:
+    def part(self, voxels: tuple[slice, ...]) -> "Domain":
         """The box of some of the voxels."""
         h = self.voxel_size
         a, b, c = (low + h * span.start for low, span in zip(self.min, voxels, strict=True))

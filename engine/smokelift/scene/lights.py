@@ -1,7 +1,5 @@
 """The kinds of light. A new one has a class here and an entry in `LIGHT_TYPES`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,7 +53,7 @@ class DirectionalLight:
             direction = (x / length, y / length, z / length)
         set_fields(self, direction=direction, irradiance=color(self.irradiance, "irradiance"))
 
-    def samples(self) -> tuple[FiniteLight, ...]:
+    def samples(self) -> "tuple[FiniteLight, ...]":
         """Return the light itself; see `SampledLight`."""
         return (self,)
 
@@ -79,7 +77,7 @@ class PointLight:
         """Check the values."""
         set_fields(self, position=vector(self.position, "position"), intensity=color(self.intensity, "intensity"))
 
-    def samples(self) -> tuple[FiniteLight, ...]:
+    def samples(self) -> "tuple[FiniteLight, ...]":
         """Return the light itself; see `SampledLight`."""
         return (self,)
 

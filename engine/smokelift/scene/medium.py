@@ -1,7 +1,5 @@
 """What the smoke does to light: how much of it is removed, and how it is scattered."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Where points of the world lie in a camera's picture, and the rays through its pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from smokelift.checks.array_types import Doubles

@@ -12,8 +12,6 @@ each of them optional. Their keys are the fields of the classes of the same name
   ``height`` in meters of an orthographic picture, in place of ``fx`` and ``fy``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path

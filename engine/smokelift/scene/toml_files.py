@@ -1,7 +1,5 @@
 """TOML files that a user names, with the lines on which their tables and keys stand."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a camera filmed and what it sees behind the smoke; further cameras of a scene."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """What is found of the background of a clip: how it was found, and why the result may be wrong."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -6,8 +6,6 @@ let through of the background is subtracted there; the rest is light that the sm
 to be for it is the least-squares factor, zero at least.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -69,7 +67,7 @@ class CoarseView:
         """Pixels (rows, columns) that show smoke."""
         return matte(self.picture, self.plate).mask
 
-    def divided(self, gain: NDArray[np.float32]) -> CoarseView:
+    def divided(self, gain: NDArray[np.float32]) -> "CoarseView":
         """The view with its pictures and background divided by a gain (3,)."""
         plate = self.plate.through(lambda part: part / gain if part.ndim == 3 else part)
         return CoarseView(self.camera, plate, self.picture / gain, self.fitted / gain, self.held_out / gain)

@@ -1,7 +1,5 @@
 """What a clip shows before camera, box, medium and light are known: its background, its smoke and its fire."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -6,8 +6,6 @@ that density it shows the smoke, over how much brighter the input does. Both are
 until little is left. Figures: docs/experiments/further-views.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

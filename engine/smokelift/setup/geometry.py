@@ -1,7 +1,5 @@
 """Camera, box and resolution: as the scene gives them, or estimated from where the smoke is in the picture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from contextlib import suppress

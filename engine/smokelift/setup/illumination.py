@@ -6,8 +6,6 @@
 The second is judged by `coarse.held_out`. Figures: docs/selection.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ has one color, else many. Smoke has a color of its own if no source on the line 
 cameras balance it, or the background's, which stands in the same light. Figures: docs/experiments/unknown-light.md.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 What is open is estimated from the clip or defaulted; the findings say what, and why.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

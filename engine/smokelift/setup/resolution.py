@@ -5,8 +5,6 @@ values, in which a clip's noise is even. A grid shows what is coarser than two o
 contrast that is finer. Figures: docs/experiments/clip-pixels.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

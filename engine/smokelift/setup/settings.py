@@ -1,7 +1,5 @@
 """What a user may decide of a run besides the scene."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -133,7 +131,7 @@ class Settings:
         quality: Quality = "balanced",
         method: MethodName = "default",
         resolution: tuple[int, int, int] | Literal["auto"] | None = None,
-    ) -> Settings:
+    ) -> "Settings":
         """The settings of a quality and a method; SceneError if there is no such one."""
         if quality not in QUALITIES:
             raise SceneError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}.")

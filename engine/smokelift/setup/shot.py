@@ -1,7 +1,5 @@
 """A shot: a clip with everything about it decided."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -35,7 +33,7 @@ class ShotView:
     source: Image | None = None
 
     @staticmethod
-    def before(domain: Domain, clip: Clip, camera: Camera, plates: Plate) -> ShotView:
+    def before(domain: Domain, clip: Clip, camera: Camera, plates: Plate) -> "ShotView":
         """Return a camera's view of a domain; CameraError if no frame shows it."""
         for frame in range(len(camera.matrices)):
             with suppress(CameraError):

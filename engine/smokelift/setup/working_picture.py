@@ -1,7 +1,5 @@
 """The working picture: a frame cropped to the domain and reduced to about one pixel a voxel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +30,7 @@ class WorkingPicture:
         columns, rows = self.camera.size
         return self.width * self.height / (columns * rows)
 
-    def resized(self, columns: int, rows: int) -> WorkingPicture:
+    def resized(self, columns: int, rows: int) -> "WorkingPicture":
         """Return the same part at another number of pixels."""
         return replace(self, camera=self.camera.resized(columns, rows))
 

@@ -1,7 +1,5 @@
 """Semi-Lagrangian advection of densities and velocities."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal, TypeVar
 

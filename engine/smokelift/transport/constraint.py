@@ -10,8 +10,6 @@ Forces on the given faces make up the difference from P u0: the immersed boundar
 (2007), with faces in place of points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

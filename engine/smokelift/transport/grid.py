@@ -4,8 +4,6 @@ The box is divided into cubes (voxels). A vector field is stored as its normal c
 Harlow and Welch 1965), where its divergence and the pressure projection are exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self, TypeVar

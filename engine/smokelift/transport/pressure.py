@@ -1,7 +1,5 @@
 """Divergence, and the pressure projection that removes it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

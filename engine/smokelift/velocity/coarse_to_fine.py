@@ -1,7 +1,5 @@
 """The default estimator: on one coarse grid, or between two densities alone from coarse grids to their own."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
@@ -105,7 +103,7 @@ class CoarseToFine:
         predicted = predict_velocity(velocity, dt)
         return smooth_velocity(predicted) if self.settings.coarsening else predicted
 
-    def of_one_view(self) -> CoarseToFine:
+    def of_one_view(self) -> "CoarseToFine":
         """The estimator with more smoothness."""
         return replace(self, settings=replace(self.settings, smoothness=ONE_VIEW_SMOOTHNESS * self.settings.smoothness))
 

@@ -1,7 +1,5 @@
 """What every way to estimate a velocity has in common."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -94,7 +92,7 @@ class VelocityEstimator(Protocol):
         """The velocity of the next frame if no force acts, on the grid of the one given: see `predict_velocity`."""
         ...
 
-    def of_one_view(self) -> VelocityEstimator:
+    def of_one_view(self) -> "VelocityEstimator":
         """The estimator for densities that one camera alone saw, standing still; itself if it makes no difference."""
         ...
 

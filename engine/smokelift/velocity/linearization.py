@@ -1,7 +1,5 @@
 """The change between two densities as a linear function of the velocity, and the quadratic problem that it poses."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +39,7 @@ class Linearization:
     smoke: npt.NDArray[np.bool_]
     scale: float
 
-    def with_dissipation(self, fraction: float) -> Linearization:
+    def with_dissipation(self, fraction: float) -> "Linearization":
         """The change that is left where a fraction of the smoke dissolves."""
         return replace(self, offset=self.offset + np.float32(fraction) * self.carried) if fraction else self
 

@@ -15,8 +15,6 @@ d is the fraction of the smoke that dissolves. Below zero smoke gets denser, as 
 either would be fitted as motion. The regularizer penalises the distance from the velocity that is fitted here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A velocity of a coarser grid on the density's, where smoke is and where it can arrive: most of a box holds none."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ well (docs/experiments/velocity-solver.md). Noise would count as well, so noisy 
 are smooth ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

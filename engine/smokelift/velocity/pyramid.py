@@ -1,7 +1,5 @@
 """Densities and velocities on grids that are each half as fine as the one before."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -14,8 +14,6 @@ assumed, and the expected velocity, the mean over all that they may be, hardly c
 (docs/experiments/velocity-one-view.md).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -96,7 +94,7 @@ def _line(direction: NDArray[np.float64], deviation: float) -> Array:
 
 
 def _correction(
-    image: _ImageGrid, motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
+    image: "_ImageGrid", motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
 ) -> Array:
     """What the motion (cells, 2) of the picture lacks, in columns and rows a frame."""
     columns, rows = (image.pixels @ motion).T.reshape(2, *after.shape)
@@ -144,7 +142,7 @@ class _ImageGrid:
 
     @staticmethod
     @lru_cache(maxsize=2)
-    def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> _ImageGrid:
+    def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> "_ImageGrid":
         """The cells for a grid from the domain's low corner on, its voxels so many meters wide."""
         centers = np.array(domain.min) + (np.indices(shape).reshape(3, -1).T + 0.5) * voxel_size
         at, _ = project_points(camera, centers)

@@ -1,7 +1,5 @@
 """``smokelift batch``: a list of shots, on this machine or on many."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import threading

@@ -1,7 +1,5 @@
 """``smokelift continue``, ``retime`` and ``loop``: what is made of a sequence after its clip."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Iterable, Iterator

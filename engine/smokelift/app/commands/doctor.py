@@ -1,7 +1,5 @@
 """``smokelift doctor``: versions, devices and what is missing."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform

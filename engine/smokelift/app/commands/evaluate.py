@@ -1,7 +1,5 @@
 """``smokelift evaluate``: whether a sequence looks like smoke from all around, and how near it is to what is known."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -1,7 +1,5 @@
 """``smokelift export``: small OpenVDB files, a proxy and a USD file of a sequence, for other programs."""
 
-from __future__ import annotations
-
 import argparse
 import time
 from typing import get_args

@@ -1,7 +1,5 @@
 """``smokelift extract``: the smoke of a clip as an element, with alpha, for a compositor."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

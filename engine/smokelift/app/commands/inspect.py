@@ -1,7 +1,5 @@
 """``smokelift inspect``: what a run would assume, choose and spend."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """``smokelift reconstruct``: a clip or scene file to a VDB sequence."""
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """``smokelift render``: an image or video of a sequence."""
 
-from __future__ import annotations
-
 import argparse
 import math
 

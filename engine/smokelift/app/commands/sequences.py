@@ -1,7 +1,5 @@
 """``smokelift check``, ``preview`` and ``proxy``: is a sequence whole, what does it look like, and coarse copies."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """How near a velocity is to the truth, and whether it carries a density as the next frame shows it."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage

@@ -1,7 +1,5 @@
 """Whether pictures of smoke have the same texture, wherever its parts are: distributions of small patches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -50,7 +48,7 @@ class PatchStatistics:
     spread: Doubles
 
     @staticmethod
-    def of(picture: npt.ArrayLike) -> PatchStatistics:
+    def of(picture: npt.ArrayLike) -> "PatchStatistics":
         """Return the statistics of a picture (rows, columns) of smoke before black.
 
         Raises
@@ -65,7 +63,7 @@ class PatchStatistics:
         quantiles = np.stack([_quantiles(scale) for scale in projected])
         return PatchStatistics(quantiles, np.stack([scale.std(axis=1) for scale in projected]))
 
-    def distance(self, reference: PatchStatistics) -> float:
+    def distance(self, reference: "PatchStatistics") -> float:
         """Return the sliced Wasserstein distance from a reference, in units of its spread; the mean over the scales.
 
         Elnekave and Weiss, "Generating natural images with direct patch distributions matching" (ECCV 2022). Every
@@ -78,7 +76,7 @@ class PatchStatistics:
         away, spread = (np.sqrt(np.mean(values[:, :DIRECTIONS] ** 2, axis=1)) for values in self._beside(reference))
         return _mean_ratio(away, spread)
 
-    def texture_distance(self, reference: PatchStatistics) -> float:
+    def texture_distance(self, reference: "PatchStatistics") -> float:
         """Return the distance on the waves, each in units of its own spread; the mean over scales and waves.
 
         All sizes and directions of detail count alike, so it sees what is constant along rows, soft or noisy, however
@@ -87,7 +85,7 @@ class PatchStatistics:
         away, spread = (values[:, DIRECTIONS:].ravel() for values in self._beside(reference))
         return _mean_ratio(away, spread)
 
-    def _beside(self, reference: PatchStatistics) -> tuple[Doubles, Doubles]:
+    def _beside(self, reference: "PatchStatistics") -> tuple[Doubles, Doubles]:
         """Distances on every direction, and the reference's spread there, [scale, direction]."""
         return np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=2)), reference.spread
 

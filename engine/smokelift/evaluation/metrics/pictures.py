@@ -1,7 +1,5 @@
 """How alike two pictures are."""
 
-from __future__ import annotations
-
 import math
 
 import numpy.typing as npt

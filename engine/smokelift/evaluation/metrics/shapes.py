@@ -3,8 +3,6 @@
 Lengths are in units of the smoke's width: its standard deviation across its rows, the mean over the smoke.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +52,7 @@ class RayShapes:
     masses: Doubles
 
     @staticmethod
-    def of(smoke: npt.ArrayLike) -> RayShapes | None:
+    def of(smoke: npt.ArrayLike) -> "RayShapes | None":
         """Measure smoke (columns, voxels along the rays, rows); None where there is none.
 
         Raises

@@ -1,7 +1,5 @@
 """How near a density is to the truth; and what every metric demands: arrays of one shape, whose values are finite."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
