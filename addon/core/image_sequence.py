@@ -42,10 +42,7 @@ class ImageSequence:
 def image_sequence_from(first: Path) -> ImageSequence | None:
     """The sequence that begins with a picture; None where there is none, or most of it is missing.
 
-    Parameters
-    ----------
-    first
-        A file whose name ends with its number, not below zero.
+    The name of the picture ends with its number, not below zero.
     """
     try:
         return _image_sequence_at(first, first.parent.stat().st_mtime_ns)

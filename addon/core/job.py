@@ -77,10 +77,7 @@ def engine_command(arguments: Sequence[str]) -> list[str]:
 def require_fitting_zip() -> None:
     """Refuse the engine of a zip for another Python or another platform, which Blender installs without a word.
 
-    Raises
-    ------
-    ShotError
-        With the name of the zip that fits.
+    The ShotError names the zip that fits.
     """
     pythons = sorted(folder.name.removeprefix("python") for folder in HOME.glob("python3.*"))
     try:

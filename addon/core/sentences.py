@@ -89,14 +89,8 @@ OF_RESULT = ("dissolving smoke",)
 def sentence(message: Mapping[str, Any], before: int = 0, doubts: Collection[str] = ()) -> str:
     """A message of the engine, as the panel shows it.
 
-    Parameters
-    ----------
-    message
-        With the engine's ``text``; with its ``kind`` and ``figures`` if it has those.
-    before
-        Number of the clip's frames before the first of the result.
-    doubts
-        Kinds of what was said before of why the result may be wrong.
+    It has a ``text``, and most have a ``kind`` and ``figures``. Of the clip's frames so many are ``before`` the
+    first of the result. ``doubts`` are kinds of what was said before of why the result may be wrong.
     """
     kind = message.get("kind", "")
     words, add = SENTENCES.get(kind), before if kind in OF_RESULT else 1

@@ -77,15 +77,8 @@ class Take:
     def copy_mask(self, drawn: Path) -> str:
         """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
 
-        Parameters
-        ----------
-        drawn
-            A picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones.
-
-        Raises
-        ------
-        ShotError
-            If the folder cannot be written to.
+        It is a picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones. ShotError if the folder
+        cannot be written to.
         """
         beside = self.directory.name
         files = sorted(drawn.parent.glob(drawn.name.replace("####", "*")))
@@ -102,23 +95,10 @@ class Take:
     def write_directed(
         self, direction: str, source: Take, options: Sequence[str], meshes: Sequence[bytes] = ()
     ) -> None:
-        """Write what is made of another take.
+        """Write what is made of another take, by a direction of `DIRECTIONS`.
 
-        Parameters
-        ----------
-        direction
-            A key of `DIRECTIONS`.
-        source
-            The other take.
-        options
-            The engine's, with those of its values that are numbers.
-        meshes
-            Obstacles, as a binary STL file; one for each frame if they move.
-
-        Raises
-        ------
-        ShotError
-            If the folder cannot be written to.
+        The options are the engine's, with those of its values that are numbers. Meshes are obstacles, as a
+        binary STL file, one for each frame if they move. ShotError if the folder cannot be written to.
         """
         request = _request(options, direction=direction, source=_relative_path(self.directory.parent, source.directory))
         name = self.directory.name
@@ -143,15 +123,8 @@ class Take:
     def update_moved_files(self, files: Mapping[tuple[str, str], Path]) -> None:
         """Write today's paths into its scene file for files that are not where they were: the project was moved.
 
-        Parameters
-        ----------
-        files
-            Today's path by the table it is in, and its key there.
-
-        Raises
-        ------
-        ShotError
-            If the scene file is damaged or cannot be written.
+        Today's path is given by the table that it is in, and its key there. ShotError if the scene file is
+        damaged or cannot be written.
         """
         try:
             tables = tomllib.loads(self.scene_file.read_text(encoding="utf-8"))
@@ -365,13 +338,7 @@ def _numbers(folder: Path) -> set[int]:
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """The text of a TOML file.
-
-    Parameters
-    ----------
-    tables
-        Tables and lists of tables by name; their values are numbers, texts, or nested lists of those.
-    """
+    """The text of a TOML file, whose tables, and lists of them, hold numbers, texts, or nested lists of those."""
     parts = []
     for name, content in tables.items():
         if isinstance(content, list):

@@ -83,14 +83,8 @@ class ChangesScene(ActsOnSmoke):
 def operator(label: str, *needs: Need, base: type = ActsOnSmoke, **attributes: Any) -> Callable[[Act], type]:
     """Make an operator of what it does: the class SMOKELIFT_OT_NAME, with the function's name and docstring.
 
-    Parameters
-    ----------
-    label
-        What its button says.
-    needs, base
-        When it can be used, and what it is besides.
-    attributes
-        Further ones of the class.
+    Its button says the label, and it can be used where nothing is missing that it needs. It has the base and
+    further attributes.
     """
 
     def made(act: Act) -> type:
@@ -128,19 +122,11 @@ Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]
 
 
 def panels(name: str, label: str, draw: Draw, *needs: Need, **attributes: Any) -> tuple[type, ...]:
-    """The panels of the tab in both editors.
+    """The panels of the tab in both editors, whose classes have further attributes.
 
-    Parameters
-    ----------
-    name, label
-        For Blender, SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME, and for the user. Without a name it is the tab
-        itself, with one a part of it, closed at first.
-    draw
-        Draws it, with the names of settings on their left.
-    needs
-        When it is shown.
-    attributes
-        Further ones of both classes.
+    Blender knows them as SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME. Without a name it is the tab itself,
+    with one a part of it, closed at first. Names of settings are drawn on their left. It is shown where nothing is
+    missing that it needs.
     """
 
     def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:

@@ -66,14 +66,8 @@ def draw_doubts(
 ) -> None:
     """Why a result may be wrong, what is left to do about it, and the button that does it.
 
-    Parameters
-    ----------
-    layout, smoke
-        Where, and whose settings.
-    doubts
-        Each a kind and words.
-    said
-        Kinds that stand elsewhere in the tab, to which these are added.
+    A doubt is a kind and words. Kinds that are ``said`` elsewhere in the tab are left out, and these are added to
+    them.
     """
     settings = smoke.smokelift
     given = {

@@ -33,16 +33,10 @@ STL_HEADER = 80
 
 
 def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
-    """What the engine is asked to do to the take that a smoke shows.
+    """What the engine is asked to do to the take that a smoke shows: its command, its options, and obstacles.
 
-    Returns
-    -------
-    The engine's command, its options, and obstacles as a binary STL file, one for each frame if they move.
-
-    Raises
-    ------
-    ShotError
-        If a setting or an object cannot be used.
+    Those are a binary STL file, one for each frame if they move. ShotError if a setting or an object cannot be
+    used.
     """
     settings = smoke.smokelift.directing
     numbers = volume.shown_numbers(smoke)

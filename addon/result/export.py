@@ -106,13 +106,7 @@ def copy_later(obj: bpy.types.Object, name: str, offset: int, repeat: bool) -> b
 
 
 def complete_import(folder: Path) -> None:
-    """Give Volumes that were imported from the USD file of an export what the note beside it says.
-
-    Parameters
-    ----------
-    folder
-        Of the USD file; one without such a note changes nothing.
-    """
+    """Give Volumes that were imported from the USD file of an export what the note beside it says, if there is one."""
     try:
         note = json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))
         grids, _ = note["grids"], note["medium"]

@@ -19,16 +19,10 @@ from .smoke_takes import Run, runs, show_while_made
 
 
 def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
-    """Append a take to the queue; without a window, wait for its end.
+    """Append a take to the queue; without a window, wait for its end. ShotError if it cannot be made.
 
-    ShotError if it cannot be made.
-
-    Parameters
-    ----------
-    smoke, take
-        What is made.
-    settings
-        Those that it is made with, as `shot_check.settings_text` has them; empty if they are not the smoke's own.
+    The settings are those that it is made with, as `shot_check.settings_text` has them; empty if they are not the
+    smoke's own.
     """
     try:
         words = engine_command(take.arguments() + thread_options())

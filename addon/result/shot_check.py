@@ -41,13 +41,7 @@ WORDS = {
 
 
 def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
-    """What was found or assumed, in a line each that fits the sidebar.
-
-    Parameters
-    ----------
-    facts
-        The engine's, each with ``what`` it is about and its ``short`` value.
-    """
+    """What was found or assumed, in a line each that fits the sidebar, by the engine's facts."""
     return [f"{WORDS[fact['what']]}: {fact['short']}" for fact in facts if fact["what"] in WORDS]
 
 

@@ -112,21 +112,11 @@ writing_job = SideJob()
 def write_files(
     smoke: bpy.types.Object, operator: str, words: list[str], complete: Callable[[bpy.types.Object], str | None]
 ) -> None:
-    """Have the engine write files; without a window, wait for them.
+    """Have the engine write files of a smoke, by its arguments; without a window, wait for them.
 
-    Parameters
-    ----------
-    smoke, operator
-        What they are of, and the identifier of the operator that asks for them.
-    words
-        The engine's arguments.
-    complete
-        Called with the smoke when they are written; may return what is said of them in place of the engine's words.
-
-    Raises
-    ------
-    ShotError
-        If there is no engine, or, without a window, if it failed.
+    An operator of that identifier asks for them. When they are written, ``complete`` is called with the smoke, and
+    may return what is said of them in place of the engine's words. ShotError if there is no engine, or, without a
+    window, if it failed.
     """
 
     def end(smoke: bpy.types.Object, job: Job) -> None:

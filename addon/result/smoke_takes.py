@@ -118,13 +118,7 @@ def takes_of_file() -> list[Take]:
 
 
 def write_take(smoke: bpy.types.Object) -> Take:
-    """Write the files of a new take.
-
-    Raises
-    ------
-    ShotError
-        If the shot is unusable, or the folder cannot be written to.
-    """
+    """Write the files of a new take; ShotError if the shot is unusable, or the folder cannot be written to."""
     tables = shot_tables(smoke)
     take = _next_take(smoke)
     if smoke.smokelift.drawn_mask is not None:
@@ -170,17 +164,7 @@ def _next_take(smoke: bpy.types.Object) -> Take:
 def move_results(smoke: bpy.types.Object, folder: Path) -> None:
     """Show the result on show from the folder that its files were moved to, which holds all of the smoke's from now on.
 
-    Parameters
-    ----------
-    smoke
-        Shows a result whose files are missing.
-    folder
-        Holds the takes, or is the one on show.
-
-    Raises
-    ------
-    ShotError
-        If that result is not there.
+    The folder may be the result itself. ShotError if that is not there.
     """
     settings, name = smoke.smokelift, volume.shown_take(smoke).directory.name
     take = next((take for take in (Take(folder / name), Take(folder)) if take.directory.name == name), None)
@@ -236,9 +220,7 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
 def present(smoke: bpy.types.Object, take: Take) -> str:
     """Show a take's finished frames, and the camera that the engine assumed if it did.
 
-    Returns
-    -------
-    What else was changed in the scene, as a sentence; empty if nothing was.
+    Returns what else was changed in the scene, as a sentence; empty if nothing was.
     """
     index, first = take.read().index, volume.shown_take(smoke) is None
     if not volume.show(smoke, take) or index is None:

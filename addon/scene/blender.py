@@ -25,14 +25,7 @@ TOLERANCE = 1e-5
 def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
     """The absolute path, without the ``..`` that Blender's relative paths begin with: so it can be compared.
 
-    Parameters
-    ----------
-    path
-        As Blender keeps it; ``//`` is the folder of the .blend, or of the library.
-    library
-        The .blend that the owner of the path is linked from.
-    folder
-        Of the .blend; by default of the open one, or of the library.
+    ``//`` is the folder of the library that the owner of the path is linked from, else that given, else the .blend's.
     """
     found = bpy.path.abspath(path, start=None if folder is None else str(folder), library=library)
     return Path(os.path.abspath(found))  # noqa: PTH100 - resolve() follows links, which Blender keeps
@@ -41,12 +34,7 @@ def absolute(path: str, library: bpy.types.Library | None = None, folder: Path |
 def relative(path: Path, folder: Path | None = None) -> str:
     """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute.
 
-    Parameters
-    ----------
-    path
-        Absolute.
-    folder
-        Of the .blend; by default of the open one.
+    The folder is that of the .blend, by default of the open one.
     """
     if folder is None and not bpy.data.filepath:
         return str(path)
@@ -98,16 +86,8 @@ def thread_options() -> list[str]:
 def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
     """Set a value for the first time, or again if it is still as it was set last.
 
-    Parameters
-    ----------
-    owner
-        Data-block that remembers what was set, in the custom property ``smokelift_NAME``.
-    name
-        Of the value among those of the owner.
-    holder, attribute
-        Where Blender keeps the value: a number, a vector or a matrix.
-    value
-        The value.
+    The owner remembers what was set, in its custom property ``smokelift_NAME``. Blender keeps the value, a number,
+    a vector or a matrix, in an attribute of the holder.
     """
     before = owner.get(_property_name(name))
     if before is None or _equal(_numbers(getattr(holder, attribute)), list(before)):

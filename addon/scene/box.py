@@ -69,12 +69,8 @@ def keep_camera_outside(
 ) -> dict[str, Any]:
     """The domain, grown to the side away from a camera that would else stand in what cubes add to the box.
 
-    A camera on a side of the box counts as outside, for Blender rounds its place to 32 bits.
-
-    Raises
-    ------
-    ShotError
-        If the camera stands inside the box itself.
+    A camera on a side of the box counts as outside, for Blender rounds its place to 32 bits. ShotError if it stands
+    inside the box itself.
     """
     eyes = [Vector(row[3] for row in pose[:3]) for pose in camera.get("matrices") or [camera["matrix"]]]
 

@@ -22,16 +22,9 @@ CAMERA_SAMPLES = 9
 def camera_table(
     smoke: bpy.types.Object, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix
 ) -> dict[str, Any]:
-    """The camera as a pinhole (or orthographic) camera of the clip's size.
+    """The camera as a pinhole (or orthographic) camera of the clip's size, as it is evaluated in a frame.
 
-    Parameters
-    ----------
-    smoke
-        Gives the clip, and its scene the pixel aspect.
-    camera, depsgraph
-        Evaluated in the frame that counts.
-    rotation
-        From the engine's axes to Blender's (3x3).
+    The rotation (3x3) is from the engine's axes to Blender's.
     """
     width, height = smoke.smokelift.clip.size
     render = scene_of(smoke).render

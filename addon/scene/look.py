@@ -99,14 +99,9 @@ PRESETS: dict[str, tuple[str, str, dict[str, Any]]] = {
 
 
 def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
-    """Give a smoke a material of what was fitted to the clip.
+    """Give a smoke a material, if it has none, of what was fitted to the clip: medium and domain of a take's scene.
 
-    Parameters
-    ----------
-    smoke
-        Its Volume gets a material if it has none; of one that has no node of ours, nothing is changed.
-    scene
-        Tables of a take's scene: its medium and its domain.
+    In a material without our node nothing is changed.
     """
     volume = smoke.data
     if not volume.materials or volume.materials[0] is None:

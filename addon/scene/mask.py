@@ -31,17 +31,7 @@ POINT = ("co", "handle_left", "handle_right", "weight")
 def mask_path(smoke: bpy.types.Object, quick: bool = False) -> Path | None:
     """The picture of a smoke's mask, or the pattern of those that it has for every frame; None without a mask.
 
-    Parameters
-    ----------
-    smoke
-        The smoke.
-    quick
-        Of a drawn mask that moves, only the current frame.
-
-    Raises
-    ------
-    ShotError
-        If the file is missing, or nothing is drawn.
+    A ``quick`` one is of the current frame only. ShotError if the file is missing, or nothing is drawn.
     """
     settings = smoke.smokelift
     if settings.drawn_mask is not None:

@@ -139,16 +139,9 @@ def fit_interpolation(smoke: bpy.types.Object, wanted: bool) -> None:
 
 
 def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> None:
-    """Say where in the take a smoke is in a frame of the scene.
+    """Say where in the take a smoke is in a frame of the scene, if it has frames between.
 
-    Parameters
-    ----------
-    smoke
-        With or without frames between.
-    place
-        The place in frames, as an expression for a driver.
-    seconds
-        From one frame to the next.
+    The place, in frames, is an expression for a driver. From one frame to the next it is so many seconds.
     """
     modifier = FRAMES_BETWEEN.modifier(smoke)
     if modifier is None:

@@ -40,18 +40,10 @@ def file_group(
     outputs: Sequence[tuple[str, str]],
     build: Callable[[bpy.types.NodeTree], None],
 ) -> bpy.types.NodeTree:
-    """The file's own node group, which the artist may have changed, or else a new one.
+    """The file's own node group, which the artist may have changed, or else a new one, whose nodes ``build`` adds.
 
-    Parameters
-    ----------
-    name, kind
-        Its name, and the type of its tree.
-    mark
-        Custom property by which it is found under any name.
-    inputs, outputs
-        Its sockets; of the outputs name and type.
-    build
-        Adds the nodes to a new one.
+    The kind is that of its tree. The mark is the custom property by which it is found under any name. Outputs are
+    names and types.
     """
     for group in bpy.data.node_groups:
         if group.library is None and group.get(mark):
@@ -76,14 +68,9 @@ def file_group(
 def add_node(
     tree: bpy.types.NodeTree, kind: str, column: float, row: float, *inputs: Any, **settings: Any
 ) -> bpy.types.Node:
-    """Add a node at a place of the grid that `SPACING` makes.
+    """Add a node at a place of the grid that `SPACING` makes, with these values of its attributes.
 
-    Parameters
-    ----------
-    inputs
-        What feeds its first inputs, in their order: sockets of other nodes, or values.
-    settings
-        Values of its attributes, which are set before the inputs.
+    Sockets of other nodes, or values, feed its first inputs, in their order, after the attributes are set.
     """
     node = tree.nodes.new(kind)
     node.location = (SPACING * column, -SPACING * row)

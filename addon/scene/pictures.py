@@ -50,21 +50,7 @@ def picture_scene(
 def write_pictures(clip: bpy.types.MovieClip, first: int, last: int, prefix: Path, undistort: bool = False) -> Path:
     """Write what a clip shows in some frames of the scene, as PNG; returns the first picture.
 
-    Parameters
-    ----------
-    clip
-        The clip.
-    first, last
-        Frames of the scene.
-    prefix
-        The pictures' path, to which Blender adds the frame and the suffix.
-    undistort
-        Whether the distortion of the clip's lens is taken out.
-
-    Raises
-    ------
-    RuntimeError
-        If they cannot be written.
+    Blender adds the frame and the suffix to the prefix. RuntimeError if they cannot be written.
     """
     with picture_scene(clip) as (scene, tree, shown):
         scene.frame_start, scene.frame_end = first, last

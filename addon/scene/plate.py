@@ -83,14 +83,7 @@ def show_plate(
 ) -> None:
     """Have a shader show the clean plate of the result on show, or one color if the background is that.
 
-    Parameters
-    ----------
-    smoke
-        Shows a result.
-    tree, shader
-        The shader, which has an input Color.
-    place
-        Makes coordinates in the plate; asked for them only if no texture is connected yet.
+    It has an input Color. If no texture is connected to that yet, ``place`` makes coordinates in the plate.
     """
     color, background = shader.inputs["Color"], shown_background(smoke)
     if "image" not in background:
@@ -161,14 +154,7 @@ def _new_picture(camera: bpy.types.Camera, source: str) -> bpy.types.CameraBackg
 def synchronize_plate(smoke: bpy.types.Object, image: bpy.types.Image, user: Any) -> None:
     """Keep a plate of many pictures in step with the clip; one of a moving camera has a picture for every frame.
 
-    Parameters
-    ----------
-    smoke
-        Shows a result.
-    image
-        The plate.
-    user
-        What says which of its frames is shown: an image user, or a node of the compositor.
+    The user, an image user or a node of the compositor, says which of them is shown.
     """
     clip, tracked = smoke.smokelift.clip, "matrices" in volume.shown_index(smoke)["scene"]["camera"]
     number = re.search(r"(\d+)\.\w+$", image.filepath)

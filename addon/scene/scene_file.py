@@ -37,19 +37,10 @@ def footage_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, An
 
 
 def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
-    """The tables of a scene file.
+    """The tables of a scene file, of which the smoke's settings decide what is used of its scene.
 
-    Parameters
-    ----------
-    smoke
-        Its settings decide what is used of its scene.
-    quick
-        Read the camera, and a mask that is drawn, in the current frame only.
-
-    Raises
-    ------
-    ShotError
-        If something is missing or unusable.
+    ``quick`` reads the camera, and a mask that is drawn, in the current frame only. ShotError if something is
+    missing or unusable.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
     tables = footage_tables(smoke, quick)

@@ -70,9 +70,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
 def set_up(smoke: bpy.types.Object) -> list[str]:
     """Make a render of the result on show match the clip from the camera, in the parts that are ticked.
 
-    Returns
-    -------
-    What an artist should know of it, a sentence each.
+    Returns what an artist should know of it, a sentence each.
     """
     settings, scene, index = smoke.smokelift, scene_of(smoke), volume.shown_index(smoke)
     said = []

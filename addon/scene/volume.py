@@ -37,11 +37,9 @@ PROVENANCE = "smokelift_provenance"
 
 
 def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
-    """Show a take's finished frames in a smoke. What the artist changed of its place and material stays.
+    """Show a take's finished frames in a smoke, which is returned; None while there are none.
 
-    Returns
-    -------
-    The smoke, or None while no frame is finished.
+    What the artist changed of its place and material stays.
     """
     index = take.read().index
     if not index or not index["frames"]:
@@ -146,11 +144,9 @@ def take_before(smoke: bpy.types.Object) -> Take | None:
 
 
 def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
-    """Show a take in a copy of a smoke, on its right; it is no smoke itself, and can be deleted like any object.
+    """Show a take in a copy of a smoke, on its right, which is returned; None if no frame is finished.
 
-    Returns
-    -------
-    The copy, or None if no frame is finished.
+    It is no smoke itself, and can be deleted like any object.
     """
     index = take.read().index
     if not index or not index["frames"]:
