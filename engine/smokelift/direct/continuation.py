@@ -94,26 +94,9 @@ def continue_sequence(
 ) -> Iterator[Written]:
     """Write a sequence up to a frame, and then what a simulation makes of it.
 
-    Parameters
-    ----------
-    sequence
-        See `smokelift.direct.new_sequence.open_source`.
-    out
-        Directory to write to.
-    continuation
-        How it goes on.
-    npz, resume
-        As in `smokelift.output.writer.SequenceWriter`.
-
-    Yields
-    ------
-    The number and the figures of every frame, which is written already.
-
-    Raises
-    ------
-    ValueError
-        If there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies
-        are too small for the voxels, or a file cannot be read or written.
+    Arguments and what it yields are those of `smokelift.direct.new_sequence.directed_writer`. It is a ValueError if
+    there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies are
+    too small for the voxels, or a file cannot be read or written.
     """
     start = sequence.frames[-1] if continuation.start is None else continuation.start
     copied = tuple(number for number in sequence.frames if number <= start)

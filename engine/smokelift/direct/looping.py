@@ -62,13 +62,7 @@ def default_overlap(count: int) -> int:
 
 
 def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
-    """Return how many frames a loop has.
-
-    Raises
-    ------
-    ValueError
-        If there are no such frames, or too few.
-    """
+    """Return how many frames a loop has; ValueError if there are no such frames, or too few."""
     there = f"{sequence.directory}: has the frames {sequence.frames[0]} to {sequence.frames[-1]}"
     if not sequence.frames[0] <= first <= last <= sequence.frames[-1]:
         raise ValueError(f"{there}, not {first} to {last}.")
@@ -86,32 +80,13 @@ def loop_sequence(
 ) -> Iterator[Written]:
     """Write a part of a sequence so that its last frame leads to its first.
 
-    The part overlaps with its own start. In the overlap the motion from the last density to the first is estimated, the
-    last frames are advected along it and the first ones back, and the two are mixed. So shapes move to where they
-    have to be, and do not fade out in one place and in at another. Smoke that only one of them has comes and goes by
-    its edges.
+    The part overlaps with its own start by some frames, and the loop is shorter by so many. In the overlap the
+    motion from the last density to the first is estimated, the last frames are advected along it and the first ones
+    back, and the two are mixed. So shapes move to where they have to be, and do not fade out in one place and in at
+    another. Smoke that only one of them has comes and goes by its edges.
 
-    Parameters
-    ----------
-    sequence
-        See `smokelift.direct.new_sequence.open_source`.
-    out
-        Directory to write to.
-    first, last
-        Frames of the part.
-    overlap
-        Frames in which the end becomes the start; the loop is shorter by so many.
-    npz, resume
-        As in `smokelift.output.writer.SequenceWriter`.
-
-    Yields
-    ------
-    The number and the figures of every frame, which is written already.
-
-    Raises
-    ------
-    ValueError
-        See `loop_length`, or if a file cannot be read or written.
+    Further arguments and what it yields are those of `smokelift.direct.new_sequence.directed_writer`. It is a
+    ValueError as by `loop_length`, or if a file cannot be read or written.
     """
     length = loop_length(sequence, first, last, overlap)
     settings = {"frames": [first, last], "overlap": overlap}

@@ -73,10 +73,8 @@ class Mesh:
     def read(path: Path) -> "Mesh":
         """Read a binary STL file, in meters, Z up, or numbered ones from a pattern ``crate_####.stl`` (a # is a digit).
 
-        Raises
-        ------
-        ValueError
-            With the path, if one cannot be read, is damaged or of another kind, or their numbers of triangles differ.
+        A ValueError names the path if one cannot be read, is damaged or of another kind, or their numbers of
+        triangles differ.
         """
         places = [_read_stl(file) for file in (numbered_files(path) if is_pattern(path) else (path,))]
         counts = [len(place) for place in places]
@@ -101,10 +99,7 @@ class Mesh:
     def voxels(self, domain: Domain, step: int = 0) -> Mask:
         """The voxels whose centers it encloses after a step, shape (nx, ny, nz).
 
-        Raises
-        ------
-        ValueError
-            If it is open, such as a plane, so that it encloses nothing.
+        It is a ValueError if it is open, such as a plane, so that it encloses nothing.
         """
         return _enclosed(_all_crossings(self._at(step), domain), domain)
 

@@ -44,17 +44,12 @@ def directed_writer(
     npz: bool,
     resume: bool,
 ) -> SequenceWriter:
-    """The writer of a sequence that is made from another.
+    """The writer of a sequence that is made from another, of which `open_source` knows that it has enough frames.
 
-    Parameters
-    ----------
-    job, settings
-        What is done to it; kept in the settings under ``direct``.
-    how
-        The same as a sentence for the provenance.
-    camera_frames
-        For every frame that is written, the number of the frame of `sequence` whose camera it has; between frames the
-        nearest, beyond them the last.
+    The job and its settings are kept in the settings under ``direct``, and ``how`` says the same as a sentence for
+    the provenance. Every frame that is written has the camera of a frame of `sequence`: ``camera_frames`` are their
+    numbers, between frames the nearest, beyond them the last. ``npz`` and ``resume`` are those of `SequenceWriter`.
+    Jobs yield the number and the figures of every frame, which is written already.
     """
     scene = replace(sequence.scene, camera=_camera_at(sequence.scene.camera, camera_frames))
     return SequenceWriter(
@@ -97,16 +92,8 @@ def write_simulated(
 ) -> Written:
     """Write a frame that no picture shows, with its figures and further ones.
 
-    Parameters
-    ----------
-    origin
-        Where it comes from, a word.
-    started
-        When work on it did, by `time.perf_counter`.
-    solid : (nx, ny, nz), optional
-        Obstacles, inside which no divergence counts.
-    options
-        See `SequenceWriter.write`.
+    The origin is a word for where it comes from, and work on it ``started`` at a time of `time.perf_counter`. No
+    divergence counts inside ``solid`` obstacles (nx, ny, nz). Options are those of `SequenceWriter.write`.
     """
     figures = {
         "origin": origin,

@@ -35,27 +35,9 @@ def retime_sequence(
 ) -> Iterator[Written]:
     """Write a sequence at another speed: frames between the clip's own are interpolated from both neighbors.
 
-    Velocities are scaled with the speed: at half the speed they are half of the smoke's.
-
-    Parameters
-    ----------
-    sequence
-        See `smokelift.direct.new_sequence.open_source`.
-    out
-        Directory to write to.
-    speeds
-        See `playback`.
-    npz, resume
-        As in `smokelift.output.writer.SequenceWriter`.
-
-    Yields
-    ------
-    The number and the figures of every frame, which is written already.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot be read or written.
+    Velocities are scaled with the speed: at half the speed they are half of the smoke's. Speeds are those of
+    `playback`, further arguments and what it yields those of `smokelift.direct.new_sequence.directed_writer`. It is
+    a ValueError if a file cannot be read or written.
     """
     times, speeds_shown = playback(len(sequence.frames), speeds)
     first, dt = sequence.frames[0], 1 / sequence.fps

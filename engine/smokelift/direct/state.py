@@ -82,20 +82,14 @@ def blend(a: Array, b: Array, fraction: float) -> Array:
 def interpolate(
     before: SmokeState, after: SmokeState, motion: Velocity, dt: float, fraction: float, mix: Mix = blend
 ) -> SmokeState:
-    """Return the smoke at a fraction of the time from one state to another.
+    """Return the smoke at a fraction of the time from one state, 0, to another, 1.
 
     The first state is advected forwards by its part of the time, the second backwards by the rest, and the two are
-    blended by the fraction. So nothing shows twice where the motion is right, and the mass changes linearly from that
-    of the first to that of the second.
+    blended by the fraction. So nothing shows twice where the motion is right, and the mass changes linearly from
+    that of the first to that of the second.
 
-    Parameters
-    ----------
-    motion
-        Velocity in m/s that carries the first to the second in `dt` seconds, at the points of arrival.
-    fraction
-        0 for the first, 1 for the second.
-    mix
-        Mixes what of density and of emission is carried from both, by the fraction; linearly by default.
+    The motion, a velocity in m/s at the points of arrival, carries the first to the second in `dt` seconds. What of
+    density and of emission is carried from both is mixed by ``mix``, linearly by default.
     """
     if fraction < RESOLVED:
         return before

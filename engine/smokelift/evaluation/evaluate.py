@@ -67,21 +67,10 @@ def evaluate(
 ) -> Evaluation:
     """Compare a sequence with the truth and with other views, and its orbit with the truth's or with its own front.
 
-    The last needs neither truth nor view: what smoke looks like from another side is, in its texture, what its front
-    looks like.
-
-    Parameters
-    ----------
-    truth_path
-        A truth.npz over the same box and at the same rate; resolutions may differ.
-    view_paths
-        Camera files and clips, whose frame 0 is the input clip's. With any, or without a truth, the input is compared
-        as well.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot be read or does not belong to the sequence.
+    The last needs neither truth nor view: what smoke looks like from another side is, in its texture, what its
+    front looks like. The truth is a truth.npz over the same box and at the same rate; resolutions may differ. Views
+    are camera files and clips, whose frame 0 is the input clip's. With any, or without a truth, the input is
+    compared as well. It is a ValueError if a file cannot be read or does not belong to the sequence.
     """
     if not sequence.frames:
         raise ValueError(f"{sequence.directory}: there are no finished frames to evaluate yet.")

@@ -49,13 +49,7 @@ class Truth:
 
     @staticmethod
     def load(path: Path) -> "Truth":
-        """Read a truth.npz.
-
-        Raises
-        ------
-        TruthError
-            If there is no such file, it is damaged, or it holds something else.
-        """
+        """Read a truth.npz; TruthError if there is no such file, it is damaged, or it holds something else."""
         wanted: dict[str, Shape | None] = dict.fromkeys(("density", *VELOCITY, "inflow_packed"))
         wanted |= {"voxel_size": (), "fps": ()}
         try:

@@ -48,23 +48,10 @@ def read_arrays(
 ) -> dict[str, npt.NDArray[Any]]:
     """Read arrays of real, finite numbers from a ``.npz``.
 
-    Sizes are compared with what the file really holds, and with what is expected, before memory is taken.
-
-    Parameters
-    ----------
-    path
-        The file.
-    expected
-        Names of the arrays that it must hold, with their shapes where these are known.
-    others
-        Beginnings of the names of arrays that it may hold, with the most values along each axis.
-    text
-        Names of those of them that hold text instead.
-
-    Raises
-    ------
-    OSError
-        With the path and the reason, if it is missing or damaged, lacks an array, or holds others than expected.
+    It must hold those that are expected, with their shapes where these are known. It may hold others, by beginnings
+    of their names, with the most values along each axis; those named in ``text`` hold text. Sizes are compared with
+    what the file really holds, and with what is expected, before memory is taken. An OSError has the path and the
+    reason, if it is missing or damaged, lacks an array, or holds others than expected.
     """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")

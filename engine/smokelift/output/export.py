@@ -97,30 +97,12 @@ class ExportSettings:
 def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSettings) -> Iterator[tuple[int, int]]:
     """Export a sequence to a folder: `smoke_0001.vdb`, ..., `smoke.usda`, `export.json`, and `proxy_0001.vdb`, ...
 
-    Files have the numbers of the sequence's own, and so do the times of the USD file.
+    Files have the numbers of the sequence's own, and so do the times of the USD file. There is none for a program
+    whose axes are left-handed. An earlier export in the folder is replaced. The sequence stays as it is. The number
+    of every frame is yielded once it is written, with the bytes of its files.
 
-    There is no USD file for a program whose axes are left-handed. An earlier export in the folder is replaced. The
-    sequence stays as it is.
-
-    Parameters
-    ----------
-    sequence
-        What is exported, with all its frames.
-    out
-        The folder, which is made if it is missing.
-    settings
-        What of it.
-
-    Yields
-    ------
-    The number of every frame, which is written already, and the bytes of its files.
-
-    Raises
-    ------
-    SequenceError
-        If there are no frames, the folder holds other files, or a file cannot be read or written.
-    VdbUnavailable
-        If there is no OpenVDB module.
+    It raises SequenceError if there are no frames, the folder holds other files, or a file cannot be read or
+    written, and VdbUnavailable.
     """
     out = Path(out)
     require_export(sequence, out)

@@ -17,20 +17,11 @@ MATERIAL = "/Smoke/Material"
 def usd_text(
     numbers: Sequence[int], grids: Sequence[str], domain: Domain, medium: Medium, fps: float, host: Host, *, proxy: bool
 ) -> str:
-    """Return the text of a ``.usda`` file of the frames of an export, which lie beside it.
+    """Return the text of a ``.usda`` file of the frames of an export, whose files have these numbers and lie beside it.
 
-    Parameters
-    ----------
-    numbers
-        Of the files, in order.
-    grids
-        Names of the grids in them: ``"density"``, and that of the velocity and ``"flame"`` if there are such.
-    domain
-        The box of the smoke in the host's axes.
-    medium
-        What smoke of density 1 is, for the material and custom data.
-    proxy
-        Whether there is a coarse copy of each frame, which viewports show.
+    The grids in them are ``"density"``, and that of the velocity and ``"flame"`` if there are such. The box is in
+    the host's axes, and the medium is that of smoke of density 1. With a ``proxy`` there is a coarse copy of each
+    frame, which viewports show.
     """
     properties = "".join(
         f"            double {name} = {value:.9g}\n" for name, value in light_properties(medium).items()
