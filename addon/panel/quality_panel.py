@@ -22,8 +22,8 @@ class QualitySettings:
 
     quality: choice(
         "Quality",
-        "More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the smoke's contrast "
-        "in the clip that is finer than the voxels",
+        "More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the fraction of the contrast of the "
+        "clip's smoke that is finer than the voxels",
         [
             ("draft", "Draft", "A quick preview"),
             ("balanced", "Balanced", "Good for most shots"),

@@ -35,8 +35,8 @@ BASELINES = (*BILLBOARDS, "truth", "black")
 """Runs without a reconstruction."""
 
 BLUR = 1 / 120
-"""Standard deviation of the blurred billboard's Gaussian, as a share of a picture's longer side. Of 1, 2, 3 and 4 / 120
-it is the best for camera 00 of the ScalarFlow capture, with and without a gain."""
+"""Standard deviation of the blurred billboard's Gaussian, as a fraction of a picture's longer side. Of 1, 2, 3 and 4 /
+120 it is the best for camera 00 of the ScalarFlow capture, with and without a gain."""
 
 LARGEST_GAIN = 4.0
 """Gains are searched for between this and its inverse."""
@@ -216,7 +216,7 @@ def _volume_figures(known: KnownScene, truth: Truth, folder: Path) -> dict[str, 
 
 
 def _blurred(picture: Image, width: float) -> Image:
-    """Return a picture (rows, columns, 3) after a Gaussian, as wide as a share of its longer side."""
+    """Return a picture (rows, columns, 3) after a Gaussian, as wide as a fraction of its longer side."""
     sigma = width * max(picture.shape[:2])
     return np.asarray(ndimage.gaussian_filter(picture, (sigma, sigma, 0)), np.float32)
 

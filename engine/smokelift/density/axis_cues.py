@@ -88,23 +88,24 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
         return estimate_axis([], first, domain, base=depth_at(distance, first, domain))
     camera, domain = seen[len(seen) // 2].camera, clip.optics.domain.with_at_most(MAX_VOXELS)
     optics = replace(clip.optics, domain=domain)
-    amounts = [
+    thicknesses = [
         np.where(matte(each.image, each.plate).mask, ObservedView.of(each, optics).optical_depth, np.float32(0))
         for each in seen
     ]
-    if distance is None and not any(amount.any() for amount in amounts):
+    if distance is None and not any(each.any() for each in thicknesses):
         return None
     if clip.moves:
         points = np.add(*ray_through_pixels(camera))
-        amounts = [
-            seen_at(points, amount, each.camera).astype(np.float32) for amount, each in zip(amounts, seen, strict=True)
+        thicknesses = [
+            seen_at(points, shown, each.camera).astype(np.float32)
+            for shown, each in zip(thicknesses, seen, strict=True)
         ]
     base = None if distance is None else depth_at(distance, camera, clip.optics.domain)
-    return estimate_axis(amounts, camera, domain, clip.inlets, base)
+    return estimate_axis(thicknesses, camera, domain, clip.inlets, base)
 
 
 def estimate_axis(
-    amounts: Sequence[NDArray[np.float32]],
+    thicknesses: Sequence[NDArray[np.float32]],
     camera: Camera,
     domain: Domain,
     inlets: Sequence[Inlet] = (),
@@ -112,11 +113,11 @@ def estimate_axis(
 ) -> AxisEstimate:
     """The axis of the smoke in some frames; the middle of the box where nothing else is known.
 
-    ``amounts`` are the optical depths (rows, columns) that a camera at rest sees, 0 where there is no smoke. Smoke
+    ``thicknesses`` are the optical depths (rows, columns) that a camera at rest sees, 0 where there is no smoke. Smoke
     enters at the inlets; without any a floor contact is searched for. ``base`` is the depth (m) at which the one column
     is known to stand; neither counts then.
     """
-    pictures = [shown for amount in amounts if (shown := on_upright_plane(amount, camera, domain, ROWS)).values.any()]
+    pictures = [shown for each in thicknesses if (shown := on_upright_plane(each, camera, domain, ROWS)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
     cue: Cue = "box" if base is None else "distance"
     if not pictures:
@@ -133,7 +134,7 @@ def estimate_axis(
     elif inlets:
         cue, columns = "inlets", _inlet_columns(inlets, mean, middle, camera, domain)
     else:
-        columns = _floor_column(pictures, len(amounts), middle, camera, domain)
+        columns = _floor_column(pictures, len(thicknesses), middle, camera, domain)
     if not columns:
         return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(box))
     # what drifts across the picture drifts in depth as well

@@ -30,14 +30,14 @@ from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, lasting_noise, median
 from smokelift.scene import Background, Camera
 
 MOSTLY = 0.5
-"""Mean share of the picture in one color from which on that color is no texture that passes by."""
+"""Mean fraction of the picture in one color from which on that color is no texture that passes by."""
 
 MIN_KNOWN = 0.1
 """Smallest fraction of what no mask hides that must be seen clear: public clips before a picture show .2 and more
 (docs/clips.md)."""
 
 SEEN_OFTEN = 0.15
-"""Share of the blocks of all frames in one color from which on that color is no texture that passes by. Public clips
+"""Fraction of the blocks of all frames in one color from which on that color is no texture that passes by. Public clips
 have .2 and more, two walls before a moving camera .05 and .12 (docs/experiments/turning-camera.md)."""
 
 TEXTURE = np.float32(6 / 255)

@@ -46,23 +46,23 @@ STAY_PROBABILITY, SWITCH_PROBABILITY = 0.98, 0.03
 smoke. Jumps rank the backgrounds; these only break ties."""
 
 OBJECT = 0.1
-"""Probability that a block is an object before one color (a nozzle, a floor, a logo), and largest share of such
+"""Probability that a block is an object before one color (a nozzle, a floor, a logo), and largest fraction of such
 blocks. Public clips before one color have up to .02 (docs/clips.md)."""
 
-MIN_SHOWN_SHARE = 0.25
-"""Smallest share of the blocks that must show the one color at some time."""
+MIN_SHOWN_FRACTION = 0.25
+"""Smallest fraction of the blocks that must show the one color at some time."""
 
-MIN_STILL_SHARE = 0.9
-"""Smallest share of the frames in which an object is within half of the limit of its median: smoke wavers more."""
+MIN_STILL_FRACTION = 0.9
+"""Smallest fraction of the frames in which an object is within half of the limit of its median: smoke wavers more."""
 
-MIN_SEEN_SHARE = 0.99
-"""Smallest share of a block that no mask hides."""
+MIN_SEEN_FRACTION = 0.99
+"""Smallest fraction of a block that no mask hides."""
 
 CANDIDATES = 4
 """Number of the commonest colors that are tried."""
 
-MIN_BLACK_SHARE = 0.98
-"""Share of black blocks from which on a frame counts as black everywhere."""
+MIN_BLACK_FRACTION = 0.98
+"""Fraction of black blocks from which on a frame counts as black everywhere."""
 
 CLEAR_FRAMES = 8
 """Frames that the clearest view of each pixel is taken from."""
@@ -71,9 +71,9 @@ DETAIL_QUANTILE, MAX_MIST_DETAIL = 0.99, np.float32(15 / 255)
 """Quantile of the detail before black, and the most that mist has there, in sRGB values. 26 clips of smoke have 1 to 13
 of 255, walls and stages in the dark 17 to 40 (docs/experiments/background.md)."""
 
-MAX_SIDE_DIFFERENCE, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
-"""Difference in sRGB values up to which a block has the color around a single picture, and share of such blocks needed
-along each of three sides. 18 frames of public clips before one color have 0.56 to 1, others 0.2 at most, but for
+MAX_SIDE_DIFFERENCE, MIN_SIDE_FRACTION = np.float32(2 / 255), 0.5
+"""Difference in sRGB values up to which a block has the color around a single picture, and fraction of such blocks
+needed along each of three sides. 18 frames of public clips before one color have 0.56 to 1, others 0.2 at most, but for
 stages in the dark (docs/experiments/background.md)."""
 
 
@@ -82,8 +82,8 @@ class Hypothesis:
     """A background: one linear color (3,), or a picture if ``color`` is None.
 
     ``cost`` is the negative logarithm of the frames' probability before it, on the mean over blocks. ``objects`` (rows,
-    columns) are the proxy's pixels where something hides the color all the time. ``clear`` is the share of all blocks
-    and frames that show the color.
+    columns) are the proxy's pixels where something hides the color all the time. ``clear`` is the fraction of all
+    blocks and frames that show the color.
     """
 
     cost: float
@@ -102,12 +102,12 @@ def likeliest(proxy: Proxy, white: Picture) -> Hypothesis:
     jump = -float(np.log(2 * limit.mean()))
     goes_on = _goes_on(values, limit, jump)
     empty = within(values, limit)
-    empty = empty & (empty.mean(1) > MIN_BLACK_SHARE)[:, None]
+    empty = empty & (empty.mean(1) > MIN_BLACK_FRACTION)[:, None]
     picture = np.full(values.shape[1], np.inf)
     for value in values:
         picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
     table = [Hypothesis(float(picture.mean()) + jump, None, np.zeros((rows, columns), np.bool_), 0.0)]
-    still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
+    still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_FRACTION
     for candidate in _candidates(values, limit):
         clear = within(values - candidate, limit)
         shows = clear.any(0)
@@ -115,7 +115,7 @@ def likeliest(proxy: Proxy, white: Picture) -> Hypothesis:
         stands = ~shows & (own < cost)
         if candidate.max() <= EIGHT_BIT_STEP and not _sharp(proxy, white):
             stands[:] = False
-        if stands.mean() > OBJECT or shows.mean() < MIN_SHOWN_SHARE:
+        if stands.mean() > OBJECT or shows.mean() < MIN_SHOWN_FRACTION:
             continue
         cost = np.where(stands, np.minimum(own - np.log(OBJECT), cost), cost)
         # smoke of one brightness moves a color to one side only
@@ -142,7 +142,7 @@ def color_around(picture: Picture) -> tuple[float, float, float] | None:
     sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
     color = np.median(np.concatenate(sides[0]), axis=0)
     alike = [(np.abs(side - color) <= MAX_SIDE_DIFFERENCE).all(-1) for side in sides[0]]
-    if sum(side.mean() >= MIN_SIDE_SHARE for side in alike) < 3:
+    if sum(side.mean() >= MIN_SIDE_FRACTION for side in alike) < 3:
         return None
     red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
     return red, green, blue
@@ -231,6 +231,6 @@ def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:
     """Blocks (n,) that no mask hides in any frame; if there are none, those that one frame at least shows."""
     rows, columns = shape
     shown = np.stack(
-        [area_average(seen.astype(np.float32), columns, rows).ravel() > MIN_SEEN_SHARE for seen in proxy.seen]
+        [area_average(seen.astype(np.float32), columns, rows).ravel() > MIN_SEEN_FRACTION for seen in proxy.seen]
     )
     return np.asarray(shown.all(0) if shown.all(0).any() else shown.any(0))

@@ -45,21 +45,21 @@ STRIDE = 4
 BAND = 2**14
 """Pixels that are compared at a time: they fit the cache."""
 
-MIN_ALIKE_SHARE = 0.8
-"""Share of like values of a pixel above which they are its background for certain."""
+MIN_ALIKE_FRACTION = 0.8
+"""Fraction of like values of a pixel above which they are its background for certain."""
 
-MIN_SEEN_SHARE = 1 / 8
-"""Smallest share of the frames that must show a pixel for like values to be its background: a camera that turns shows
-some pixels for a moment only."""
+MIN_SEEN_FRACTION = 1 / 8
+"""Smallest fraction of the frames that must show a pixel for like values to be its background: a camera that turns
+shows some pixels for a moment only."""
 
 ONE_SIDED = 0.9
-"""Share of the changes to one side from which on smoke only brightens, or only darkens; the rest is noise."""
+"""Fraction of the changes to one side from which on smoke only brightens, or only darkens; the rest is noise."""
 
 FALSE_ALARM = 1e-3
-"""Share of the pixels always under smoke that are taken for clear at times."""
+"""Fraction of the pixels always under smoke that are taken for clear at times."""
 
 PRIOR_PAIRS = 4.0
-"""Pairs of frames that the clip's share of like pairs counts as, added to a pixel's own."""
+"""Pairs of frames that the clip's fraction of like pairs counts as, added to a pixel's own."""
 
 DRIFT = 8 / 255
 """Largest change by a codec or by the light, in sRGB values."""
@@ -67,7 +67,7 @@ DRIFT = 8 / 255
 LIKE_SURROUNDINGS = 3 * DRIFT
 """Largest difference of a background from its surroundings, in sRGB values (docs/experiments/background.md)."""
 
-MIN_CHANGE_SHARE = 1 / 4
+MIN_CHANGE_FRACTION = 1 / 4
 """Smallest range of smoke over time, over its difference from the background: a chair or a jacket is steadier."""
 
 DETAIL_QUANTILE = 0.95
@@ -129,7 +129,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     known = in_one_piece(known)
     if not known.all():
         # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
-        known = in_one_piece(known | (calm & (MIN_CHANGE_SHARE * _unlike(image, known) >= window + DRIFT)))
+        known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * _unlike(image, known) >= window + DRIFT)))
         # or if it is like them: smoke hardly changes a background of its own color
         known = mostly_beside(in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
@@ -152,8 +152,8 @@ def _unlike(image: Picture, known: Mask) -> Picture:
 def _smoke_of(gray: Picture, window: float) -> tuple[float, float, Mask]:
     """Return the similarity of smoke in gray pictures (frames, rows, columns), its brightness, and where it brightens.
 
-    Its similarity is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
-    the value that it moves every background towards; it brightens pixels of a darker background.
+    Its similarity is the fraction of pairs of successive frames of smoke that are alike within a window. Its brightness
+    is the value that it moves every background towards; it brightens pixels of a darker background.
     """
     shape = gray.shape[1:]
     values = gray.reshape(len(gray), -1)
@@ -168,7 +168,7 @@ def _smoke_of(gray: Picture, window: float) -> tuple[float, float, Mask]:
     similarity = float((np.abs(np.diff(values, axis=0)) <= window)[pairs].mean()) if pairs.any() else 0.5
     # a value that most frames agree on is the background for certain
     number = count_of_seen(values)
-    certain = (counts.max(0) > MIN_ALIKE_SHARE * number) & (number >= MIN_SEEN_SHARE * len(values))
+    certain = (counts.max(0) > MIN_ALIKE_FRACTION * number) & (number >= MIN_SEEN_FRACTION * len(values))
     behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
     # where the background is certain, a change as small as a codec's drift says nothing of smoke
     beyond = 0.5 * window + DRIFT
@@ -216,7 +216,7 @@ def _clear_values(
     # one value may be an outlier
     lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
     calm = highest - lowest <= window + DRIFT
-    often = number >= MIN_SEEN_SHARE * len(away)
+    often = number >= MIN_SEEN_FRACTION * len(away)
     best = np.full(away.shape[1:], np.inf, np.float32)
     for value in away:
         inside = (away >= value) & (away <= value + np.float32(window))

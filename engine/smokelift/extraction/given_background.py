@@ -12,9 +12,9 @@ from smokelift.footage.image_sequence import is_pattern, is_video
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
 from smokelift.scene import Background, Camera, Scene, shared_part
 
-ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.9
-"""Difference in sRGB values up to which a pixel has a backdrop's color, and smallest share of such pixels: the others
-are a nozzle, a floor, a logo."""
+ALIKE, MIN_ALIKE_FRACTION = 8 / 255, 0.9
+"""Difference in sRGB values up to which a pixel has a backdrop's color, and smallest fraction of such pixels: the
+others are a nozzle, a floor, a logo."""
 
 
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
@@ -85,4 +85,4 @@ def backdrop_color(plate: Picture) -> Picture | None:
     """Return the linear color (3,) of a clean plate (rows, columns, 3) of one color; None of any other plate."""
     color = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
     alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(color)) <= ALIKE).all(-1)
-    return color if alike.mean() >= MIN_ALIKE_SHARE else None
+    return color if alike.mean() >= MIN_ALIKE_FRACTION else None

@@ -54,7 +54,7 @@ INDEPENDENT = 3
 """Number of independent frames that the frames count as: errors of smoke last (.75 to .95 from a frame to the next)."""
 
 MIN_UNKNOWN = 0.01
-"""Smallest share of a plate that has to be unknown for turns to change the smoke."""
+"""Smallest fraction of a plate that has to be unknown for turns to change the smoke."""
 
 CLEAR_TRANSMITTANCE = 0.02
 """Lower bound of T, for division."""

@@ -36,8 +36,8 @@ MAX_STILL_CHANGE = np.float32(4 / 255)
 """Change in sRGB values up to which a pixel counts as unchanged."""
 
 SAME_SHOT, STEADY = 0.25, 0.5
-"""Largest share of the pixels that stay unchanged at a cut, and smallest share from one frame to the next beside it: if
-the camera moves or smoke fills the picture, fewer do all the time."""
+"""Largest fraction of the pixels that stay unchanged at a cut, and smallest fraction from one frame to the next beside
+it: if the camera moves or smoke fills the picture, fewer do all the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,11 +213,11 @@ def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> 
 
 
 def _alike(one: Picture, other: Picture) -> float:
-    """Share of the pixels that two pictures have alike, at one exposure if that is more."""
+    """Fraction of the pixels that two pictures have alike, at one exposure if that is more."""
     encoded = linear_to_srgb(one)
 
-    def share(picture: Picture) -> float:
+    def alike(picture: Picture) -> float:
         return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < MAX_STILL_CHANGE).mean())
 
-    found = share(other)
-    return found if found >= STEADY else max(found, share(other / gain_of(other, one)))
+    found = alike(other)
+    return found if found >= STEADY else max(found, alike(other / gain_of(other, one)))

@@ -96,8 +96,8 @@ class StoredPicture:
             light = sums[color].copy()
             light[:, 1::2] = sums[1 - color][:, 1::2]
             board = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == color
-            share = np.maximum(area_average(board, width, height), np.float32(1e-6))
-            return np.asarray(area_average(light, width, height) / share[..., None])
+            filled = np.maximum(area_average(board, width, height), np.float32(1e-6))
+            return np.asarray(area_average(light, width, height) / filled[..., None])
 
         return average(first), average(1 - first)
 

@@ -456,10 +456,10 @@ def area_weights(old: int, new: int) -> scipy.sparse.csr_array:
     if new > old:
         position = np.clip((np.arange(new) + 0.5) * (old / new) - 0.5, 0.0, old - 1.0)
         low = np.minimum(position.astype(np.int64), max(old - 2, 0))
-        share = position - low
+        weight = position - low
         rows = np.repeat(np.arange(new), 2)
         columns = np.stack([low, np.minimum(low + 1, old - 1)], axis=1).ravel()
-        values = np.stack([1.0 - share, share], axis=1).ravel()
+        values = np.stack([1.0 - weight, weight], axis=1).ravel()
     else:
         # in units of 1 / (old new) of the picture all edges are whole numbers, so overlaps are exact
         reach = -(-old // new) + 1

@@ -10,7 +10,7 @@ DETAIL = 4.0
 """Standard deviation, in pixels, of the Gaussian that keeps smoke and removes the finer detail of a background."""
 
 ISLAND = 0.01
-"""Share of the picture up to which a clear patch is taken for an accident."""
+"""Fraction of the picture up to which a clear patch is taken for an accident."""
 
 SPECK = 7
 """Pixels along the square whose majority decides for its middle pixel."""

@@ -129,11 +129,11 @@ def continued(picture: Picture, seen: Seen) -> Picture:
     """Return the pixels (n, 3) of a linear picture (rows, columns, 3) that are not seen, continued from around them."""
     rows, columns = seen.shape
     size = reduced_size(columns, rows, CONTINUED_SIDE)
-    share = area_average(seen, *size)
-    mean = area_average(np.where(seen[..., None], picture, 0), *size) / np.maximum(share, 1e-6)[..., None]
-    known = (share > 0).astype(np.float32)
+    fraction = area_average(seen, *size)
+    mean = area_average(np.where(seen[..., None], picture, 0), *size) / np.maximum(fraction, 1e-6)[..., None]
+    known = (fraction > 0).astype(np.float32)
     # far from what is seen it fades to black; so does a white picture, which tells by how much
     fading = push_pull(np.ones_like(mean), known)
-    usual = mean[share > 0].mean(0)
+    usual = mean[fraction > 0].mean(0)
     smooth = np.where(fading > MIN_WEIGHT, push_pull(mean, known) / np.maximum(fading, MIN_WEIGHT), usual)
     return area_average(smooth, columns, rows)[~seen]

@@ -127,11 +127,11 @@ def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> f
     size = np.abs(some[np.isfinite(some)])
     squares = np.square(size)
     smoke = 1 / (np.maximum(size, EIGHT_BIT_STEP) * np.float32(1 - np.log(EIGHT_BIT_STEP)))
-    variance, share = float(EIGHT_BIT_STEP**2), 0.5
+    variance, fraction = float(EIGHT_BIT_STEP**2), 0.5
     for _ in range(SPREAD_ROUNDS if squares.size else 0):
-        noise = share * np.sqrt(2 / np.pi / variance) * np.exp(-0.5 * squares / np.float32(variance))
-        weight = noise / (noise + np.float32(1 - share) * smoke)
-        share = float(weight.mean())
+        noise = fraction * np.sqrt(2 / np.pi / variance) * np.exp(-0.5 * squares / np.float32(variance))
+        weight = noise / (noise + np.float32(1 - fraction) * smoke)
+        fraction = float(weight.mean())
         variance = float((weight * squares).sum() / max(float(weight.sum()), 1e-6))
         variance = min(max(variance, float(MIN_SPREAD**2)), float(largest**2))
     return float(np.sqrt(variance))

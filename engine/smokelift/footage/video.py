@@ -401,7 +401,7 @@ def _has_alpha(frame: av.VideoFrame) -> bool:
 
 
 def _white(frame: av.VideoFrame) -> float:
-    """Return FFmpeg's white as a share of the largest code: the converter only shifts wide codes up."""
+    """Return FFmpeg's white as a fraction of the largest code: the converter only shifts wide codes up."""
     bits = max(component.bits for component in frame.format.components)
     if bits <= 8 or bits >= 16 or frame.format.is_rgb:
         return 1.0

@@ -47,7 +47,7 @@ class SmokeSamples:
         Numbers of the frames with smoke, those with the most first.
     gains
         Exposure (3,) of each sample over its background's, by frame number; the samples are divided by it.
-    amounts
+    counts
         Numbers of smoke pixels of the samples with smoke, in the order of ``colors``.
     over_known
         Numbers of smoke pixels before a known background in each sample, in the order of ``gains``.
@@ -60,7 +60,7 @@ class SmokeSamples:
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
-    amounts: tuple[int, ...] = ()
+    counts: tuple[int, ...] = ()
     over_known: tuple[int, ...] = ()
 
     @property
@@ -177,7 +177,7 @@ def sample_smoke(clip: Clip, plates: Plate) -> SmokeSamples:
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
     colors, behind, over_known = [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
-    amounts: dict[int, int] = {}
+    counts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
     for number in clip.spread(SAMPLE_FRAMES):
         plate = reduced.at(number)
@@ -192,7 +192,7 @@ def sample_smoke(clip: Clip, plates: Plate) -> SmokeSamples:
         colors.append(picture[mask])
         behind.append(plate.image[mask])
         if mask.any():
-            amounts[number] = int(mask.sum())
-    smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
+            counts[number] = int(mask.sum())
+    smoky = tuple(sorted(counts, key=lambda number: -counts[number]))
     radiance = np.concatenate(colors), np.concatenate(behind)
-    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, tuple(amounts.values()), tuple(over_known))
+    return SmokeSamples(scale, covered, unknown, *radiance, smoky, gains, tuple(counts.values()), tuple(over_known))

@@ -132,7 +132,7 @@ def several_colors(samples: SmokeSamples) -> list[Finding]:
     off = _degrees_off_one_color(shown)
     if off < MIN_COLOR_DEGREES:
         return []
-    ends = np.cumsum(samples.amounts, dtype=np.intp)[:-1]
+    ends = np.cumsum(samples.counts, dtype=np.intp)[:-1]
     frames = [
         part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colors, usable)), strict=True)
     ]

@@ -111,8 +111,8 @@ def test_smoke_of_more_than_one_color_is_said():
     mixed = np.random.default_rng(3).permutation(len(seen.colors))
     for samples_of, kind in (
         (seen, "smoke of several colors"),
-        (replace(seen, amounts=(half, half)), "smoke that changes its color"),
-        (replace(seen, colors=seen.colors[mixed], amounts=(half, half)), "smoke of several colors"),
+        (replace(seen, counts=(half, half)), "smoke that changes its color"),
+        (replace(seen, colors=seen.colors[mixed], counts=(half, half)), "smoke of several colors"),
     ):
         assert [found.kind for found in several_colors(samples_of)] == [kind]
 
