@@ -1,7 +1,5 @@
 """Scenes that `benchmarks.truth` baked and pictured: their smoke, and what four cameras see of it alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -48,16 +46,16 @@ class Seen:
         _, rows, columns = self.radiance.shape
         return rows, columns
 
-    def at(self, frames: Sequence[int] | slice) -> Seen:
+    def at(self, frames: Sequence[int] | slice) -> "Seen":
         """Return some of its frames."""
         return Seen(self.radiance[frames], self.transmittance[frames])
 
-    def sized(self, size: tuple[int, int]) -> Seen:
+    def sized(self, size: tuple[int, int]) -> "Seen":
         """Return it at another size (columns, rows)."""
         both = (self.radiance, self.transmittance)
         return Seen(*(np.stack([area_average(picture, *size) for picture in pictures]) for pictures in both))
 
-    def scattering(self, fraction: float) -> Seen:
+    def scattering(self, fraction: float) -> "Seen":
         """Return smoke that sends this fraction of the light that it sends."""
         return Seen(np.float32(fraction) * self.radiance, self.transmittance)
 
@@ -90,7 +88,7 @@ class Baked:
     densities: Volumes
 
     @staticmethod
-    def load(folder: Path, frames: int | None = None, views: Iterable[str] = VIEWS) -> Baked:
+    def load(folder: Path, frames: int | None = None, views: Iterable[str] = VIEWS) -> "Baked":
         """Read a scene's first frames, or all, and some of its views.
 
         Where a view's transmittance is not stored, Smokelift's renderer computes it from the densities.

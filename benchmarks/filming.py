@@ -1,7 +1,5 @@
 """What a camera, a codec and an editor do to pictures, and clips in memory. Pictures are (frames, rows, columns, 3)."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

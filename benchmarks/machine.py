@@ -1,7 +1,5 @@
 """The machine that a benchmark runs on: what it is, and time in seconds and in Poisson solves of the same grid."""
 
-from __future__ import annotations
-
 import os
 import platform
 import time

@@ -1,7 +1,5 @@
 """The one way in which the benchmarks reconstruct a clip in this process, and compare it with what is known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

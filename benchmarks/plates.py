@@ -1,7 +1,5 @@
 """Pictures that stand behind the smoke, linear (rows, columns, 3): painted here, photographs, or any picture file."""
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Callable
 from functools import partial

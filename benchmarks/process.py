@@ -1,7 +1,5 @@
 """A measurement in a process of its own: clean thread pools, and a peak of memory that is its own."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor

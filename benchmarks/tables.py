@@ -1,7 +1,5 @@
 """Tables: Markdown for a terminal and a page, and rows of figures in a file that grows."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

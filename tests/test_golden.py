@@ -5,8 +5,6 @@ truth; they are development data that may be missing. After a deliberate change,
 the figures of now as they stand in `GOLDEN`.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

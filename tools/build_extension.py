@@ -12,8 +12,6 @@ The engine's own wheels have been built before, here (engine_wheels.py) or on a 
 The same sources give the same zips, byte for byte.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import re

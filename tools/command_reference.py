@@ -3,8 +3,6 @@
 python tools/command_reference.py        # prints what the manual's page "Commands" ends with
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 

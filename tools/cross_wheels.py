@@ -10,8 +10,6 @@ Windows' Python, whose headers and import library a module is built with, comes 
 module finds Python's functions when it is loaded, and this system's headers do.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import subprocess

@@ -7,8 +7,6 @@ What a build needs is installed once for each Python and stays in build/portable
 changed is not compiled again, and what knows no Python is compiled for the first of them alone.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform

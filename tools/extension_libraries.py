@@ -4,8 +4,6 @@ Wheels are downloaded as tools/bundle.txt and bundle_gpu.txt pin them, and what 
 out.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What zips of the extension there are: for Blender's platforms, and for the Pythons in it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

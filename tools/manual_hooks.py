@@ -5,8 +5,6 @@ what the code has. Equations become MathML, which browsers show without a script
 join the manual.
 """
 
-from __future__ import annotations
-
 import html
 import re
 from pathlib import Path

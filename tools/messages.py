@@ -3,8 +3,6 @@
 python tools/messages.py        # prints what the manual's page "All messages" shows
 """
 
-from __future__ import annotations
-
 import ast
 import html
 import re

@@ -3,8 +3,6 @@
 python tools/notebook.py        # prints what the manual's page "Notebook" shows
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -6,8 +6,6 @@
 What a release needs besides is `.ci/run` from a clean checkout of the same commit.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

@@ -6,8 +6,6 @@ where it happened. By default the tests of transport, velocity and rendering run
     .venv/bin/python tools/sanitize.py [PYTEST ARGUMENTS]
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -3,8 +3,6 @@
 python tools/scene_reference.py        # prints what the manual's page "Scene file" ends with
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

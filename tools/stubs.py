@@ -5,8 +5,6 @@
 With --check nothing is written: exit status 1 says that the file is not what the core says.
 """
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import re

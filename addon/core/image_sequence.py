@@ -3,8 +3,6 @@
 Blender ends a sequence at its first gap.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import lru_cache

@@ -5,8 +5,6 @@ waits. The engine ends when its standard input closes: so a job is cancelled on 
 Blender quits or crashes.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

@@ -4,8 +4,6 @@ Speeds lie evenly from the first frame of the take to the last and change linear
 ``retime``. Where the speed goes from s0 by k for each frame, the place after a time t is s0 (exp(k t) - 1) / k.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -16,8 +16,6 @@ One that is made of another take, which goes on after its clip, has another spee
     take_0004_####.stl  the meshes that are obstacles, if there are any: for every frame as long as they move
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -93,7 +91,7 @@ class Take:
         self._write({self.scene_file: toml_text(tables).encode(), self.request_file: _request(options)})
 
     def write_directed(
-        self, direction: str, source: Take, options: Sequence[str], meshes: Sequence[bytes] = ()
+        self, direction: str, source: "Take", options: Sequence[str], meshes: Sequence[bytes] = ()
     ) -> None:
         """Write what is made of another take, by a direction of `DIRECTIONS`.
 
@@ -115,7 +113,7 @@ class Take:
                 f"{self.directory.parent} cannot be written to ({error.strerror}): choose another output folder."
             ) from error
 
-    def read(self) -> Snapshot:
+    def read(self) -> "Snapshot":
         """What its files say now; read again only when one of them has changed: the panel asks with every redraw."""
         files = (self.request_file, self.directory / INDEX_FILE, self.scene_file)
         return _snapshot_at(self, *map(_file_state, files))

@@ -15,8 +15,6 @@ each also with one gain a camera.
 OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real).
 """
 
-from __future__ import annotations
-
 import argparse
 from datetime import date
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The default method without one of its parts: compositions for experiments."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +27,7 @@ from smokelift.velocity import CoarseToFine
 class EvenDepth:
     """A depth prior: smoke is spread evenly along each ray through the domain."""
 
-    def of_clip(self, clip: ObservedClip) -> EvenDepth:
+    def of_clip(self, clip: ObservedClip) -> "EvenDepth":
         """Return itself: it reads nothing of the clip."""
         return self
 

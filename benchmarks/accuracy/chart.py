@@ -3,8 +3,6 @@
 python -m benchmarks.accuracy.chart OUT/accuracy.csv docs/accuracy_chart.png
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

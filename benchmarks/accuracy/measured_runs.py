@@ -1,7 +1,5 @@
 """Speed and errors of measured runs, from the figures that benchmarks/accuracy writes."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The figures of all runs as a Markdown table, as CSV and as a sheet of pictures."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from pathlib import Path

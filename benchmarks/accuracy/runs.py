@@ -13,8 +13,6 @@ A name is a quality or "paper", then further views, then changes:
 - ``billboard``, ``blurred``: the front picture in every view, as it is or blurred
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace

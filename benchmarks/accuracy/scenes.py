@@ -1,7 +1,5 @@
 """The scenes that reconstructions are scored on: a clip, and what is known that the reconstruction does not see."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

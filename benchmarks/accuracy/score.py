@@ -1,7 +1,5 @@
 """The figures of a run: its pictures in every view beside the true ones, its volumes beside the true ones."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence

@@ -4,8 +4,6 @@ Only the reconstruction is timed, from decoding the clip to OpenVDB files on dis
 are the processor's, over all cores, so that other work on the machine changes none.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import tempfile

@@ -1,7 +1,5 @@
 """Clips of baked smoke before known backgrounds, as a camera would spoil them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -83,7 +81,7 @@ class Case:
         return filmed(self.spoil(np.clip(encoded, 0, 1)))
 
     @property
-    def undisturbed(self) -> Case:
+    def undisturbed(self) -> "Case":
         """The clean clip that it is compared with: all frames, its background given unless the medium is not."""
         return Case(self.plate, self.smoke, given=self.medium, medium=self.medium)
 

@@ -4,8 +4,6 @@ It takes a Python with bpy, and a sequence of the example:
 ``smokelift reconstruct examples/plume/scene.toml --quality final --frames 25:36 --out SEQUENCE``.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import tempfile

@@ -5,8 +5,6 @@
 The smoke is a cone of noise that fills a quarter of the box, with its velocity.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

@@ -4,8 +4,6 @@ It takes a Python with bpy 5.0 or later, and the example's sequence from `make d
 of null scattering and of marching, and their noise beside pictures of many samples.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -3,8 +3,6 @@
 python -m benchmarks.blender.pictures
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from PIL import Image

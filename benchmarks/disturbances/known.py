@@ -1,7 +1,5 @@
 """Smoke whose flow is known too, on a small grid, so that many runs take minutes; and takes of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -42,7 +40,7 @@ class Known(Baked):
     fps: float
 
     @staticmethod
-    def read(folder: Path, moments: int) -> Known:
+    def read(folder: Path, moments: int) -> "Known":
         """Read the first moments of a baked scene."""
         truth, baked = Truth.load(folder / "truth.npz"), Baked.load(folder, moments).sized(SIZE)
         assert baked.scene.domain is not None

@@ -15,8 +15,6 @@ the figures mean: T rms, imprint, mass, mass up to optical depth 3, the fraction
 inside the smoke at the clip's pixels, PSNR of new views at 20, 45 and 90 degrees.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Baked smoke before a plate: the clip that a camera would film, scene files that know more or less, and the truth."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +67,7 @@ class Composed:
     plate: Picture
 
     @staticmethod
-    def load(folder: Path) -> Composed:
+    def load(folder: Path) -> "Composed":
         """Read what `compose` wrote."""
         with np.load(folder / TRUTH) as file:
             radiance, clear, behind = (file[name].astype(np.float32) for name in ("radiance", "transmittance", "plate"))
@@ -84,7 +82,7 @@ class Composed:
         """Return what the camera sees, linear (frames, rows, columns, 3), before it adds anything."""
         return self.seen.before(self.plate)
 
-    def at(self, frames: Sequence[int]) -> Composed:
+    def at(self, frames: Sequence[int]) -> "Composed":
         """Return some frames of it."""
         return replace(self, seen=self.seen.at(list(frames)))
 

@@ -1,7 +1,5 @@
 """The figures of an element or of a reconstruction beside the true element of its clip."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

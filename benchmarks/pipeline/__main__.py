@@ -9,8 +9,6 @@ grid, timed between the frames; density and velocity are always in the seconds t
 said to stop there.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import tempfile
@@ -51,7 +49,7 @@ class Law:
     an_occupied: float
 
     @staticmethod
-    def of(runs: Sequence[Run], costs: Sequence[float]) -> Law:
+    def of(runs: Sequence[Run], costs: Sequence[float]) -> "Law":
         """Fit the law by least squares of the relative differences."""
         voxels = np.array([math.prod(run.size) for run in runs], np.float64)
         occupied = voxels * [run.occupied for run in runs]

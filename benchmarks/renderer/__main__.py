@@ -8,8 +8,6 @@ beyond imports, density and compiler, in MiB and in volumes of size^3 floats. Er
 Smokelift alone is timed by the fraction of voxels with smoke and by the number of lights.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ we sample it onto finer grids, and a step shrinks with the voxel. All figures ar
 Optical depth is that of the thickest column along an axis. Half an hour on two cores.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

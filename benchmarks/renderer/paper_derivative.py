@@ -7,8 +7,6 @@ and differentiated by a complex step: central differences without their rounding
 column of smoke.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from typing import Any

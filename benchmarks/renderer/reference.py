@@ -7,8 +7,6 @@ to the light's columns (bilinear in each plane), K the midpoint rule along the c
 All rays advance together, plane after plane, which is fast enough for 256^3 voxels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

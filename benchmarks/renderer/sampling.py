@@ -5,8 +5,6 @@ sample is then a cell, the index of its lowest corner, and two weights; the othe
 further on. Rays that miss the grid are left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scene of the renderer's benchmark: a plume with structure in a given fraction of the voxels, seen obliquely."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

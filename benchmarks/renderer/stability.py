@@ -7,8 +7,6 @@ their exact derivative in float64. The last column is the brightest pixel of the
 from everywhere, before a white wall): above 1 the renderer would create light.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One peer, one scene, one process: clean thread pools and a peak of memory that is its own."""
 
-from __future__ import annotations
-
 import importlib
 import time
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@
 writes OUT/NAME/truth.npz for each scene that is not there yet. Needs root on Linux and mmdebstrap.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

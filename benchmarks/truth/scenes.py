@@ -3,8 +3,6 @@
 Lengths are meters, times seconds, in a box of 2 x 2 x 3 m from (-1, -1, 0) with z up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

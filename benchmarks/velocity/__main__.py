@@ -8,8 +8,6 @@ know the inlet. Machines differ and are shared, so times are given in Poisson so
 and just after all that is measured.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import time

@@ -7,8 +7,6 @@ are means over at least eight frames, inside the smoke and the two voxels around
 which have a column of their own. Time is in Poisson solves of the same grid (`benchmarks.machine.poisson_seconds`).
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable, Iterator

@@ -18,8 +18,6 @@ Velocity and smoke have the spectrum k^(-5/3) (Kolmogorov 1941, Corrsin 1951) do
 size: a finer grid has finer smoke and finer eddies, and moves by more voxels a frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -80,7 +78,7 @@ class Waves:
     amplitudes: Array
 
     @staticmethod
-    def random(rng: np.random.Generator, voxels: int) -> Waves:
+    def random(rng: np.random.Generator, voxels: int) -> "Waves":
         """Draw one as fine as this many voxels along the longest side can show."""
         octaves = max(1, 1 + int(np.log2(COARSEST * voxels / FINEST)))
         length = np.repeat(COARSEST * 0.5 ** np.arange(octaves), WAVES)
@@ -116,7 +114,7 @@ class Flow:
     turning: Array
 
     @staticmethod
-    def random(rng: np.random.Generator, voxels: int) -> Flow:
+    def random(rng: np.random.Generator, voxels: int) -> "Flow":
         """Draw one as fine as this many voxels along the longest side can show."""
         waves = Waves.random(rng, voxels)
         across = np.cross(waves.vectors, rng.standard_normal(waves.vectors.shape))
@@ -179,7 +177,7 @@ class Stirred:
     structure: Waves
 
     @staticmethod
-    def random(shape: tuple[int, int, int], seed: int) -> Stirred:
+    def random(shape: tuple[int, int, int], seed: int) -> "Stirred":
         """Draw one as fine as a box of these voxels can show."""
         rng = np.random.default_rng(seed)
         return Stirred(Flow.random(rng, max(shape)), Waves.random(rng, max(shape)))

@@ -1,7 +1,5 @@
 """Two densities and the motion between them, to compare an estimate with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

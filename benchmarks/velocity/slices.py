@@ -8,8 +8,6 @@ velocity of the whole run, which knows the front video alone. Shown is the compo
 one moment, in the slices with most of the true smoke.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

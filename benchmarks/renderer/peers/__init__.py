@@ -6,8 +6,6 @@ the process that runs it needs it. All but Mitsuba and the paper compute the sam
 (rays, columns, the phase function) is tabulated before the clock starts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec

@@ -1,7 +1,5 @@
 """Smokelift's own renderer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """A batch on a cluster of several processes: nothing lost and nothing done twice, whatever of it is lost."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import signal
