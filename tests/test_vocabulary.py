@@ -1,6 +1,5 @@
 """The words: names, docstrings, messages and pages say what `CONTRIBUTING.md` says, and not what it says not."""
 
-import ast
 import re
 from pathlib import Path
 
@@ -97,30 +96,6 @@ def test_there_is_one_spelling() -> None:
     """All pages, and the code with its comments."""
     found = {name(path): set(BRITISH.findall(CONTRACT.sub("", path.read_text(encoding="utf-8")))) for path in FILES}
     assert {path: words for path, words in found.items() if words} == {}
-
-
-FRAGMENT = re.compile(r"(?:Of|That of|Those|By|In|From|As|With|On|At|The same) ")
-"""How docstrings begin that leave their noun to the name beside them."""
-
-
-def docstrings(source: str) -> list[str]:
-    """Every string of a module that stands by itself."""
-    bodies = [body for node in ast.walk(ast.parse(source)) if isinstance(body := getattr(node, "body", None), list)]
-    values = [each.value for body in bodies for each in body if isinstance(each, ast.Expr)]
-    return [each.value for each in values if isinstance(each, ast.Constant) and isinstance(each.value, str)]
-
-
-def test_docstrings_have_their_noun() -> None:
-    modules = [
-        path
-        for path in FILES
-        if path.suffix == ".py" and name(path).startswith(("addon", "benchmarks", "engine", "tools"))
-    ]
-    found = {
-        name(path): [each for each in docstrings(path.read_text(encoding="utf-8")) if FRAGMENT.match(each)]
-        for path in modules
-    }
-    assert {path: each for path, each in found.items() if each} == {}
 
 
 def test_types_of_arrays_have_one_module() -> None:
