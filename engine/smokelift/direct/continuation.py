@@ -5,21 +5,15 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from smokelift.direct.fitting import BUOYANCY_FRAMES, coarsen_state, fit_simulation, spin_up
-from smokelift.direct.growth import (
-    Growth,
-    camera_and_lamp_places,
-    dissolve,
-    in_larger_box,
-    moves,
-)
+from smokelift.direct.growth import Growth, camera_and_lamp_places, dissolve, in_larger_box, moves
+from smokelift.direct.mesh import Mesh
 from smokelift.direct.new_sequence import MIN_FRAMES, Written, directed_writer, write_copy, write_simulated
 from smokelift.direct.state import SmokeState, read_state
-from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Obstacle, Surroundings, require_place
+from smokelift.direct.surroundings import Fan, Obstacle, Surroundings, require_place
 from smokelift.direct.turbulence import Turbulence
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
@@ -119,7 +113,7 @@ def continue_sequence(
         "start": start,
         "turbulences": [asdict(turbulence) for turbulence in continuation.turbulences],
         "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
-        "obstacles": [_as_settings(obstacle) for obstacle in continuation.obstacles],
+        "obstacles": [each.fingerprint() if isinstance(each, Mesh) else vars(each) for each in continuation.obstacles],
     }
     given = [name for name in ("buoyancy", "dissipation") if settings[name] is not None]
     found = [name for name in ("buoyancy", "dissipation") if name not in given]
@@ -226,8 +220,3 @@ def _surroundings(continuation: Continuation, domain: Domain, clip: Domain) -> S
             )
     placed = continuation.wind, continuation.turbulences, continuation.fans, continuation.obstacles
     return Surroundings(domain, *placed, domain.first_in(clip))
-
-
-def _as_settings(obstacle: Obstacle) -> dict[str, Any]:
-    """What identifies an obstacle in the settings of the new sequence."""
-    return vars(obstacle) if isinstance(obstacle, Ball | BoxObstacle) else obstacle.fingerprint()

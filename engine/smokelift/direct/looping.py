@@ -21,7 +21,6 @@ MAX_OVERLAP = 24
 """Frames that the start and the end of a loop share, at most, unless said otherwise. In a second the way from the one
 to the other is slow beside the smoke's own motion."""
 
-
 TINY = 1e-20
 """Keeps quotients of no smoke finite."""
 

@@ -81,7 +81,8 @@ def orbit_scores(
         else:
             _add_distances(own, [*references[OWN_STEP:], *references[:OWN_STEP]], references)
             outline = _outline(true)
-            found["halo"].append([_halo(picture, outline) for picture in pictures])
+            beyond = ((float(picture[~outline].sum()), float(picture.sum())) for picture in pictures)
+            found["halo"].append([_ratio(*sums) for sums in beyond])
         _add_distances(found, [PatchStatistics.of(picture) for picture in pictures], references)
         edges = zip(map(mean_gradient, pictures), sharp, strict=True)
         found["edges"].append([_ratio(value, reference) for value, reference in edges])
@@ -154,10 +155,6 @@ def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
     return np.asarray(
         ndimage.binary_dilation(brightest > OUTLINE_FRACTION * brightest.max(), iterations=OUTLINE_MARGIN)
     )
-
-
-def _halo(picture: Array, outline: npt.NDArray[np.bool_]) -> float | None:
-    return _ratio(float(picture[~outline].sum()), float(picture.sum()))
 
 
 def _ratio(value: float, reference: float) -> float | None:

@@ -1,6 +1,7 @@
 """NumPy archives that appear whole or not at all, and are read only if they are sound."""
 
 import math
+import operator
 import zipfile
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
@@ -96,7 +97,8 @@ def _array(
     if kind.kind not in kinds:
         raise ValueError(f"{info.filename} holds {kind}")
     count = math.prod(shape)
-    unexpected = exactly not in (None, shape) or (at_most is not None and not _within(shape, at_most))
+    within = at_most is None or (len(shape) <= len(at_most) and all(map(operator.le, shape, at_most)))
+    unexpected = exactly not in (None, shape) or not within
     if unexpected or count > MAX_VALUES or count * kind.itemsize > info.file_size:
         raise ValueError(f"{info.filename} cannot have the shape {shape}")
     with archive.open(info) as file:
@@ -106,7 +108,3 @@ def _array(
     ):  # 16 bits cannot hold the bound
         raise ValueError(f"{info.filename} holds values that are not finite, or beyond {MAX_MAGNITUDE:g}")
     return values
-
-
-def _within(shape: Shape, most: Shape) -> bool:
-    return len(shape) <= len(most) and all(n <= m for n, m in zip(shape, most, strict=False))

@@ -15,7 +15,7 @@ from smokelift.render import scene_optics
 from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scene
 from smokelift.setup.backdrop_findings import first_findings
 from smokelift.setup.coarse import coarse_frame, coarse_frames
-from smokelift.setup.first_estimate import FirstEstimate, first_estimate
+from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.illumination import find_scattering, first_light, light_doubts
@@ -78,7 +78,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         lit = scene_optics(complete).unshadowed_source()
         lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
         first = replace(first, source=np.asarray(lit, np.float32))
-    of_clip = first_findings(estimate, _background_given(scene.background, estimate))
+    # strokes give it where an alpha channel leaves nothing to estimate
+    decided = scene.background is not None and (not scene.background.estimated or estimate.found.source == "alpha")
+    of_clip = first_findings(estimate, decided)
     findings = [*clip.findings(), *of_clip, *geometry.findings, *of_medium, *of_light]
     coarse = coarse_frames((first,), samples.typical, complete) if settings.measure else ()
     if coarse and asked is not None:
@@ -134,11 +136,6 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Findin
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
     figures = {"voxels": float(longest), "tolerance": MAX_VELOCITY_SIDE}
     return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
-
-
-def _background_given(background: Background | None, estimate: FirstEstimate) -> bool:
-    """Whether a scene says what is behind the smoke; strokes do where an alpha channel leaves nothing to estimate."""
-    return background is not None and (not background.estimated or estimate.found.source == "alpha")
 
 
 def _check(length: int, scene: Scene, settings: Settings) -> None:
