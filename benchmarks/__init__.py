@@ -13,7 +13,7 @@ Each is run as ``python -m benchmarks.NAME`` in the folder of the checkout:
 - ``background``: backgrounds that are found beside known ones, and what a spoiled clip costs its volume
 - ``disturbances``: accuracy against the strength of each disturbance
 - ``extraction``: smoke separated from known plates, and what is reconstructed of it
-- ``pipeline``: seconds a frame and memory of whole runs
+- ``pipeline``: seconds per frame and memory of whole runs
 - ``renderer``: the renderer beside other ways to do the same work, and beside exact answers
 - ``stability``: damaged files, hostile values and failing systems against the command line
 - ``velocity``: error against time of the velocity solver, and its error on known flows

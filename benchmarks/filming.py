@@ -69,7 +69,7 @@ def crushed(encoded: Picture, level: float) -> Picture:
 
 
 def exposed(linear: Picture, gains: npt.ArrayLike = 1.0) -> Picture:
-    """Return linear pictures in sRGB, with one gain, one a frame, or one a frame and channel."""
+    """Return linear pictures in sRGB, with one gain, one per frame, or one per frame and channel."""
     gain = np.asarray(gains, np.float32)
     return linear_to_srgb(linear * (gain.reshape(len(linear), 1, 1, -1) if gain.ndim else gain))
 

@@ -20,7 +20,8 @@ struct Run {
     int planes() const { return last - first + 1; }
 };
 
-// One ray a pixel. A ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k), in grid coordinates.
+// One ray per pixel. A ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k), in grid
+// coordinates.
 struct Rays {
     static constexpr int LANES = 16; // pixels of a run, at most
 

@@ -1,5 +1,5 @@
-// A volume on a turntable: its picture from any angle, a pixel a voxel, and factors along the rays of that
-// picture; see the docstrings in register_pictures.cpp.
+// A volume on a turntable: its picture from any angle, one pixel per voxel, and factors along the rays of
+// that picture; see the docstrings in register_pictures.cpp.
 #pragma once
 
 #include "grid.h"

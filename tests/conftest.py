@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture(scope="session", autouse=True)
 def threads_of_a_worker() -> int:
-    """Threads of a call of the compiled core; 0 is one a core. Workers side by side would wait for each other's."""
+    """Threads of a call of the compiled core; 0 is one per core. Workers side by side would wait for each other's."""
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return 0
     from smokelift import _core

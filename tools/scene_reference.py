@@ -34,7 +34,7 @@ CAMERA: Mapping[str, Row] = {
         ("matrices", "list of such matrices", OPEN, "One for every frame that is used, of a camera that moves."),
         ("fov_y_degrees", "number", REQUIRED + ", or `fx`", "Perspective: angle from the lower to the upper edge."),
         ("height", "number", REQUIRED + ", or `fx`", "Orthographic: height of the picture in meters."),
-        ("fx", "number", OPEN, "Focal length in pixels; orthographic: pixels a meter."),
+        ("fx", "number", OPEN, "Focal length in pixels; orthographic: pixels per meter."),
         ("fy", "number", "`fx`", "The same along the picture's height."),
         ("cx", "number", "half of the width", "Where the optical axis meets the picture, in pixels from the left."),
         ("cy", "number", "half of the height", "The same from the top."),

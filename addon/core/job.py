@@ -1,6 +1,6 @@
 """A run of the engine in a child process.
 
-The engine writes its progress to its standard output, one JSON object a line. A thread reads them, so polling never
+The engine writes its progress to its standard output, one JSON object per line. A thread reads them, so polling never
 waits. The engine ends when its standard input closes: so a job is cancelled on every system, and ends by itself when
 Blender quits or crashes.
 """
@@ -33,7 +33,7 @@ HOME = Path(__file__).parents[1]
 LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
 """Folder of an extension that the engine imports from: what is compiled is for one version of Python."""
 
-LINES_A_POLL = 500
+LINES_PER_POLL = 500
 """Lines read in one poll, at most, so that many lines do not delay the caller."""
 
 LONGEST_LINE = 2**20
@@ -153,7 +153,7 @@ class Job:
         self._before = before
         self._log: IO[bytes] | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._lines: queue.Queue[bytes | None] = queue.Queue(4 * LINES_A_POLL)
+        self._lines: queue.Queue[bytes | None] = queue.Queue(4 * LINES_PER_POLL)
         self._kill_at: float | None = None
         self._output_ended = False
         self._exited_at: float | None = None
@@ -195,7 +195,7 @@ class Job:
             return False
         assert self._process is not None
         changed = False
-        for _ in range(LINES_A_POLL):
+        for _ in range(LINES_PER_POLL):
             try:
                 line = self._lines.get_nowait()
             except queue.Empty:

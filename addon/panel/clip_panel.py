@@ -254,7 +254,7 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     if size != tuple(clip.size):
         said.append(iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size))
     if clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01:  # pictures have no rate of their own
-        text = iface_("The clip has {:g} frames a second, the scene {:g}.")
+        text = iface_("The clip has {:g} frames per second, the scene {:g}.")
         said.append(text.format(clip.fps, frame_rate(scene)))
     if said:
         draw_hint(layout, " ".join(said), "smokelift.match_clip")

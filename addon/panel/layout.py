@@ -11,7 +11,7 @@ from ..core.job import Job
 from ..core.sentences import REMEDIES, advice, duration, repeats
 from ..result.side_job import writing_job
 
-POINTS_A_LETTER = 6.5
+POINTS_PER_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
 NEW_WIDTH = 258
@@ -108,7 +108,7 @@ def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None
     text = iface_(text)
     region = bpy.context.region
     width = NEW_WIDTH if region is None else region.width / bpy.context.preferences.system.ui_scale
-    lines = textwrap.wrap(text, max(16, int((width - (50.0 if icon == "NONE" else 70.0)) / POINTS_A_LETTER)))
+    lines = textwrap.wrap(text, max(16, int((width - (50.0 if icon == "NONE" else 70.0)) / POINTS_PER_LETTER)))
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(lines):

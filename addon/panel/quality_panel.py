@@ -28,7 +28,11 @@ class QualitySettings:
             ("draft", "Draft", "A quick preview"),
             ("balanced", "Balanced", "Good for most shots"),
             ("fine", "Fine", "More of the clip's detail, several times slower"),
-            ("final", "Final", "All of the clip's detail, a voxel a pixel: much memory, seconds to minutes a frame"),
+            (
+                "final",
+                "Final",
+                "All of the clip's detail, one voxel per pixel: much memory, seconds to minutes per frame",
+            ),
         ],
         default="balanced",
     )

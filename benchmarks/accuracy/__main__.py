@@ -10,7 +10,7 @@ reconstruction has a process of its own; one that is in OUT already is not repea
 
 The FOLDER of the ScalarFlow capture has scene.toml and any number of cameraNN.toml. Every tenth frame of 10 to 110 is
 compared at 270 x 480, as the cameras are calibrated and registered (the recordings moved as FluidNexus moves them), and
-each also with one gain a camera.
+each also with one gain per camera.
 
 OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real).
 """

@@ -19,7 +19,7 @@ SECONDS = "seconds"
 PANELS = ((SECONDS, "view_error"), ("view_error", "patches"))
 """Across and up in each: speed against accuracy, and how right new views are against how like smoke they look."""
 
-NAMES = {SECONDS: "processor seconds a frame", **ERRORS}
+NAMES = {SECONDS: "processor seconds per frame", **ERRORS}
 
 DIRECTIONS = [(round(np.cos(turn), 3), round(np.sin(turn), 3)) for turn in np.pi * np.arange(16) / 8]
 DISTANCES = (10, 16, 26, 40, 60, 90, 130)

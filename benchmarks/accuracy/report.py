@@ -20,7 +20,7 @@ Column = tuple[str, list[str], str]
 """Heading, the figures that share the column, and their format."""
 
 _COST: list[Column] = [
-    ("processor s a frame", ["seconds"], ".2f"),
+    ("processor s per frame", ["seconds"], ".2f"),
     ("solves", ["solves"], ".0f"),
     ("MiB", ["memory_mib"], ".0f"),
 ]
@@ -98,7 +98,7 @@ def write(out: Path, name: str, rows: list[Row], scenes: list[KnownScene]) -> No
 def contact_sheet(
     scenes: list[KnownScene], shown: list[str], folder: Callable[[KnownScene, str], Path], path: Path
 ) -> None:
-    """Write a picture of the last scored frames: a row a scene; for every view the truth and some runs."""
+    """Write a picture of the last scored frames: one row per scene; for every view the truth and some runs."""
     rows = []
     for known in scenes:
         last = known.scored[-1:]

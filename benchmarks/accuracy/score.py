@@ -162,7 +162,8 @@ def _view_figures(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
 
 
 def _exposure_figures(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
-    """Return what PSNR and SSIM become with one gain a camera, since real cameras differ in exposure; and the gains."""
+    """Return what PSNR and SSIM become with one gain per camera, since real cameras differ in exposure; and the
+    gains."""
     shown: dict[str, list[Image]] = {view: [] for view in known.cameras}
     for _, pictures in images(known, run, folder, known.scored):
         for view, picture in pictures.items():

@@ -33,7 +33,7 @@ def main() -> None:
         _write(take)
     for kind in ("smoke", "proxy"):
         megabytes = (take.directory / f"{kind}_0001.vdb").stat().st_size / 1e6
-        print(f"{kind}: {megabytes:.2f} MB a frame")
+        print(f"{kind}: {megabytes:.2f} MB per frame")
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon.register()
     obj = volume.show(smoke(bpy.context.scene), take)
@@ -42,7 +42,7 @@ def main() -> None:
         before = psutil.Process().memory_info().rss
         seconds = [_played(obj, frame) for frame in range(1, FRAMES + 1)]
         megabytes = (psutil.Process().memory_info().rss - before) / 1e6 / FRAMES
-        print(f"{'proxy' if shown else 'smoke'}: {np.median(seconds):.3f} s and {megabytes:.1f} MB a frame")
+        print(f"{'proxy' if shown else 'smoke'}: {np.median(seconds):.3f} s and {megabytes:.1f} MB per frame")
 
 
 def _played(obj: bpy.types.Object, frame: int) -> float:

@@ -34,7 +34,7 @@ from smokelift.scene import Domain
 from smokelift.transport import Velocity, faces_in
 from smokelift.transport.advection import fraction_inside
 
-HEADER = ["case", "room", "left by a face", "dissolved", "box at the end", "seconds a frame: first, last six"]
+HEADER = ["case", "room", "left by a face", "dissolved", "box at the end", "seconds per frame: first, last six"]
 
 COLUMNS = 8
 

@@ -55,7 +55,7 @@ def taken(
     known, gray
         What is filmed, and what stands behind it.
     gains
-        Exposure: one gain, or one a frame.
+        Exposure: one gain, or one per frame.
     spoil
         What becomes of the sRGB pictures.
     **given

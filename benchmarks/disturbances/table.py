@@ -108,7 +108,7 @@ DISTURBANCES: dict[str, Disturbance] = {
         logarithmic=True,
     ),
     "motion": Disturbance(
-        "Motion", "voxels a frame", calls.motion, (0.01, 0.1, 0.5, 1, 2, 5, 10, 20), 1, logarithmic=True
+        "Motion", "voxels per frame", calls.motion, (0.01, 0.1, 0.5, 1, 2, 5, 10, 20), 1, logarithmic=True
     ),
     "scale": Disturbance(
         "Density scaled", "factor", calls.scaled_density, (1e-6, 1e-3, 0.1, 1, 10, 1e3, 1e6), 1, logarithmic=True

@@ -1,1 +1,1 @@
-"""A whole run from a clip to files on disk: seconds a frame and memory."""
+"""A whole run from a clip to files on disk: seconds per frame and memory."""

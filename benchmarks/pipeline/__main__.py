@@ -30,7 +30,7 @@ MEMORY = 24.0
 """GiB of the largest machine that a grid is foretold for."""
 
 HEADER = (
-    "voxels", "may hold smoke", "density s", "velocity s", "s a frame", "solves", "MiB", "bytes a voxel", "front dB",
+    "voxels", "may hold smoke", "density s", "velocity s", "s per frame", "solves", "MiB", "bytes a voxel", "front dB",
 )  # fmt: skip
 
 
@@ -87,12 +87,12 @@ def laws(runs: Sequence[Run]) -> list[str]:
         return []
     seconds, mib = [run.seconds for run in done], [run.memory_mib or 0.0 for run in done]
     memory, time = Law.of(done, mib), Law.of(done, seconds)
-    bytes_a_voxel, bytes_more = (2**20 * cost for cost in (memory.a_voxel, memory.an_occupied))
+    per_voxel, bytes_more = (2**20 * cost for cost in (memory.a_voxel, memory.an_occupied))
     nanoseconds, more = (1e9 * cost for cost in (time.a_voxel, time.an_occupied))
     of_voxels, of_fraction = exponents(done, seconds)
     fractions = [run.occupied for run in done]
     return [
-        f"Memory: {memory.base:.0f} MiB, {bytes_a_voxel:.0f} bytes a voxel, {bytes_more:.0f} more where smoke may be.",
+        f"Memory: {memory.base:.0f} MiB, {per_voxel:.0f} bytes per voxel, {bytes_more:.0f} more where smoke may be.",
         f"Time: {time.base:.2f} s, {nanoseconds:.0f} ns a voxel, {more:.0f} more where smoke may be.",
         f"Time grows as voxels^{of_voxels:.2f} fraction^{of_fraction:.2f}.",
         *(

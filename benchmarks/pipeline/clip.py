@@ -15,7 +15,7 @@ SHAPE = (64, 64, 96)
 """Voxels of the pictured smoke; the grid that is timed may be another."""
 
 PIXELS = (512, 768)
-"""Columns and rows of the pictures: at least two pixels a voxel of the paper's finest grid."""
+"""Columns and rows of the pictures: at least two pixels per voxel of the paper's finest grid."""
 
 HEIGHT = 3.0
 """Longest side of the box (m)."""

@@ -151,7 +151,7 @@ class Stage:
 def main() -> None:
     """Print a table for each size and scene, and the times of Smokelift alone."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.renderer")
-    parser.add_argument("--sizes", default="32,64,128,256", help="voxels a side")
+    parser.add_argument("--sizes", default="32,64,128,256", help="voxels per side")
     parser.add_argument("--peers", default=",".join(PEERS), help=f"of {', '.join(PEERS)}")
     parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="for Smokelift")
     options = parser.parse_args()

@@ -225,7 +225,7 @@ class Comparison:
                 cells = [f"{difference(pictures[number][c], pictures[best][c]):.3f}" for c in self.cases]
                 rows.append([kind, str(number), str(best), *cells])
         columns = [", ".join(self.named(case)) for case in self.cases]
-        return markdown(["light", "steps a voxel or directions", "against", *columns], rows)
+        return markdown(["light", "steps per voxel or directions", "against", *columns], rows)
 
     def tables(self) -> Iterator[tuple[str, str]]:
         """Yield what each table shows, and the table."""

@@ -2,9 +2,9 @@
 
     blender -b --factory-startup -P manta_scene.py -- NAME ACROSS FRAMES STEPS OUT
 
-ACROSS is the number of voxels along x, STEPS that of solver steps a frame; OUT is the file to write, in the format that
-truth.py reads. The velocity of a frame carries its smoke to the next one if a step is a frame; with several it is left
-out. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
+ACROSS is the number of voxels along x, STEPS that of solver steps per frame; OUT is the file to write, in the format
+that truth.py reads. The velocity of a frame carries its smoke to the next one if a step is a frame; with several it is
+left out. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
 """
 
 import json
@@ -72,7 +72,7 @@ class Simulation:
         self.manta, self.scene, self.step_time = manta, scene, step_time
         self.voxel = BOX_SIZE[0] / across
         self.shape = tuple(round(size / self.voxel) + 2 for size in BOX_SIZE)
-        self.scale = step_time / self.voxel  # m/s -> voxels a step, Mantaflow's unit here
+        self.scale = step_time / self.voxel  # m/s -> voxels per step, Mantaflow's unit here
         axes = [
             low + np.arange(-0.5, count - 1, dtype=np.float32) * self.voxel
             for low, count in zip(BOX_MIN, self.shape, strict=True)

@@ -152,7 +152,7 @@ KINDS: dict[str, Callable[[np.random.Generator, int], Scene]] = {
 def draw_tempo(rng: np.random.Generator) -> float:
     """A factor on all speeds, 0.65 to 1.5, mostly low: real shots are, and a few should be hard.
 
-    At 1 the fastest smoke goes about 4 voxels a frame on a grid 64 across. Forces go with the square, so that the
+    At 1 the fastest smoke goes about 4 voxels per frame on a grid 64 across. Forces go with the square, so that the
     shape of the flow stays and only its pace changes.
     """
     return float(0.65 * 2.3 ** (rng.uniform() ** 2))

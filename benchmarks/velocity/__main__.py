@@ -69,7 +69,7 @@ def measure(name: str, shape: tuple[int, int, int], truth: Truth | None) -> None
         frames = [round((truth.frames - 1) * (k + 1) / (count + 1)) for k in range(count)]
         pairs = [pair_of_truth(truth, frame) for frame in frames]
     motion = float(np.mean([np.linalg.norm(pair.motion[pair.counted], axis=-1).mean() for pair in pairs]))
-    print(f"\n{name}, {size_text(shape)}: {motion:.2g} voxels a frame on average\n")
+    print(f"\n{name}, {size_text(shape)}: {motion:.2g} voxels per frame on average\n")
     print(markdown(("estimate (* by default)", "error", "solves", "ms")), flush=True)
     for words, estimator in ESTIMATORS.items():
         if words in SHORT or not many:

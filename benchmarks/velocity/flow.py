@@ -15,7 +15,7 @@ so both densities sample one function, and no step of Smokelift takes part. The 
 because the motion carries the one density into the other.
 
 Velocity and smoke have the spectrum k^(-5/3) (Kolmogorov 1941, Corrsin 1951) down to the same number of voxels at every
-size: a finer grid has finer smoke and finer eddies, and moves by more voxels a frame.
+size: a finer grid has finer smoke and finer eddies, and moves by more voxels per frame.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ from benchmarks.velocity.pairs import Pair
 from smokelift.transport import Array
 
 FASTEST = 1 / 64
-"""Largest speed in longest sides a frame, about: one and a half voxels of 96, four and a half of 288."""
+"""Largest speed in longest sides per frame, about: one and a half voxels of 96, four and a half of 288."""
 
 TURBULENCE = 0.3
 """Root mean square speed of the plane waves, relative to the ring's in its middle."""
@@ -39,8 +39,8 @@ RADIUS = 0.13
 STIRRED = 4.0
 """Frames during which the flow draws out the smoke before the first density."""
 
-STEPS_A_FRAME = 2
-"""Runge-Kutta steps of the frame between the densities; one a frame is enough before, which both share."""
+STEPS_PER_FRAME = 2
+"""Runge-Kutta steps of the frame between the densities; one per frame is enough before, which both share."""
 
 BALL = 0.22
 """Radius of the smoke before the flow draws it out."""
@@ -152,7 +152,7 @@ def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
     motion = np.zeros_like(positions)
     for part in _batches(positions):
         x = positions[:, part]
-        last = stirred.flow.back(x, 1.0, STEPS_A_FRAME)
+        last = stirred.flow.back(x, 1.0, STEPS_PER_FRAME)
         motion[:, part] = (x - last) * np.float32(max(shape))
         before[part], after[part] = (stirred.density(end, 0.0) for end in (x, last))
     vectors = np.stack([component.reshape(shape) for component in motion], -1)

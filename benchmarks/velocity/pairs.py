@@ -22,7 +22,7 @@ class Pair:
     before, after : (nx, ny, nz) float32
         Densities of two frames.
     motion : (nx, ny, nz, 3) float32
-        What carries the first into the second, in voxels a frame, at voxel centers and at the points of arrival.
+        What carries the first into the second, in voxels per frame, at voxel centers and at the points of arrival.
     inlet : (nx, ny, nz) bool
         Where smoke enters. Estimates do not know it.
     """

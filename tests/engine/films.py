@@ -54,7 +54,7 @@ def grainy(pictures: Iterable[np.ndarray], noise: float, seed: int = 1) -> Itera
 
 
 def clip_of(folder: Path, pictures: Iterable[np.ndarray], suffix: str = ".png", **how: Any) -> Clip:
-    """Write linear pictures, and open them as `Clip.open` does, by default with 24 frames a second."""
+    """Write linear pictures, and open them as `Clip.open` does, by default with 24 frames per second."""
     for n, picture in enumerate(pictures):
         write_image(folder / f"frame_{n:03d}{suffix}", picture)
     return Clip.open(folder / f"frame_###{suffix}", **{"fps": 24, **how})
@@ -114,7 +114,7 @@ def encode(
 ) -> Path:
     """Write pictures (rows, columns, channels) of 8 or 16 bits with FFmpeg: a video, or one file of a picture.
 
-    A video has 24 frames a second, or ``times`` in 1/240 s, and is lossless in H.264. ``tags`` are attributes of the
+    A video has 24 frames per second, or ``times`` in 1/240 s, and is lossless in H.264. ``tags`` are attributes of the
     codec's context.
     """
     picture = path.suffix.lower() in (".png", ".tif", ".tiff", ".dpx")

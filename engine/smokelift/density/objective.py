@@ -55,8 +55,9 @@ class Term:
 def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
     """A term for every camera's picture.
 
-    Smoke outside the domain is not modelled. So a pixel counts by ``inside`` (one picture a view), the fraction of its
-    ray's smoke that lies inside: the few voxels that the ray crosses on its way out need not hold all that it shows.
+    Smoke outside the domain is not modelled. So a pixel counts by ``inside`` (one picture per view), the fraction of
+    its ray's smoke that lies inside: the few voxels that the ray crosses on its way out need not hold all that it
+    shows.
     """
     return [
         Term(view, renderer, view.influenced * np.maximum(fraction, MIN_INSIDE) ** 2)

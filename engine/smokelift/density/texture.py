@@ -89,7 +89,7 @@ class ClipTexture:
     The `turntable` is before the input's camera. It turns about the smoke's own axis: what is seen on the way about it
     looks alike. There is one of the `exemplars` a scale, the coarsest first: its patches are as wide as the smoke.
     `width` is the standard deviation of the smoke across the axis, in voxels. `drift` is the mean motion of the
-    pictures along it, in voxels a frame, and `roughness` the strength of each octave of `stretched_noise`.
+    pictures along it, in voxels per frame, and `roughness` the strength of each octave of `stretched_noise`.
     """
 
     turntable: Turntable
@@ -159,7 +159,7 @@ def _on_screens(
 
 
 def _motion(pairs: Sequence[tuple[Sequence[_Shown], Sequence[_Shown]]]) -> NDArray[np.float64]:
-    """Mean motion across and along the axis, in voxels a frame, that explains most of the change between frames.
+    """Mean motion across and along the axis, in voxels per frame, that explains most of the change between frames.
 
     It is the least squares solution of p' - p + u . grad p = 0 over pairs of successive pictures of the input,
     compressed and smoothed.
@@ -184,9 +184,9 @@ def _width(picture: Picture) -> float:
 def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
     """Standard deviation of the logarithm of some smoke's density by octave, the coarsest first.
 
-    The pictures are optical depths, a pixel a voxel; the smoke is ``width`` voxels wide (standard deviation across its
-    axis). A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart, is
-    divided by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
+    The pictures are optical depths, one pixel per voxel; the smoke is ``width`` voxels wide (standard deviation across
+    its axis). A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart,
+    is divided by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
     """
     octaves = max(1, 1 + int(np.log2(MAX_NODE_DISTANCE * width / MIN_NODE_DISTANCE)))
     blurs = [MAX_NODE_DISTANCE * width / 2**octave / np.sqrt(6) for octave in range(octaves)]

@@ -1,4 +1,4 @@
-"""What is seen of the smoke when it is turned about an axis of the grid, at a pixel a voxel."""
+"""What is seen of the smoke when it is turned about an axis of the grid, at one pixel per voxel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from smokelift.scene import Camera, Domain, as_matrix
 
 Volume = NDArray[np.float32]
 Picture = NDArray[np.float32]
-"""(columns, voxels along the axis), a pixel a voxel, upwards."""
+"""(columns, voxels along the axis), one pixel per voxel, upwards."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,7 @@ class Scatter:
 class Wander:
     """How the smoke of one camera's clip wanders.
 
-    `velocity` (3,) is in voxels a frame, `width` the standard deviation of the smoke across its axis in voxels.
+    `velocity` (3,) is in voxels per frame, `width` the standard deviation of the smoke across its axis in voxels.
     `roughness` is the standard deviation of the logarithm of its density by octave, the coarsest first: see
     `stretched_noise`.
     """

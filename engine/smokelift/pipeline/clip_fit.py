@@ -1,8 +1,9 @@
 """How closely a density renders to its clip, at the clip's own pixels.
 
-A fit is judged on the working picture, a pixel a voxel; what is finer than the grid shows here only. So that it costs
-little, rays go through every n-th pixel of every n-th row, n odd: the ray through the middle of a block of n x n pixels
-is that of its middle pixel, so these pixels are rendered exactly, and the mean over them stands for that over all.
+A fit is judged on the working picture, one pixel per voxel; what is finer than the grid shows here only. So that it
+costs little, rays go through every n-th pixel of every n-th row, n odd: the ray through the middle of a block of n x n
+pixels is that of its middle pixel, so these pixels are rendered exactly, and the mean over them stands for that over
+all.
 """
 
 import math
@@ -19,9 +20,9 @@ OUTLINE_PIXELS = 320
 """Pixels along the longer side of the picture, at most, in which the smoke is found: its outline needs no more
 (docs/experiments/clip-pixels.md)."""
 
-RAYS_A_VOXEL = 2.0
+RAYS_PER_VOXEL = 2.0
 """Rays along a voxel, about, where it has as many pixels: what interpolation leaves repeats from voxel to voxel, and
-two rays a voxel see both its ends and its middle (docs/experiments/clip-pixels.md)."""
+two rays per voxel see both its ends and its middle (docs/experiments/clip-pixels.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +53,14 @@ def beside_clip(
 ) -> BesideClip | None:
     """Render a density (nx, ny, nz) beside a frame, from 0, of a view's clip, at the clip's own pixels.
 
-    Only every so many pixels along and across are taken, an odd number; by default as many as leave `RAYS_A_VOXEL`. It
-    is None if nothing of the domain is in the frame's picture.
+    Only every so many pixels along and across are taken, an odd number; by default as many as leave `RAYS_PER_VOXEL`.
+    It is None if nothing of the domain is in the frame's picture.
     """
     working = view.working_at(frame, optics.domain)
     if working is None:
         return None
     side = min(working.width, working.height)
-    wanted = step or 2 * round((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1
+    wanted = step or 2 * round((math.sqrt(working.pixels) / RAYS_PER_VOXEL - 1) / 2) + 1
     step = max(1, min(wanted, side - 1 + side % 2))
     columns, rows = working.width // step, working.height // step
     # what is left over of a step is left out on both sides

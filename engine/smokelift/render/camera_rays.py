@@ -36,7 +36,7 @@ BAND = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """One ray a pixel, for one grid.
+    """One ray per pixel, for one grid.
 
     Attributes
     ----------

@@ -87,7 +87,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     view_clip = _open_clip(view.clip, clip, scene)
     if abs(view_clip.fps - clip.fps) > MAX_RATE_DIFFERENCE * clip.fps:
         raise ValueError(
-            f"{view_clip.path}: has {view_clip.fps:g} frames a second, the input {clip.fps:g}; all views need the "
+            f"{view_clip.path}: has {view_clip.fps:g} frames per second, the input {clip.fps:g}; all views need the "
             "same, so convert one, or give the frame rate of the clip whose file says it wrongly."
         )
     camera, background = fitting(view.camera, view_clip), view.background

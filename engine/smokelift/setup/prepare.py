@@ -151,7 +151,7 @@ def _check(length: int, scene: Scene, settings: Settings) -> None:
             if camera is not None:
                 camera.require_outside(scene.domain)
     if scene.views and (moves or any(view.camera.moves for view in scene.views)):
-        raise ValueError("With further views no camera may move; give one matrix a camera, or one view only.")
+        raise ValueError("With further views no camera may move; give one matrix per camera, or one view only.")
     if scene.camera is not None and moves and len(scene.camera.matrices) != length:
         given, used = counted(len(scene.camera.matrices), "frame"), counted(length, "frame")
         raise ValueError(

@@ -59,7 +59,7 @@ class Settings:
     method
         ``"default"``, or ``"paper"``: the paper's loop as it is, for comparison.
     quality
-        ``"draft"``, ``"balanced"``, ``"fine"`` or ``"final"`` (a voxel a pixel): how much of the clip's detail the
+        ``"draft"``, ``"balanced"``, ``"fine"`` or ``"final"`` (one voxel per pixel): how much of the clip's detail the
         grid shows (unless it is given), and iterations.
     resolution
         Voxels along x, y, z. ``"auto"`` takes as few as the detail of the clip's smoke allows, up to the quality's

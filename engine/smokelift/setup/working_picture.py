@@ -1,4 +1,4 @@
-"""The working picture: a frame cropped to the domain and reduced to about one pixel a voxel."""
+"""The working picture: a frame cropped to the domain and reduced to about one pixel per voxel."""
 
 from dataclasses import dataclass, replace
 

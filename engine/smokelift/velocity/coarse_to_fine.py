@@ -132,7 +132,7 @@ def _half(pair: DensityPair) -> DensityPair:
 def _usable_prediction(
     given: Velocity | None, pair: DensityPair, prepared: PreparedPair, weight: Array
 ) -> StaggeredGrid | None:
-    """The prediction in voxels a frame, if it explains the change well enough as it is, and better than no motion."""
+    """The prediction in voxels per frame, if it explains the change well enough as it is, and better than no motion."""
     if given is None or not any(component.any() for component in given.faces):
         return None
     u = replace(given, closed=pair.closed).displacement(pair.dt)

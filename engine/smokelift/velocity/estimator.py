@@ -72,7 +72,7 @@ class DensityPair:
         require_positive("voxel_size", self.voxel_size)
         first, second = _density("before", self.before), _density("after", self.after)
         require_same_shape("after", second.shape, first.shape)
-        require_kind(self.inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
+        require_kind(self.inflow, np.ndarray | None, "inflow", "an array of booleans, one per voxel")
         if self.inflow is not None:
             require_same_shape("inflow", self.inflow.shape, first.shape)
         set_fields(self, before=first, after=second, closed=checked_sides(self.closed))
@@ -133,7 +133,7 @@ def refine_in_box(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) 
 
 
 def in_meters(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float]) -> Velocity:
-    """The velocity (m/s) of an estimate u in voxels a frame, projected a last time, and what is known of it."""
+    """The velocity (m/s) of an estimate u in voxels per frame, projected a last time, and what is known of it."""
     u, largest = without_divergence(u)
     for component in u.faces:
         component *= np.float32(pair.voxel_size / pair.dt)

@@ -37,7 +37,7 @@ RIDGE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Center:
-    """The motion around which the velocity is regularized: t u_p + P(m), in voxels a frame.
+    """The motion around which the velocity is regularized: t u_p + P(m), in voxels per frame.
 
     `trust` is t, from 0 to 1. `dissipation` is the fraction of the smoke that dissolves in a frame, at most 1 and
     below zero where all of it gets denser.
@@ -51,8 +51,8 @@ class Center:
 def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Linearization, grid: StaggeredGrid) -> Center:
     """Fit trust, momentum and dissipation to a linearized change.
 
-    The prediction is in voxels a frame, and the density (nx, ny, nz) is what momentum goes with. ``grid`` is any field
-    on the estimate's grid.
+    The prediction is in voxels per frame, and the density (nx, ny, nz) is what momentum goes with. ``grid`` is any
+    field on the estimate's grid.
     """
     rows = 4 if prediction is None else 1
     columns = [
@@ -79,9 +79,9 @@ def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Lineari
 
 
 def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:
-    """The motion P(m) in voxels a frame that a momentum (1 or 4, 3) in the smoke sets off.
+    """The motion P(m) in voxels per frame that a momentum (1 or 4, 3) in the smoke sets off.
 
-    It is in voxels a frame at density 1: constant, and along x, y, z, for each component.
+    It is in voxels per frame at density 1: constant, and along x, y, z, for each component.
     """
     axes = np.meshgrid(*(np.linspace(-1, 1, n, dtype=np.float32) for n in density.shape), indexing="ij", sparse=True)
     faces = StaggeredGrid.zero(density.shape, 1.0).faces

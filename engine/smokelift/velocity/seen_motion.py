@@ -96,7 +96,7 @@ def _line(direction: NDArray[np.float64], deviation: float) -> Array:
 def _correction(
     image: "_ImageGrid", motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
 ) -> Array:
-    """What the motion (cells, 2) of the picture lacks, in columns and rows a frame."""
+    """What the motion (cells, 2) of the picture lacks, in columns and rows per frame."""
     columns, rows = (image.pixels @ motion).T.reshape(2, *after.shape)
     down, across = np.indices(after.shape)
     carried = ndimage.map_coordinates(before, (down - rows, across - columns), order=1, mode="nearest")
@@ -166,7 +166,7 @@ class _ImageGrid:
         return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
 
     def mean_motion(self, motion: Array, density: Array) -> NDArray[np.float64]:
-        """Mean along the rays (cells, 2), in columns and rows a frame, of a motion (nx, ny, nz, 3) in voxels."""
+        """Mean along the rays (cells, 2), in columns and rows per frame, of a motion (nx, ny, nz, 3) in voxels."""
         weight = density.ravel() + OUTSIDE_WEIGHT * float(density.max()) + np.finfo(np.float32).tiny
         across = np.einsum("nij,nj->ni", self.moved, motion.reshape(-1, 3))
         sums = self.voxels.T @ np.column_stack([weight[:, None] * across, weight])

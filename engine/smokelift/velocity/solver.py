@@ -26,7 +26,7 @@ class Solver(Protocol):
         problem
             The quadratic function, see `smokelift.velocity.linearization.least_squares`.
         start
-            Without divergence, in voxels a frame.
+            Without divergence, in voxels per frame.
         """
         ...
 
@@ -58,7 +58,7 @@ class PrimalDual:
         Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1, or `solve` raises ValueError.
         The paper gives no values: docs/experiments/velocity-solver.md has the sweep.
     absolute_tolerance, relative_tolerance
-        Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels a frame.
+        Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels per frame.
     iterations
         Limit of its steps. A few tens are usual; the paper gives none.
     inner_tolerance, inner_iterations

@@ -190,7 +190,7 @@ def test_lines_that_are_no_messages_go_to_the_log(engine, log) -> None:
 
 
 def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
-    count = 20 * module.LINES_A_POLL
+    count = 20 * module.LINES_PER_POLL
     job = engine(
         f"import json\nfor n in range({count}):\n"
         f"    print(json.dumps({{'event': 'frame', 'frame': n, 'done': n, 'total': {count}, 'seconds_left': 0}}))\n"
@@ -199,7 +199,7 @@ def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
     before = 0
     while not job.ended:
         job.poll()
-        assert job.done - before <= module.LINES_A_POLL
+        assert job.done - before <= module.LINES_PER_POLL
         before = job.done
     assert (job.outcome, job.done) == ("done", count - 1)
 

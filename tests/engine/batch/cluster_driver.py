@@ -1,4 +1,4 @@
-"""Runs shots of the fake engine on a cluster, and says of each how it ended: a line a shot.
+"""Runs shots of the fake engine on a cluster, and says of each how it ended: one line per shot.
 
 In a process of its own, because a client that lost its scheduler leaves sockets behind, of which pytest complains.
 """

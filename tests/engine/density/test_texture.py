@@ -126,7 +126,7 @@ class Shadows:
 
 
 def moving(step: tuple[int, int], frames: int = 4, width: float = 6.0) -> Shadows:
-    """A blob with detail that moves by some rows and columns a frame."""
+    """A blob with detail that moves by some rows and columns per frame."""
     random = np.random.default_rng(0)
     noise = ndimage.gaussian_filter(random.normal(size=(36, 36)), 1.5)
     rows, columns = np.meshgrid(np.arange(36) - 17.5, np.arange(36) - 17.5, indexing="ij")

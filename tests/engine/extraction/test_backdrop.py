@@ -25,7 +25,7 @@ def spreading_ink(n: int) -> np.ndarray:
 
 
 def fog(folder: Path, frames: tuple[int, int] | None = None, haze: float | None = None) -> Clip:
-    """Billows that fill the picture and drift by two pixels a frame, and pure black at both ends of the file.
+    """Billows that fill the picture and drift by two pixels per frame, and pure black at both ends of the file.
 
     With haze (sRGB) they never leave, and it is added to them.
     """

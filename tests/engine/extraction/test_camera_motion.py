@@ -134,7 +134,7 @@ def test_what_is_no_similarity(motions: tuple[Similarity, ...], how: dict[str, f
 
 
 def ink(count: int) -> np.ndarray:
-    """Return fine texture over half of black, which a swirl turns by a pixel a frame."""
+    """Return fine texture over half of black, which a swirl turns by one pixel per frame."""
     random, shape = np.random.default_rng(3), (180, 240)
     texture = sum(ndimage.gaussian_filter(random.standard_normal((360, 480)), s) * s for s in (1, 3))
     stream = ndimage.gaussian_filter(random.standard_normal(shape), 24)

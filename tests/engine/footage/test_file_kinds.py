@@ -56,7 +56,7 @@ def eight_bits(values: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
 @dataclass(frozen=True, eq=False)
 class Kind:
     """A file; the sRGB values (frames, rows, columns, 3) that it has to be read as, up to a mean difference in steps of
-    8 bits that the encoding may leave; the kinds of its findings, and its frames a second.
+    8 bits that the encoding may leave; the kinds of its findings, and its frames per second.
     """
 
     path: Path

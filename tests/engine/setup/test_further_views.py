@@ -85,7 +85,7 @@ FROM_ASIDE = look_at_matrix((4, 0, 0.8), (0, 0, 0.8), (0, 0, 1))
     ("of_clip", "of_camera", "sentence"),
     [
         ({"frames": (4, 5)}, {}, "has frames 0 to 5, but 4 to 8"),
-        ({"fps": 25.0}, {}, "25 frames a second, the input 24"),
+        ({"fps": 25.0}, {}, "25 frames per second, the input 24"),
         ({"path": Path("none.mp4")}, {}, "none.mp4: no such file"),
         ({}, {"size": (56, 40)}, "56 x 40, the clip's 40 x 56"),
         ({}, {"matrix": FROM_ASIDE, "matrices": (FROM_ASIDE,) * 5}, "no camera may move"),

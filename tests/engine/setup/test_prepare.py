@@ -199,7 +199,7 @@ def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, complete) -> 
 
 
 def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
-    """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
+    """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels per side."""
     shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
     choices = [velocity_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), draft) for shape in shapes]
     assert [coarsening for coarsening, _ in choices] == [choice.value for _, choice in choices] == [0, 1, 2, 3, 4, 1]

@@ -25,7 +25,8 @@ def test_better_qualities_cost_more() -> None:
     [(40, (40, 40, 40, 40)), (128, (64, 96, 128, 128)), (360, (64, 120, 180, 360)), (2000, (64, 128, 256, 2000))],
 )
 def test_qualities_are_shares_of_the_clips_pixels(pixels, allowed) -> None:
-    """Never more than a voxel a pixel; a small clip gets all that it has, a large one no more than can be afforded."""
+    """Never more than one voxel per pixel; a small clip gets all that it has, a large one no more than can be
+    afforded."""
     assert tuple(LIMITS[quality].voxels(pixels) for quality in QUALITIES) == allowed
 
 

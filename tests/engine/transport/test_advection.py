@@ -62,7 +62,7 @@ def test_a_constant_stays_constant_between_walls(scheme):
 
 
 def swirl(speed, shape=(32, 32, 16)):
-    """A flow between walls without divergence, round and round, as fast as `speed` voxels a step."""
+    """A flow between walls without divergence, round and round, as fast as `speed` voxels per step."""
     along = [np.sin(np.pi * np.arange(n + 1) / n) ** 2 for n in shape[:2]]
     stream = along[0][:, None] * along[1][None, :]
     x, y = (np.repeat(a[:, :, None], shape[2], 2) for a in (np.diff(stream, axis=1), -np.diff(stream, axis=0)))

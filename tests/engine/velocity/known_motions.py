@@ -50,7 +50,7 @@ def rotation(angle, shape=SHAPE, radius=6.0, before=0.0):
 
 
 def uniform(motion, shape=SHAPE):
-    """The same velocity everywhere, in voxels a frame."""
+    """The same velocity everywhere, in voxels per frame."""
     return Velocity([np.full(n, v * VOXEL / DT) for n, v in zip(face_shapes(shape), motion, strict=True)], VOXEL)
 
 

@@ -36,7 +36,7 @@ def texture(seed: int = 0) -> np.ndarray:
 
 
 def seen(velocity: Velocity, across: float, up: float, kind: str) -> Velocity:
-    """The velocity corrected by a texture that moves so many pixels a frame to the right and upwards."""
+    """The velocity corrected by a texture that moves so many pixels per frame to the right and upwards."""
     before = texture()
     after = ndimage.shift(before, (-up, across), order=3, mode="nearest")
     density = np.ones(DOMAIN.resolution, np.float32)

@@ -1,6 +1,6 @@
 # mypy: ignore-errors
 # Taichi compiles this file: its annotations are no Python types, so there is nothing for mypy to check.
-"""The camera pass and its adjoint for a GPU: the same sums as in ``cpp/camera.cpp``, one thread a ray.
+"""The camera pass and its adjoint for a GPU: the same sums as in ``cpp/camera.cpp``, one thread per ray.
 
 Voxels are laid out as in ``light_kernels``. On the way back every voxel gathers from the rays that pass it, so that
 nothing is atomic.

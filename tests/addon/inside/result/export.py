@@ -63,7 +63,7 @@ def test_an_export_beside_the_results(made) -> None:
 
 @pytest.mark.parametrize(("host", "velocity"), [("blender", "velocity"), ("houdini", "vel")])
 def test_blender_reads_the_usd_file(made, host, velocity) -> None:
-    """As a sequence of Volumes that look like the smoke and whose velocity is in meters a second."""
+    """As a sequence of Volumes that look like the smoke and whose velocity is in meters per second."""
     exported(made, host=host)
     bpy.ops.wm.usd_import(filepath=str(export.folder_of(made) / "smoke.usda"))
     (obj,) = [obj for obj in bpy.data.objects if obj.type == "VOLUME" and obj != made]

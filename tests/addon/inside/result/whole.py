@@ -284,7 +284,9 @@ def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) 
     wanted = smokelift.render(sequence.density(LAST - FIRST + 1), lit)
     shot.render.engine = "CYCLES"
     shot.cycles.samples, shot.cycles.use_denoising = 128, False
-    shot.cycles.volume_step_rate = 0.25  # a step a voxel is Cycles' own error of one per cent of the example's light
+    shot.cycles.volume_step_rate = (
+        0.25  # one step per voxel is Cycles' own error of one per cent of the example's light
+    )
     shot.render.resolution_percentage = 10
     smoke(shot).smokelift.box.hide_render = True
     shot.world.cycles_visibility.camera = False

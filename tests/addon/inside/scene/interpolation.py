@@ -14,7 +14,7 @@ from smokelift.scene import Domain, Medium, Scene
 from tests.example_shot import add_camera, set_world, smoke
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (32, 32, 48))
-FRAMES, FPS, VOXELS_A_FRAME = 4, 24.0, 4.0
+FRAMES, FPS, VOXELS_PER_FRAME = 4, 24.0, 4.0
 needs_nodes = pytest.mark.skipif(not modifiers.CAN_INTERPOLATE, reason="Blender moves grids since 5.0")
 
 
@@ -30,9 +30,9 @@ def flying(folder: Path, *, fire: bool = False, proxies: bool = False) -> Take:
     take = Take(folder / "take_0001")
     take.directory.mkdir(parents=True)
     velocity = np.zeros((*DOMAIN.resolution, 3), np.float32)
-    velocity[..., 0] = VOXELS_A_FRAME * DOMAIN.voxel_size * FPS
+    velocity[..., 0] = VOXELS_PER_FRAME * DOMAIN.voxel_size * FPS
     for number in range(1, FRAMES + 1):
-        rho = ball(8.0 + VOXELS_A_FRAME * (number - 1))
+        rho = ball(8.0 + VOXELS_PER_FRAME * (number - 1))
         flame = 2.0 * rho if fire else None
         write_vdb(take.directory / f"smoke_{number:04d}.vdb", rho, velocity, DOMAIN, flame=flame)
         if proxies:
@@ -66,7 +66,7 @@ def test_the_smoke_is_where_it_would_be(slow, tmp_path) -> None:
     volume.show(slow, flying(tmp_path, fire=True))
     for frame in range(1, 2 * FRAMES + 1):
         place = min((frame - 1) / 2, FRAMES - 1)
-        wanted = ball(8.0 + VOXELS_A_FRAME * place)
+        wanted = ball(8.0 + VOXELS_PER_FRAME * place)
         np.testing.assert_allclose(seen(slow, frame), wanted, atol=4e-3)
         np.testing.assert_allclose(seen(slow, frame, "flame"), 2.0 * wanted, atol=8e-3)
 
@@ -91,9 +91,9 @@ def test_a_render_has_them_and_their_motion_blur(slow, tmp_path) -> None:
         middle = (hidden * columns).sum() / hidden.sum()
         found.append((middle, np.sqrt((hidden * (columns - middle) ** 2).sum() / hidden.sum())))
     (middle, width), (blurred, wider) = found
-    assert middle == pytest.approx(8.0 + 1.5 * VOXELS_A_FRAME, abs=0.5)
+    assert middle == pytest.approx(8.0 + 1.5 * VOXELS_PER_FRAME, abs=0.5)
     assert blurred == pytest.approx(middle, abs=0.5)
-    assert wider**2 - width**2 == pytest.approx(VOXELS_A_FRAME**2 / 12, rel=0.3), "as of a box as wide as it moves"
+    assert wider**2 - width**2 == pytest.approx(VOXELS_PER_FRAME**2 / 12, rel=0.3), "as of a box as wide as it moves"
 
 
 @needs_nodes
