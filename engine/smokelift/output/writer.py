@@ -32,14 +32,7 @@ from smokelift.output.files import (
     proxy_path,
 )
 from smokelift.output.images import write_image
-from smokelift.output.index import (
-    BOX,
-    DirectoryBusyError,
-    Index,
-    SequenceError,
-    first_change,
-    json_value,
-)
+from smokelift.output.index import BOX, DirectoryBusyError, Index, SequenceError, first_change, json_value
 from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, checked_volume, vdb_module, write_proxy, write_vdb

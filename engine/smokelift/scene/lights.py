@@ -6,17 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from smokelift.checks import shown
-from smokelift.scene.checks import (
-    SceneError,
-    Vector,
-    color,
-    file_path,
-    integer,
-    number,
-    set_fields,
-    unexpected,
-    vector,
-)
+from smokelift.scene.checks import SceneError, Vector, color, file_path, integer, number, set_fields, unexpected, vector
 from smokelift.scene.domain import Box, Domain
 
 MAX_DISTANCE_VOXELS = 1e6

@@ -5,14 +5,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from smokelift.app.options import (
-    Command,
-    add_directed_options,
-    finite_number,
-    frame_range,
-    named_path,
-    require_new,
-)
+from smokelift.app.options import Command, add_directed_options, finite_number, frame_range, named_path, require_new
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
 from smokelift.direct import (
