@@ -81,20 +81,11 @@ def fit_simulation(
 ) -> Simulation:
     """Fit forces, inlets and fire to frames of a clip, for a simulation that goes on from them.
 
-    Parameters
-    ----------
-    states
-        Consecutive, two at least, `dt` seconds apart.
-    marked : (nx, ny, nz) bool, optional
-        Where smoke enters, if that is known.
-    surroundings
-        What the artist has placed; nothing if None.
-    earlier
-        The frames before them, from `coarsen_state`, which show the buoyancy as well.
-    depth_axis
-        0 or 1: the axis, x or y, that is nearest to the camera's line of sight. Motion is compared in the picture.
-    buoyancy, dissipation
-        As in `Physics`, if they are known; None fits them.
+    The states are consecutive, two at least, `dt` seconds apart; those of the frames ``earlier``, from
+    `coarsen_state`, show the buoyancy as well. Where smoke enters is ``marked`` (nx, ny, nz), if that is known, and
+    what the artist has placed is in the surroundings. Motion is compared in the picture: ``depth_axis``, 0 or 1, is
+    the axis, x or y, that is nearest to the camera's line of sight. Buoyancy and dissipation are those of
+    `Physics`, if they are known; None fits them.
     """
     inflow = find_inflow(states, dt, marked)
     if dissipation is None:

@@ -209,19 +209,10 @@ def require_scene(scene: object) -> None:
 
 
 def completed(scene: Scene, camera: Camera | None = None) -> CompleteScene:
-    """Complete a description with defaults, without any footage.
+    """Complete a description with defaults, without any footage; a given camera takes the place of the scene's.
 
-    Parameters
-    ----------
-    scene
-        Needs a domain, and a camera unless one is given. A complete scene stays as it is, but for the camera.
-    camera
-        Takes the place of the scene's.
-
-    Raises
-    ------
-    ValueError
-        If there is no camera or no domain.
+    It is a ValueError if there is no domain, or no camera at all. A complete scene stays as it is, but for the
+    camera.
     """
     require_scene(scene)
     given = {name: value for name, value in {**vars(scene), "camera": camera or scene.camera}.items() if value}
