@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift import Camera, Scene
-from smokelift.evaluation.truth import Truth, on_grid
+from smokelift.evaluation.truth import on_grid
 from smokelift.footage.images import Picture, area_average
 from smokelift.render import scene_renderer
 from smokelift.scene import completed
@@ -94,7 +94,8 @@ class Baked:
         Where a view's transmittance is not stored, Smokelift's renderer computes it from the densities.
         """
         scene = replace(Scene.load(folder / "scene.toml"), clip=None, background=None)
-        densities = Truth.load(folder / "truth.npz").densities[:frames]
+        with np.load(folder / "truth.npz") as file:
+            densities = file["density"][:frames]
         cameras = {view: camera_of(folder / f"{VIEWS[view]}.toml") for view in views}
         seen = {}
         for view, camera in cameras.items():

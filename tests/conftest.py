@@ -4,6 +4,9 @@ import os
 
 import pytest
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""As the command ``smokelift`` starts, before NumPy is loaded: OpenBLAS's threads wait actively for one another."""
+
 
 @pytest.fixture(scope="session", autouse=True)
 def threads_of_a_worker() -> int:

@@ -4,6 +4,8 @@ import ast
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 ADDON = Path(__file__).parents[2] / "addon"
 FOLDERS = ("core", "scene", "result", "panel")
 """From the lowest, which knows no Blender, to the highest."""
@@ -25,19 +27,24 @@ def imports(path: Path) -> set[str]:
     return found
 
 
-MODULES = {f"{path.parent.name}/{path.stem}": imports(path) for path in ADDON.glob("*/*.py") if path.stem != "__init__"}
+@pytest.fixture(scope="module")
+def modules() -> dict[str, set[str]]:
+    """The imports of all modules."""
+    return {
+        f"{path.parent.name}/{path.stem}": imports(path) for path in ADDON.glob("*/*.py") if path.stem != "__init__"
+    }
 
 
-def test_imports_lead_down() -> None:
-    assert {module.partition("/")[0] for module in MODULES} == set(FOLDERS)
-    level = {module: FOLDERS.index(module.partition("/")[0]) for module in MODULES}
-    upward = {(a, b) for a in MODULES for b in MODULES[a] & MODULES.keys() if level[b] > level[a]}
+def test_imports_lead_down(modules) -> None:
+    assert {module.partition("/")[0] for module in modules} == set(FOLDERS)
+    level = {module: FOLDERS.index(module.partition("/")[0]) for module in modules}
+    upward = {(a, b) for a in modules for b in modules[a] & modules.keys() if level[b] > level[a]}
     assert upward == set()
-    order = list(TopologicalSorter({a: MODULES[a] & MODULES.keys() for a in MODULES}).static_order())  # no circle
-    assert len(order) == len(MODULES)
+    order = list(TopologicalSorter({a: modules[a] & modules.keys() for a in modules}).static_order())  # no circle
+    assert len(order) == len(modules)
 
 
-def test_the_core_knows_no_blender_and_nobody_the_engine() -> None:
+def test_the_core_knows_no_blender_and_nobody_the_engine(modules) -> None:
     blender = {"bpy", "bpy_extras", "mathutils", "bl_ui", "bl_operators"}
-    assert {module for module in MODULES if module.startswith("core/") and MODULES[module] & blender} == set()
-    assert {module for module in MODULES if MODULES[module] & {"smokelift", "smokelift_command"}} == set()
+    assert {module for module in modules if module.startswith("core/") and modules[module] & blender} == set()
+    assert {module for module in modules if modules[module] & {"smokelift", "smokelift_command"}} == set()

@@ -1,4 +1,4 @@
-"""Runs the tests of ``inside`` with the bpy of this Python, in two processes: to start one takes as long as a file.
+"""Runs the tests of ``inside`` with the bpy of this Python, in one process: to start it takes as long as a file.
 
 bpy is one per process and a crash of it ends the process; so it stays out of this one. A single file, or a test of
 it, is run like any other: ``pytest tests/addon/inside/scene/volume.py -k velocity``.
@@ -21,9 +21,7 @@ SECONDS = 600
 
 
 @pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="there is no bpy for this Python")
-@pytest.mark.parametrize("paths", [FILES[::2], FILES[1::2]])
-def test_inside(paths) -> None:
-    files = [str(path) for path in paths]
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files]
+def test_inside() -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *map(str, FILES)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
     assert done.returncode == 0, done.stdout[-20_000:] + done.stderr[-2_000:]

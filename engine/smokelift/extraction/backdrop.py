@@ -119,6 +119,9 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     behind, moves = gray or background, camera is not None and camera.moves
     if moves and behind is not None and behind.frame is not None:
         raise ValueError(MOVING_CAMERA)
+    strokes = None
+    if background is not None and background.strokes is not None and gray is None:
+        strokes = Strokes.read(background.strokes, clip.size)
     frames = None if behind is None else behind.frame
     if frames:
         given: Picture | Clip | None = mean_of_frames(frames[:1], clip)
@@ -140,14 +143,13 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
         found = Backdrop("alpha" if gray else "given", quiet, plate, behind, motion=motion)
     plate = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
     found = replace(found, clip=cleared(found.clip, plate), plates=plate)
-    if background is None or background.strokes is None or gray is not None:
+    if background is None or strokes is None:
         return found
     if moves or plate.images is not None:
         raise ValueError(STROKES_OVER_ONE_FRAME)
-    strokes, clip = Strokes.read(background.strokes, found.clip.size), found.clip
     one_color = background.color is not None or (background.estimated and found.source != "picture")
-    plate = stroked_plate(strokes, plate, clip, one_color)
-    clip = without_others(strokes, clip, plate)
+    plate = stroked_plate(strokes, plate, found.clip, one_color)
+    clip = without_others(strokes, found.clip, plate)
     return replace(found, clip=clip, plates=plate, background=background, strokes=strokes)
 
 

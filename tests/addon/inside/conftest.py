@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -47,9 +48,14 @@ def pytest_unconfigure() -> None:
 
 @pytest.fixture(autouse=True)
 def blender(tmp_path, monkeypatch) -> Iterator[Any]:
-    """An empty file; Blender's own talk goes to a log."""
+    """An empty file and no files of a session before; Blender's own talk goes to a log.
+
+    To reset the preferences too would load every add-on of Blender anew, which takes longer than most tests.
+    """
     monkeypatch.chdir(tmp_path)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    shutil.rmtree(bpy.app.tempdir)
+    Path(bpy.app.tempdir).mkdir()
     addon.register()
     yield bpy
     addon.unregister()

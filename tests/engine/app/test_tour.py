@@ -20,6 +20,8 @@ def test_a_command_of_the_tour_does_what_it_says(line, shot, finished, plume, tm
     words = [str(plume.scene.clip.path) if word == "clip.mp4" else word for word in words]
     if words[0] in WRITE_FILES and not has_vdb():
         words.append("--npz")
+    if words[0] == "reconstruct":
+        words += ["--frames", "0:1"]
     monkeypatch.chdir(tmp_path)
     made = [words[n + 1] for n, word in enumerate(words) if word in ("--out", "--page", "--write", "--picture")]
     if words[0] != "inspect":

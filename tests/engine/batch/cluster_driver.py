@@ -4,6 +4,8 @@ In a process of its own, because a client that lost its scheduler leaves sockets
 """
 
 import functools
+import os
+import runpy
 import signal
 import sys
 from pathlib import Path
@@ -13,6 +15,15 @@ from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import finish_shot
 
 FAKE = (sys.executable, "-S", str(Path(__file__).with_name("fake_engine.py")))
+
+
+def run_dask(log: Path, words: tuple[str, ...]) -> None:
+    """Be a scheduler or a worker, which says what it does in a file."""
+    with log.open("a") as file:
+        for stream in (1, 2):
+            os.dup2(file.fileno(), stream)
+    sys.argv = list(words)
+    runpy.run_module(words[0], run_name="__main__", alter_sys=True)
 
 
 def main(address: str, folder: Path) -> None:

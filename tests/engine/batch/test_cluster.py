@@ -1,6 +1,7 @@
 """A batch on a cluster of several processes: nothing lost and nothing done twice, whatever of it is lost."""
 
 import importlib.util
+import multiprocessing
 import os
 import signal
 import socket
@@ -9,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,6 +24,7 @@ if importlib.util.find_spec("distributed") is None:
     pytest.skip("Dask distributed is not installed", allow_module_level=True)
 
 import distributed
+from cluster_driver import run_dask
 
 from smokelift.batch.cluster import Stop, work
 
@@ -38,7 +41,7 @@ SECONDS = 120.0
 
 
 class Cluster:
-    """A scheduler and its workers, each a process."""
+    """A scheduler and its workers, each a process; Dask and the engine are loaded once, before they fork."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -46,31 +49,37 @@ class Cluster:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
         self.address = f"tcp://127.0.0.1:{self.port}"
-        self.processes: list[subprocess.Popen[str]] = []
+        self.forks = multiprocessing.get_context("forkserver")
+        self.forks.set_forkserver_preload(
+            ["smokelift.batch.cluster", "distributed.cli.dask_scheduler", "distributed.cli.dask_worker"]
+        )
+        self.processes: list[BaseProcess] = []
+        self.drivers: list[subprocess.Popen[str]] = []
 
-    def scheduler(self) -> subprocess.Popen[str]:
+    def scheduler(self) -> BaseProcess:
         return self._start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(self.port))
 
-    def worker(self) -> subprocess.Popen[str]:
+    def worker(self) -> BaseProcess:
         options = ("--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", str(self.folder))
         return self._start("distributed.cli.dask_worker", self.address, *options)
 
     def drive(self) -> subprocess.Popen[str]:
-        return self._process(str(Path(__file__).with_name("cluster_driver.py")), self.address, str(self.folder))
+        words = [sys.executable, str(Path(__file__).with_name("cluster_driver.py")), self.address, str(self.folder)]
+        self.drivers.append(subprocess.Popen(words, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True))
+        return self.drivers[-1]
 
     def close(self) -> None:
-        for process in self.processes:
+        for process in (*self.processes, *self.drivers):
             process.kill()
-            process.communicate()
+        for process in self.processes:
+            process.join()
+        for driver in self.drivers:
+            driver.communicate()
 
-    def _start(self, module: str, *options: str) -> subprocess.Popen[str]:
-        return self._process("-m", module, *options, "--no-dashboard")
-
-    def _process(self, *words: str) -> subprocess.Popen[str]:
-        with (self.folder / "cluster.log").open("a") as log:
-            process = subprocess.Popen(
-                [sys.executable, *words], env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=log, text=True
-            )
+    def _start(self, module: str, *options: str) -> BaseProcess:
+        words = (module, *options, "--no-dashboard")
+        process = self.forks.Process(target=run_dask, args=(self.folder / "cluster.log", words))
+        process.start()
         self.processes.append(process)
         return process
 
@@ -106,7 +115,8 @@ def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, 
     first.kill()
     until(lambda: sum(done()) >= 10)
     scheduler.kill()
-    second.wait(SECONDS)  # a worker ends without its scheduler, and its shot with it
+    second.join(SECONDS)  # a worker ends without its scheduler, and its shot with it
+    assert not second.is_alive()
     cluster.scheduler(), cluster.worker()
     until(lambda: 8 in done())  # where the disk is full
     full.unlink()
