@@ -128,24 +128,26 @@ def test_background_and_noise_are_those_of_what_is_seen(tmp_path: Path, mask: Pa
     file = filmed(tmp_path / "clip")
     with Clip.open(file, mask=mask) as clip:
         found = plate_of(clip)
-        before = known_plate(wall(0.3, 0.5), clip)
+        before, _ = known_plate(wall(0.3, 0.5), clip)
     assert codes_apart(found.image, expected.image)[:, :SIDE].max() < 4
     for plate in (found, before):
         np.testing.assert_allclose(plate.noise.total, expected.noise.total, rtol=0.25)
 
 
 @pytest.mark.parametrize("frames", [None, (10, 12)])
-def test_a_cleared_clip_shows_its_background_as_it_is_exposed(
+def test_a_cleared_clip_shows_its_background_at_one_exposure(
     tmp_path: Path, mask: Path, frames: tuple[int, int] | None
 ) -> None:
-    """Also beside the frames that are used, as the plate is found there, too."""
+    """The exposure is measured beside the mask; also beside the frames that are used, as the plate is found there."""
     file = filmed(tmp_path / "clip")
     plate = Plate(wall(0.3, 0.5).astype(np.float32) / 2, np.ones((HEIGHT, WIDTH), np.float32), None)
     with Clip.open(file, mask=mask, frames=frames) as clip:
-        shown = cleared(clip, plate)
+        exposed = clip.exposed(plate.gain)
+        shown = cleared(exposed, plate)
         for number in (0, COUNT - 1):
-            assert codes_apart(shown.whole().frame(number), 2 * plate.image)[:, SIDE:].max() < 3
-        np.testing.assert_array_equal(shown.frame(2)[:, :SIDE], clip.frame(2)[:, :SIDE])
+            np.testing.assert_array_equal(shown.whole().frame(number)[:, SIDE:], plate.image[:, SIDE:])
+        np.testing.assert_allclose(shown.gain(2), 2, rtol=0.02)
+        np.testing.assert_allclose(shown.frame(2)[:, :SIDE], clip.frame(2)[:, :SIDE] / shown.gain(2), rtol=1e-6)
     with Clip.open(file) as clip:
         assert cleared(clip, plate) is clip
 
@@ -156,7 +158,7 @@ def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, m
         found = plate_of(clip)
         assert codes_apart(found.image, wall(0.3, 0.5)).max() < 4
         assert found.confidence[:, SIDE + 4 :].mean() > 0.9
-        given = find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))).plates.at(0)
+        given = find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))).plate.at(0)
         np.testing.assert_allclose(given.image, 0.1, atol=1e-6)
     with Clip.open(file) as clip:
         assert uncovered(found, clip) is found
@@ -171,6 +173,6 @@ def test_what_a_tight_mask_hides_is_still_background(tmp_path: Path) -> None:
     with Clip.open(tmp_path / "frame_###.png", mask=tmp_path / "mask.png") as clip:
         found = find_backdrop(clip, None, None)
     assert found.source == "picture"
-    plate = found.plates.at(0)
+    plate = found.plate.at(0)
     assert plate.confidence.mean() > 0.5
     assert np.percentile(codes_apart(plate.image, truth)[~smoky], 95) < 5
