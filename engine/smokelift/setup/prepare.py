@@ -79,6 +79,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     if estimate.source is not None and scene.lights:
         lit = scene_optics(complete).unshadowed_source()
         lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
+        if estimate.found.source == "picture" and samples.exposure:
+            # a plate from a clip whose white balance changes has that of some frame, and no light's
+            lit = lit.mean() * estimate.source / estimate.source.mean()
         first = replace(first, source=np.asarray(lit, np.float32))
     of_clip = first_findings(estimate, _background_given(scene.background, estimate))
     findings = [*clip.findings(), *of_clip, *geometry.findings, *of_medium, *of_light]
