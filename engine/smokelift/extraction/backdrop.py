@@ -180,7 +180,8 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     if quiet is not clip:
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
-    found = likeliest(part.evened, white)
+    part = part.evened
+    found = likeliest(part, white)
     color, objects = found.color, found.objects
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
@@ -209,12 +210,12 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
         shown = part.with_still()
-        plate = _picture(clip, shown.evened, white)
+        plate = _picture(clip, shown, white)
         if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
             return made("picture", plate)
         # fog drifts over all of the file: treat it as filmed before black
         color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    return made(source, _of_one_color(clip, part.evened, color, objects, white))
+    return made(source, _of_one_color(clip, part, color, objects, white))
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:

@@ -25,10 +25,15 @@ def block(n: int) -> tuple[slice, slice]:
     return slice(2 * n, 2 * n + 12), slice(46, 55)
 
 
-def filmed(folder: Path, with_block: bool = True) -> Path:
-    """Write a clip of a puff before a wall, and of a dark block that moves beside it; its pattern."""
+def filmed(folder: Path, with_block: bool = True, drift: float = 0.0) -> Path:
+    """Write a clip of a puff before a wall, and of a dark block that moves beside it; its pattern.
+
+    It gets brighter by the fraction ``drift``.
+    """
     folder.mkdir()
-    film(folder, wall(0.3, 0.5), puff, 0.8).close()
+    clip = film(folder, wall(0.3, 0.5), puff, 0.8)
+    for n, shown in enumerate(clip) if drift else ():
+        write_image(folder / f"frame_{n:03d}.png", shown * np.float32(1 + drift * n / (COUNT - 1)))
     for n in range(COUNT) if with_block else ():
         file = folder / f"frame_{n:03d}.png"
         codes = np.array(Image.open(file))
@@ -152,11 +157,14 @@ def test_a_cleared_clip_shows_its_background_at_one_exposure(
         assert cleared(clip, plate) is clip
 
 
-def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path) -> None:
-    file = filmed(tmp_path / "clip", with_block=False)
+@pytest.mark.parametrize("drift", [0.0, 0.3])
+def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path, drift: float) -> None:
+    file = filmed(tmp_path / "clip", with_block=False, drift=drift)
     with Clip.open(file, mask=mask) as clip:
         found = plate_of(clip)
-        assert codes_apart(found.image, wall(0.3, 0.5)).max() < 4
+        middle = float(np.median(found.image / wall(0.3, 0.5)))
+        assert middle == pytest.approx(1 + drift / 2, abs=0.05)
+        assert codes_apart(found.image / middle, wall(0.3, 0.5)).max() < 5
         assert found.confidence[:, SIDE + 4 :].mean() > 0.9
         given = find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))).plate.at(0)
         np.testing.assert_allclose(given.image, 0.1, atol=1e-6)
