@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, brightest_channel, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
@@ -137,11 +137,12 @@ def _measured(plate: Plate, reach: Picture, clip: Clip) -> tuple[Plate, Clip]:
     single, blocks = [], []
     for number in clip.spread(NOISE_FRAMES):
         shown, behind = clip.stored(number), plate.at(number)
-        if edge.any():
-            away = clip.as_seen(number, clip.frame(number))[edge] - plate.image[edge]
-            closer = np.abs(away).max(-1) < distance  # never where it is hidden, and not a number
-            nearest[closer], distance[closer] = away[closer], np.abs(away[closer]).max(-1)
         deviation = clip.as_seen(number, shown.through(linear_to_srgb)) - encoded(behind)
+        if edge.any():
+            away = shown.cut(lambda values: values[edge][None]).linear()[0] - plate.image[edge]
+            apart = brightest_channel(np.abs(away))
+            closer = (apart < distance) & np.isfinite(deviation[..., 0][edge])  # never where it is hidden
+            nearest[closer], distance[closer] = away[closer], apart[closer]
         single.append(some_blocks(deviation))
         blocks.append(block_means(deviation[None])[0])
     samples = np.stack(single), np.stack(blocks)
