@@ -27,7 +27,7 @@ from benchmarks.tables import line, markdown
 from smokelift import Background, Clip, Domain, Frame, Settings
 from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.matte import matte
-from smokelift.extraction.plate import Plate, evened, known_plate, without_noise_light
+from smokelift.extraction.plate import Plate, known_plate, without_noise_light
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.output.images import write_image
 from smokelift.scene import CompleteScene
@@ -45,13 +45,13 @@ LOOKED_AT = 8
 """Frames of a clip."""
 
 
-def plate_score(clip: Clip, plates: Plate, background: Picture, clean: Picture) -> dict[str, float]:
-    """Judge the plates that were found for a clip.
+def plate_score(clip: Clip, plate: Plate, background: Picture, clean: Picture) -> dict[str, float]:
+    """Judge the plate that was found for a clip.
 
     Parameters
     ----------
-    clip, plates
-        What was filmed, and what was found behind it.
+    clip, plate
+        What was filmed, at its plate's exposure, and what was found behind it.
     background : (rows, columns, 3)
         The true background, linear.
     clean : (frames, rows, columns, 3)
@@ -63,24 +63,23 @@ def plate_score(clip: Clip, plates: Plate, background: Picture, clean: Picture) 
     that the plate holds; ``missed``: visible smoke outside the matte; ``false``: clear pixels inside it; ``unknown``:
     fraction of the picture.
     """
-    clip = evened(clip, plates)
     truth = linear_to_srgb(background)
     missed, false, errors, lost, smoke = [], [], [], 0.0, 0.0
     touched = np.zeros(clean.shape[1:3], np.bool_)
     unknown = 0.0
     for number in clip.spread(LOOKED_AT):
-        plate = plates.at(number)
+        behind = plate.at(number)
         contrast = np.abs(linear_to_srgb(clean[number]) - truth).max(-1) * 255
-        found = matte(clip.frame(number), plate).mask
+        found = matte(clip.frame(number), behind).mask
         visible = contrast > VISIBLE
         touched |= visible
         if visible.any():
             missed.append(float((visible & ~found).sum() / visible.sum()))
         false.append(float(found[contrast < CLEAR].mean()) if (contrast < CLEAR).any() else 0.0)
-        lost += float(np.abs(plate.image - background)[visible].sum())
+        lost += float(np.abs(behind.image - background)[visible].sum())
         smoke += float(np.abs(clean[number] - background)[visible].sum())
-        errors.append(np.abs(linear_to_srgb(plate.image) - truth).max(-1) * 255)
-        unknown = float((plate.confidence < 0.5).mean())
+        errors.append(np.abs(linear_to_srgb(behind.image) - truth).max(-1) * 255)
+        unknown = float((behind.confidence < 0.5).mean())
     return {
         "plate": float(np.percentile(np.stack(errors)[:, touched], 95)),
         "lost": lost / smoke,
@@ -98,13 +97,13 @@ def plate_row(case: Case, scenes: Sequence[Baked]) -> list[str]:
         clip, background = case.clip(seen), case.background(seen)
         began = time.process_time()
         if case.given:
-            plates: Plate = known_plate(background, clip)
-            clip = without_noise_light(clip, plates.noise)
+            plate, _ = known_plate(background, clip)
+            clip = without_noise_light(clip, plate.noise).exposed(plate.gain)
         else:
             found = find_backdrop(clip, None, None)
-            plates, clip = found.plates, found.clip
+            plate, clip = found.plate, found.clip
         seconds += time.process_time() - began
-        rows.append(plate_score(clip, plates, background, case.clean(seen)))
+        rows.append(plate_score(clip, plate, background, case.clean(seen)))
     figures = {name: [row[name] for row in rows] for name in FIGURES}
     cells = [f"{np.mean(figures['plate']):.1f} ({np.max(figures['plate']):.1f})"]
     cells += [f"{np.mean(figures[name]):.1%} ({np.max(figures[name]):.1%})" for name in FIGURES[1:]]

@@ -56,7 +56,8 @@ def _angles(smokes: Sequence[Seen], light: Doubles, color: Doubles, plate: Pictu
     behind: Picture = (plate * light).astype(np.float32)
     for smoke in smokes:
         clip = filmed(np.clip(exposed(smoke.before(behind, tuple(color * light))), 0, 1))
-        found, estimate = smoke_color(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
+        known, shown = known_plate(behind, clip)
+        found, estimate = smoke_color(sample_smoke(shown, known), np.ones(3))
         if estimate.value != UNDETERMINED:
             own = np.array(found)
             cosine = float(own @ color / (np.linalg.norm(own) * np.linalg.norm(color)))

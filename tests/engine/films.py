@@ -182,7 +182,7 @@ def codes_apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def plate_of(clip: Clip) -> Plate:
     """Return the background that is found for a clip whose camera stands still."""
-    return find_backdrop(clip, None, None).plates
+    return find_backdrop(clip, None, None).plate
 
 
 def clear_plate(image: np.ndarray, codes: float = 1.0) -> Plate:

@@ -15,13 +15,13 @@ from smokelift.extraction.element import (
     tells_source,
     usual_source,
 )
-from smokelift.extraction.hidden_plate import plates_and_source
+from smokelift.extraction.hidden_plate import plate_and_source
 
 __all__ = [
     "Element",
     "brightest_smoke",
     "extract_element",
-    "plates_and_source",
+    "plate_and_source",
     "shows_transmittance",
     "tells_source",
     "usual_source",

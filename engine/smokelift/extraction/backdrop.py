@@ -10,7 +10,6 @@ refused; one color is the same wherever it points. The clip's noise is measured 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -74,10 +73,10 @@ class Backdrop:
     source
         Where it comes from.
     clip
-        The footage without the light that noise adds, with the background in place of what a mask hides and of what is
-        painted as no smoke.
-    plates
-        Backgrounds at full size.
+        The footage at its plate's exposure, without the light that noise adds, with the plate in place of what a mask
+        hides and of what is painted as no smoke.
+    plate
+        What is behind it, at full size.
     background
         The background as a scene gives it, with its strokes; None where it was estimated from the clip alone, unless
         the camera is known to move.
@@ -95,7 +94,7 @@ class Backdrop:
 
     source: Source
     clip: Clip
-    plates: Plate
+    plate: Plate
     background: Background | None = None
     frames: int = 0
     shot: tuple[int, int] | None = None
@@ -132,17 +131,18 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
         found = _estimated(clip, moves)
     else:
 
-        def plate_of(clip: Clip) -> Plate:
+        def known(clip: Clip) -> tuple[Plate, Clip]:
             return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=bool(frames))
 
-        plate = plate_of(clip)
+        plate, shown = known(clip)
         quiet = without_noise_light(clip, plate.noise)
         if quiet is not clip:
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
-            plate = replace(plate_of(quiet), noise=plate.noise)
-        found = Backdrop("alpha" if gray else "given", quiet, plate, behind, motion=motion)
-    plate = uncovered(found.plates, found.clip) if found.source == "picture" else found.plates
-    found = replace(found, clip=cleared(found.clip, plate), plates=plate)
+            noise, (plate, shown) = plate.noise, known(quiet)
+            plate = replace(plate, noise=noise)
+        found = Backdrop("alpha" if gray else "given", shown, plate, behind, motion=motion)
+    plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
+    found = replace(found, clip=cleared(found.clip, plate), plate=plate)
     if background is None or strokes is None:
         return found
     if moves or plate.images is not None:
@@ -150,7 +150,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     one_color = background.color is not None or (background.estimated and found.source != "picture")
     plate = stroked_plate(strokes, plate, found.clip, one_color)
     clip = without_others(strokes, found.clip, plate)
-    return replace(found, clip=clip, plates=plate, background=background, strokes=strokes)
+    return replace(found, clip=clip, plate=plate, background=background, strokes=strokes)
 
 
 def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMotion | None]:
@@ -174,14 +174,16 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     """The background of a clip when none is given; ``motion`` is that by which its frames are registered."""
     filmed = clip
     if len(clip) == len(clip.whole()) == 1 and (around := color_around(clip.frame(0))) is not None:
-        return Backdrop("color around one frame", clip, known_plate(around, clip), frames=1)
+        plate, clip = known_plate(around, clip)
+        return Backdrop("color around one frame", clip, plate, frames=1)
     proxy = Proxy.of(clip)
     white = proxy.white_noise()
     quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
     if quiet is not clip:
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
-    found = likeliest(part.evened, white)
+    part = part.evened
+    found = likeliest(part, white)
     color, objects = found.color, found.objects
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
@@ -189,7 +191,8 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
             raise ValueError(MOVING_CAMERA)
         red, green, blue = (float(v) for v in color)
         behind = Background(color=(red, green, blue))
-        return Backdrop("color", clip, known_plate(color, clip), behind, len(proxy.numbers))
+        plate, clip = known_plate(color, clip)
+        return Backdrop("color", clip, plate, behind, len(proxy.numbers))
     # black, or a color seen often, is the same wherever the camera points; any other may be texture that passes by
     often = found.clear > SEEN_OFTEN and white.max() <= TEXTURE
     plain = color is not None and (often or not color.any())
@@ -200,17 +203,21 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
         if shaken is not None:
             return _estimated(_registered(filmed, shaken), moves, shaken)
     shot = part.numbers[0], part.numbers[-1]
-    made = partial(Backdrop, clip=clip, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
+
+    def made(source: Source, plate: Plate) -> Backdrop:
+        exposed = clip.exposed(plate.gain)
+        return Backdrop(source, exposed, plate, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
+
     source: Source = "color"
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
         shown = part.with_still()
-        plate = _picture(clip, shown.evened, white)
+        plate = _picture(clip, shown, white)
         if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
-            return made("picture", plates=plate)
+            return made("picture", plate)
         # fog drifts over all of the file: treat it as filmed before black
         color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    return made(source, plates=_of_one_color(clip, part.evened, color, objects, white))
+    return made(source, _of_one_color(clip, part, color, objects, white))
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:

@@ -180,23 +180,23 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
     return source
 
 
-def clip_source(clip: Clip, plates: Plate, frames: Sequence[int]) -> Picture:
-    """Return the usual source radiance (3,) of a clip's smoke before its plates, from the first of some frames.
+def clip_source(clip: Clip, plate: Plate, frames: Sequence[int]) -> Picture:
+    """Return the usual source radiance (3,) of a clip's smoke before its plate, from the first of some frames.
 
     ``frames`` (one at least) have those with the most smoke first.
     """
-    shown = [(clip.stored(frame).linear(), plates.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
+    shown = [(clip.stored(frame).linear(), plate.at(frame)) for frame in sorted(frames[:SOURCE_FRAMES])]
     return usual_source(shown, reduced_size(*clip.size, SOURCE_SIDE))
 
 
-def brightest_smoke(clip: Clip, plates: Plate, frame: int, source: Picture) -> float:
+def brightest_smoke(clip: Clip, plate: Plate, frame: int, source: Picture) -> float:
     """Return the radiance that the brightest thick smoke of a frame sends, S of its element; 0 without any.
 
     ``source`` (3,) is what `clip_source` returns. Smoke sends no more than its source radiance, so a light has to make
     that at least as bright.
     """
     picture = clip.stored(frame).linear()
-    element = extract_element(picture, plates.at(frame), source, reduced_size(*clip.size, SOURCE_SIDE))
+    element = extract_element(picture, plate.at(frame), source, reduced_size(*clip.size, SOURCE_SIDE))
     sent = channel_mean(element.radiance)[element.transmittance < 0.5]
     return float(np.percentile(sent, LIT_PERCENTILE)) if sent.size else 0.0
 

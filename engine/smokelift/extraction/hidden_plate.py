@@ -60,20 +60,20 @@ CLEAR_TRANSMITTANCE = 0.02
 """Lower bound of T, for division."""
 
 
-def plates_and_source(clip: Clip, shot: Clip, plates: Plate, smoky: Sequence[int]) -> tuple[Plate, Picture]:
-    """Return the plates of a clip, better known if they were found in its ``shot``, and its smoke's source radiance.
+def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int]) -> tuple[Plate, Picture]:
+    """Return the plate of a clip, better known if it was found in its ``shot``, and its smoke's source radiance.
 
-    Both clips are at the plates' exposure; ``smoky`` are the frames of `clip_source`.
+    Both clips are at the plate's exposure; ``smoky`` are the frames of `clip_source`.
     """
-    source = clip_source(clip, plates, smoky)
-    if plates.images is not None:
-        return plates, source
-    better, loss = plate_in_turn(shot, plates, source)
-    if better is plates:
-        return plates, source
+    source = clip_source(clip, plate, smoky)
+    if plate.images is not None:
+        return plate, source
+    better, loss = plate_in_turn(shot, plate, source)
+    if better is plate:
+        return plate, source
     after = clip_source(clip, better, smoky)
     # a plate that holds bright smoke makes what it leaves look like dark smoke
-    return better, source if loss <= _likeliest(*_shrunk(shot, plates), after)[1] else after
+    return better, source if loss <= _likeliest(*_shrunk(shot, plate), after)[1] else after
 
 
 def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> tuple[Plate, float]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, brightest_channel, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
@@ -92,8 +91,8 @@ class Plate:
         return small(self.image)
 
 
-def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = False) -> Plate:
-    """Return the plate, with the clip's noise, of a known background.
+def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = False) -> tuple[Plate, Clip]:
+    """Return the plate, with the clip's noise, of a known background, and the clip at its exposure.
 
     The background is a linear color (3,), a picture (rows, columns, 3), or a clip with one for each frame of the clip's
     file; pictures are resized to the clip if need be. Unless they are ``filmed``, made of the file's own frames, their
@@ -115,60 +114,57 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
             return clip.as_held(area_average(background.frame(clip.numbers.start + frame), width, height))
 
         plate = Plate(images(0), known, NO_NOISE, images=images, files=background.files)
-        return replace(plate, noise=noise_about(*_noise_samples(plate, clip)))
+        return _measured(plate, np.zeros_like(plate.image), clip.exposed(plate.gain))
     linear = np.asarray(background, np.float32)
     color = linear.shape == (3,)
     if not (color or (linear.ndim == 3 and linear.shape[2] == 3)) or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
     image = np.tile(linear, (height, width, 1)) if color else area_average(linear, width, height)
-    plate = Plate(image, known, NO_NOISE)
-    if not (color or filmed):
-        plate = _with_coarse_colors(plate, clip)
-    deviations, blocks = _noise_samples(plate, clip)
-    given = linear_to_srgb(plate.image)
-    raised = np.maximum(given, clipped_black(deviations, blocks)) - given
-    if not raised.any():
-        return replace(plate, noise=noise_about(deviations, blocks))
-    noise = noise_about(deviations - some_blocks(raised), blocks - block_means(raised[None]))
-    lasting = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
-    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting))
+    held = image if color or filmed else clip.as_held(image)
+    plate = Plate(held, known, NO_NOISE)
+    return _measured(plate, np.abs(held - image), clip.exposed(plate.gain))
 
 
-def _with_coarse_colors(plate: Plate, clip: Clip) -> Plate:
-    """Return a plate whose colors are as coarse as the clip's file holds them.
+def _measured(plate: Plate, reach: Picture, clip: Clip) -> tuple[Plate, Clip]:
+    """Return a plate as a clip at its exposure shows it, with the clip's noise; and the clip.
 
-    Beside a saturated edge a codec does not hold even these. There each pixel goes on towards the frame that is
-    nearest to it, as far at most as coarse colors have changed it.
+    Coarse colors have changed the plate by ``reach`` (rows, columns, 3). Beside a saturated edge a codec does not hold
+    even these. There each pixel goes on towards the frame that is nearest to it, by that much at most.
     """
-    held = replace(plate, image=clip.as_held(plate.image))
-    reach = np.abs(held.image - plate.image)
-    edge = (reach > EIGHT_BIT_STEP * linear_per_srgb(linear_to_srgb(held.image))).any(-1)
-    if not edge.any():
-        return held
-    nearest, distance = np.zeros_like(reach[edge]), np.full(np.count_nonzero(edge), np.inf)
-    for number in clip.spread(NOISE_FRAMES):
-        seen = clip.as_seen(number, clip.frame(number))
-        away = (seen / held.gain(number, small(seen)) - held.image)[edge]
-        closer = np.abs(away).max(-1) < distance  # never where it is hidden, and not a number
-        nearest[closer], distance[closer] = away[closer], np.abs(away[closer]).max(-1)
-    image = held.image.copy()
-    image[edge] += np.clip(nearest, -reach[edge], reach[edge])
-    return replace(held, image=image)
-
-
-def _noise_samples(plate: Plate, clip: Clip) -> tuple[Picture, Picture]:
-    """Differences of a clip from known backgrounds, as `noise_about` takes them; NaN where a mask hides it."""
-    single, blocks = [], []
     encoded = lru_cache(maxsize=1)(lambda plate: linear_to_srgb(plate.image))  # once if the plate is always the same
+    edge = (reach > EIGHT_BIT_STEP * linear_per_srgb(encoded(plate))).any(-1)
+    nearest, distance = np.zeros_like(reach[edge]), np.full(np.count_nonzero(edge), np.inf)
+    single, blocks = [], []
     for number in clip.spread(NOISE_FRAMES):
-        behind, stored = plate.at(number), clip.stored(number)
-        seen = clip.as_seen(number, stored.linear())
-        gains = behind.gain(number, small(seen))
-        even = stored.through(linear_to_srgb) if (gains == 1).all() else linear_to_srgb(seen / gains)
-        deviation = clip.as_seen(number, even) - encoded(behind)
+        shown, behind = clip.stored(number), plate.at(number)
+        deviation = clip.as_seen(number, shown.through(linear_to_srgb)) - encoded(behind)
+        if edge.any():
+            away = shown.cut(lambda values: values[edge][None]).linear()[0] - plate.image[edge]
+            apart = brightest_channel(np.abs(away))
+            closer = (apart < distance) & np.isfinite(deviation[..., 0][edge])  # never where it is hidden
+            nearest[closer], distance[closer] = away[closer], apart[closer]
         single.append(some_blocks(deviation))
         blocks.append(block_means(deviation[None])[0])
-    return np.stack(single), np.stack(blocks)
+    samples = np.stack(single), np.stack(blocks)
+    if plate.images is not None:
+        return replace(plate, noise=noise_about(*samples)), clip
+    held = encoded(plate)
+    image = plate.image.copy()
+    image[edge] += np.clip(nearest, -reach[edge], reach[edge])
+    given = linear_to_srgb(image)
+    samples = _less(samples, given - held)
+    raised = np.maximum(given, clipped_black(*samples)) - given
+    if not raised.any():
+        return replace(plate, image=image, noise=noise_about(*samples)), clip
+    noise = noise_about(*_less(samples, raised))
+    lasting = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
+    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting)), clip
+
+
+def _less(samples: tuple[Picture, Picture], change: Picture) -> tuple[Picture, Picture]:
+    """Samples of deviations, as `noise_about` takes them, from a background that is changed, in sRGB values."""
+    single, blocks = samples
+    return single - some_blocks(change), blocks - block_means(change[None])
 
 
 def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
@@ -177,18 +173,6 @@ def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
     The plate's noise is even in sRGB values, so in linear light it grows with brightness.
     """
     return plate.noise.total * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))
-
-
-def evened(clip: Clip, plate: Plate, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
-    """Return a clip exposed as its plate is; ``known`` are gains (3,) by frame that are not measured."""
-
-    def gains(number: int, shown: Callable[[], Picture]) -> Picture:
-        return known[number] if number in known else plate.gain(number, shown())
-
-    def balanced(number: int, picture: Picture) -> Picture:
-        return picture / gains(number, lambda: small(picture))
-
-    return clip.changed(balanced, lambda number, tiny: bool((gains(number, tiny) == 1).all()))
 
 
 def without_noise_light(clip: Clip, noise: Noise) -> Clip:
@@ -207,16 +191,16 @@ def without_noise_light(clip: Clip, noise: Noise) -> Clip:
 
 
 def cleared(clip: Clip, plate: Plate) -> Clip:
-    """Return a clip that shows its background, at each frame's exposure, where a mask hides it."""
+    """Return a clip at its plate's exposure that shows the plate where a mask hides it."""
     return clip if clip.mask is None else shown_behind(clip, plate, clip.as_seen)
 
 
 def shown_behind(clip: Clip, plate: Plate, visible: Callable[[int, Picture], Picture]) -> Clip:
-    """Return a clip that shows its background, at each frame's exposure, where ``visible`` makes it not a number."""
+    """Return a clip at its plate's exposure that shows the plate where ``visible`` makes it not a number."""
 
     def change(number: int, picture: Picture) -> Picture:
         shown = visible(number, picture)
-        return np.where(np.isnan(shown), plate.at(number).image * plate.gain(number, small(shown)), picture)
+        return np.where(np.isnan(shown), plate.at(number).image, shown)
 
     return clip.changed(change)
 
@@ -232,10 +216,6 @@ def uncovered(plate: Plate, clip: Clip) -> Plate:
     hidden = ~np.any([mask.seen(clip.numbers[number], *clip.size) for number in numbers], axis=0)
     if not hidden.any():
         return plate
-    filmed, shown = clip.as_filmed(), []
-    for number in numbers:
-        gains = plate.gain(number, small(clip.as_seen(number, clip.frame(number))))
-        shown.append(filmed.frame(number)[hidden] / gains)
-    image = plate.image.copy()
-    image[hidden] = np.median(shown, axis=0)
+    filmed, image = clip.as_filmed(), plate.image.copy()
+    image[hidden] = np.median([filmed.frame(number)[hidden] / clip.gain(number) for number in numbers], axis=0)
     return replace(plate, image=image)

@@ -155,7 +155,7 @@ class Proxy:
         return sides[0], sides[-1]
 
     def with_still(self) -> Proxy:
-        """Return the frames with what a mask hides, and never changes, as it was filmed: there is background."""
+        """Return `evened` frames with what a mask hides, and never changes, as it was filmed: there is background."""
         if self.seen.all():
             return self
         encoded = linear_to_srgb(self.filmed)
@@ -176,7 +176,8 @@ class Proxy:
         gains = sample_gains(np.stack([small(picture) for picture in hidden]))
         if (gains == 1).all():
             return self
-        return replace(self, pictures=self.pictures / gains[:, None, None, :], gains=gains)
+        even = gains[:, None, None]
+        return replace(self, pictures=self.pictures / even, filmed=self.filmed / even, gains=gains)
 
     def white_noise(self) -> Picture:
         """Return the white noise (3,) of the file's pixels, in sRGB values, measured at one exposure."""

@@ -15,9 +15,8 @@ from scipy import ndimage
 from smokelift.checks.array_types import Mask
 from smokelift.extraction.plate import Plate, shown_behind
 from smokelift.footage.clip import Clip
-from smokelift.footage.exposure import small
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_layer, srgb_to_linear
+from smokelift.footage.images import area_average, linear_to_srgb, read_layer, srgb_to_linear
 from smokelift.footage.inpainting import continuation_errors, push_pull
 from smokelift.footage.mask import require_shape
 
@@ -59,11 +58,13 @@ class Strokes:
 def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> Plate:
     """Return a plate with what strokes say of it; behind smoke before ``one_color`` is that color for certain.
 
+    The clip is at the plate's exposure.
     ClipError is raised if a frame cannot be read, or if nothing is left that is not smoke.
     """
     image, confidence, seen = plate.image.copy(), plate.confidence.copy(), strokes.other | strokes.behind
     if seen.any():
-        image[seen], confidence[seen] = _median(clip, plate, seen), 1
+        shown = [clip.frame(number)[seen] for number in clip.spread(MEDIAN_FRAMES)]
+        image[seen], confidence[seen] = np.median(shown, axis=0), 1
     if one_color:
         image[strokes.smoke] = np.median(plate.image.reshape(-1, 3), axis=0)
         return replace(plate, image=image, confidence=confidence)
@@ -79,17 +80,8 @@ def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -
 
 
 def without_others(strokes: Strokes, clip: Clip, plate: Plate) -> Clip:
-    """Return a clip that shows its plate, at each frame's exposure, where it is painted as no smoke."""
+    """Return a clip at its plate's exposure that shows the plate where it is painted as no smoke."""
     if not strokes.other.any():
         return clip
     other = strokes.other[..., None]
     return shown_behind(clip, plate, lambda _, picture: np.where(other, np.float32(np.nan), picture))
-
-
-def _median(clip: Clip, plate: Plate, where: Mask) -> Picture:
-    """The median (n, 3) over time of pixels, at the plate's exposure."""
-    shown = []
-    for number in clip.spread(MEDIAN_FRAMES):
-        picture = clip.frame(number)
-        shown.append(picture[where] / plate.gain(number, small(clip.as_seen(number, picture))))
-    return np.asarray(np.median(shown, axis=0), np.float32)

@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
 linear, two of 1080p."""
 
 Kept = OrderedDict[int, StoredPicture]
+Value = TypeVar("Value")
 
 
 class Clip:
@@ -66,7 +67,7 @@ class Clip:
         self._damaged = lru_cache(maxsize=None)(source.damaged)
         self._count = source.count
         self._filmed: Read = partial(_kept, Kept(), STORED_BYTES, source.read)
-        self._read = self._filmed
+        self._read, self._gain = self._filmed, _no_gain
         self._use(frames or (0, source.count - 1))
         self.size = self.stored(0).size
 
@@ -170,7 +171,7 @@ class Clip:
 
     def stored(self, n: int) -> StoredPicture:
         """Return frame ``n`` as it is stored, of which a part or means cost less than the linear `frame`."""
-        return _kept(self._stored, LINEAR_BYTES, self._sound, n)
+        return _kept(self._stored, LINEAR_BYTES, partial(self._sound, self._read), n)
 
     def as_held(self, picture: Picture) -> Picture:
         """Return a linear picture (rows, columns, 3) of the clip's size with its colors as coarse as the file's."""
@@ -210,26 +211,38 @@ class Clip:
 
     def as_filmed(self) -> "Clip":
         """Return the clip with what a mask hides, as the file has it."""
-        return self if self.mask is None else self._with(_read=self._filmed, mask=None)
+        return self if self.mask is None else self._with(_read=self._filmed, _gain=_no_gain, mask=None)
 
-    def changed(
-        self,
-        change: Callable[[int, Picture], Picture],
-        keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
-    ) -> "Clip":
-        """Return the clip with each frame, by its number, replaced by another.
+    def changed(self, change: Callable[[int, Picture], Picture]) -> "Clip":
+        """Return the clip with each frame, by its number, replaced by another."""
+        before, first = self._read, self.numbers[0]
+        return self._with(_read=lambda number: StoredPicture(change(number - first, before(number).linear())))
 
-        ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
+    def exposed(self, measure: Callable[[int, Picture], Picture]) -> "Clip":
+        """Return the clip with each frame divided by its gain (3,), which is measured once.
+
+        ``measure`` takes a frame's number and its small linear picture, in which what is hidden is not a number.
         """
         before, first = self._read, self.numbers[0]
+        gains: dict[int, Picture] = {}
 
         def read(number: int) -> StoredPicture:
             image, n = before(number), number - first
-            if keeps is not None and keeps(n, lambda: image.averaged(*reduced_size(*image.size, COMPARED_SIDE))):
-                return image
-            return StoredPicture(change(n, image.linear()))
+            if number not in gains:
+                small = image.averaged(*reduced_size(*image.size, COMPARED_SIDE))
+                gains[number] = measure(n, self.as_seen(n, small))
+            return image if (gains[number] == 1).all() else StoredPicture(image.linear() / gains[number])
 
-        return self._with(_read=read)
+        def gain(number: int) -> Picture:
+            if number not in gains:
+                read(number)
+            return gains[number]
+
+        return self._with(_read=read, _gain=gain)
+
+    def gain(self, n: int) -> Picture:
+        """Return how many times brighter (3,) frame ``n`` was filmed than a clip that is `exposed` shows it; else 1."""
+        return self._sound(self._gain, n)
 
     def registered(self, motion: Callable[[int, StoredPicture], Similarity]) -> "Clip":
         """Return the clip with each frame as a reference shows it; what a frame does not show of that is hidden.
@@ -283,19 +296,25 @@ class Clip:
         count = min(self._count, mask.count or self._count)
         return self._with(_read=read, mask=mask, _count=count)
 
-    def _sound(self, n: int) -> StoredPicture:
-        """Frame ``n``, or what stands in for a damaged one: the last sound frame before it, else the next after it."""
+    def _sound(self, read: Callable[[int], Value], n: int) -> Value:
+        """What is read of frame ``n``, or of what stands in for a damaged one: the last sound frame before it, else the
+        next after it."""
         if not isinstance(n, int | np.integer) or not 0 <= n < len(self):
             raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {len(self) - 1}")
         try:
-            return self._read(self.numbers[n])
+            return read(self.numbers[n])
         except DamagedFrameError as error:
             damage = error
         for other in (*reversed(range(n)), *range(n + 1, len(self))):
             if other not in self.damaged:
                 with suppress(DamagedFrameError):
-                    return self._read(self.numbers[other])
+                    return read(self.numbers[other])
         raise damage
+
+
+def _no_gain(_: int) -> Picture:
+    """The gain of a frame that is shown as it was filmed."""
+    return np.ones(3, np.float32)
 
 
 def _kept(pictures: Kept, most: int, read: Read, n: int) -> StoredPicture:

@@ -2,7 +2,7 @@
 
 A mask hides what is neither smoke nor anything to learn from: a head, a dog, leaves, a label. Every frame is continued
 there from around it, so that whole pictures hold nothing that moves, and no edge that stays. Counts of pixels leave it
-out (`Clip.seen`). Once the background is known, it takes that place (`plate.cleared`).
+out (`Clip.seen`). Once the plate is known, it takes that place (`plate.cleared`).
 
 A pixel is hidden or not: the mask's stored value counts as black or white, whichever is nearer. Soft edges have no
 meaning: a frame that shows only a part of its smoke would be taken for one of thinner smoke.

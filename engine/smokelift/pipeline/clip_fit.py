@@ -73,7 +73,7 @@ def beside_clip(
         part = working.part(picture)
         return part[down[0] : down[-1] + 1 : step, across[0] : across[-1] + 1 : step]
 
-    plate = view.plates.at(frame)
+    plate = view.plate.at(frame)
     behind = cut(plate.image)
     renderer = optics.renderer(camera.resized(columns, rows), behind, density > 0)
     shown = renderer.image(density)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from smokelift.checks import require_kind
-from smokelift.extraction import Element, extract_element, plates_and_source
+from smokelift.extraction import Element, extract_element, plate_and_source
 from smokelift.extraction.backdrop import find_backdrop
-from smokelift.extraction.plate import Plate, evened
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern
 from smokelift.footage.images import Picture
@@ -32,20 +32,20 @@ class Extraction:
     ----------
     clip
         The footage at its plate's exposure.
-    plates
+    behind
         What is behind the smoke.
     source : (3,)
         The smoke's usual source radiance.
     """
 
     clip: Clip
-    plates: Plate
+    behind: Plate
     source: Picture
 
     @property
     def plate(self) -> Picture:
         """The clean plate (rows, columns, 3) of the first frame, linear."""
-        return self.plates.at(0).image
+        return self.behind.at(0).image
 
     def __len__(self) -> int:
         return len(self.clip)
@@ -55,7 +55,7 @@ class Extraction:
 
     def element(self, frame: int) -> Element:
         """Return the element of a frame, counted from 0."""
-        return extract_element(self.clip.frame(frame), self.plates.at(frame), self.source, self.clip.size)
+        return extract_element(self.clip.frame(frame), self.behind.at(frame), self.source, self.clip.size)
 
     def write(self, path: str | Path) -> Iterator[Path]:
         """Write the elements as premultiplied linear RGBA (EXR, half) or straight sRGB (PNG, 8 bit); yield each file.
@@ -122,6 +122,5 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     found = find_backdrop(clip, scene.camera, scene.background)
-    exposed = evened(found.clip, found.plates)
-    smoky = sample_smoke(found.clip, found.plates).smoky or range(len(clip))
-    return Extraction(exposed, *plates_and_source(exposed, found.shot_of(exposed), found.plates, smoky))
+    smoky = sample_smoke(found.clip, found.plate).smoky or range(len(clip))
+    return Extraction(found.clip, *plate_and_source(found.clip, found.shot_of(found.clip), found.plate, smoky))

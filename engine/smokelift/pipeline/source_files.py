@@ -37,4 +37,4 @@ def sources(shot: Shot) -> dict[str, dict[str, Any]]:
 
 def _background(given: Background | None, view: ShotView) -> tuple[Path, ...]:
     """The files of a background; none where it is a color, or estimated."""
-    return view.plates.files or (() if given is None or given.image is None else (given.image,))
+    return view.plate.files or (() if given is None or given.image is None else (given.image,))

@@ -22,7 +22,7 @@ CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
 def facts(shot: Shot, given: Scene, cost: Cost) -> list[Finding]:
     """Return what is known of a shot, one finding for each line of a table; ``given`` is the user's scene."""
     found = {each.about: each for each in reversed(shot.findings) if "view" not in each.figures}
-    scene, medium, plate = shot.scene, shot.scene.medium, shot.views[0].plates.at(0)
+    scene, medium, plate = shot.scene, shot.scene.medium, shot.views[0].plate.at(0)
 
     def known(about: str, value: Figure, is_given: bool = True) -> Finding:
         """What the set-up found, or else what is given or, if it is not, assumed."""
@@ -104,7 +104,7 @@ def forecast_of(shot: Shot, known: Sequence[Finding], work: Workload) -> dict[st
 
     Those are the facts, the median color of what is behind the smoke (linear), and grid and cost of each quality.
     """
-    plate = shot.views[0].plates.at(0).image
+    plate = shot.views[0].plate.at(0).image
     return {
         "facts": [fact(line) for line in known],
         "background_color": [float(value) for value in np.median(plate.reshape(-1, 3), axis=0)],

@@ -47,7 +47,7 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     number = shot.smoky[0] if shot.smoky else 0
     columns, rows = tile_size(*shot.clip.size)
     pixels = shot.clip.size[0] * shot.clip.size[1] / (columns * rows)
-    whole = shot.views[0].plates.through(lambda full: area_average(full, columns, rows), pixels)
+    whole = shot.views[0].plate.through(lambda full: area_average(full, columns, rows), pixels)
     plate = whole.at(number)
     picture = shot.clip.stored(number).averaged(columns, rows)
     seen = matte(picture, plate)

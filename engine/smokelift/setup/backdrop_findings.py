@@ -65,18 +65,18 @@ def backdrop_findings(found: Backdrop, bars: bool = False) -> list[Finding]:
 
 def _background_findings(found: Backdrop, bars: bool) -> list[Finding]:
     """What is behind the smoke; nothing if it is given."""
-    clip, plates = found.clip, found.plates
+    clip, plate = found.clip, found.plate
     background = partial(Finding, about="background", source="estimated")
     if found.source == "alpha":
         return [background("alpha channel", {"behind": "white" if clip.backdrop else "black"})]
     if found.source == "given":
         return []
     if found.source == "picture":
-        unknown = float(unknown_part(plates, clip, 0).mean())
+        unknown = float(unknown_part(plate, clip, 0).mean())
         return [
             background("background partly seen", {"unknown": unknown}) if unknown else background("background seen")
         ]
-    image = plates.at(0).image
+    image = plate.at(0).image
     color = image[0, 0]
     if not (image == color).all():
         color = np.median(image.reshape(-1, 3), axis=0)
@@ -140,12 +140,12 @@ def _shows_smoke(clip: Clip) -> bool:
         found = find_backdrop(clip, None, None)
     except ValueError:
         return False
-    return bool(sample_smoke(found.clip, found.plates).smoky)
+    return bool(sample_smoke(found.clip, found.plate).smoky)
 
 
 def _between_bars(samples: SmokeSamples) -> bool:
     """Whether bars beside the picture are all that is background."""
-    at_a_time = len(samples.colors) / max(len(samples.gains), 1)
+    at_a_time = len(samples.colors) / max(len(samples.over_known), 1)
     for covered in (samples.covered, samples.covered.T):
         rows = np.flatnonzero(covered.any(1))
         if len(rows) and rows[0] > 0 and rows[-1] < len(covered) - 1:

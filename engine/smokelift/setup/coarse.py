@@ -125,7 +125,7 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     working = working_picture(view.camera.at(number), domain)
     first = (working.top + working.left) % 2  # the colors are those of the whole picture's pixels
     halves = view.clip.stored(number).cut(working.part).chequered(*working.camera.size, first)
-    plate = view.plates.at(number).through(working.cut, working.pixels)
+    plate = view.plate.at(number).through(working.cut, working.pixels)
     pictures = (working.of(view.clip, number), *halves)
     columns, rows = working.camera.size
     element = view.element(number, working.resized(CELLS_PER_PIXEL * columns, CELLS_PER_PIXEL * rows))

@@ -16,7 +16,6 @@ from smokelift.checks import Figures, Finding
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.extraction.backdrop import find_backdrop
-from smokelift.extraction.plate import evened
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_video
 from smokelift.scene import ClipSource, CompleteScene
@@ -95,9 +94,8 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         background = replace(scene.background, strokes=None)
     found = find_backdrop(view_clip, camera, background)
     try:
-        exposed, smoky = evened(found.clip, found.plates), sample_smoke(found.clip, found.plates).smoky
-        plates, source = with_source(found, exposed, smoky)
-        shown = replace(ShotView.before(scene.domain, exposed, camera, plates), source=source)
+        plate, source = with_source(found, found.clip, sample_smoke(found.clip, found.plate).smoky)
+        shown = replace(ShotView.before(scene.domain, found.clip, camera, plate), source=source)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
@@ -162,7 +160,7 @@ def _match_exposure(
     figures = {"view": number, "error": error, "error_as_it_is": as_it_is, "tolerance": tolerance}
     clip = view.clip.changed(lambda _, picture: picture / gain)
     source = None if view.source is None else view.source / gain
-    plates = view.plates.through(lambda part: part / gain if part.ndim == 3 else part)
-    view = replace(view, clip=clip, plates=plates, source=source)
+    plate = view.plate.through(lambda part: part / gain if part.ndim == 3 else part)
+    view = replace(view, clip=clip, plate=plate, source=source)
     about, value = f"gain of view {number}", (red, green, blue)
     return view, [Finding("gain of a view", figures, about=about, value=value, source="measured")]

@@ -264,7 +264,7 @@ def _smoke_detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> Detai
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
             part = working_picture(camera.at(number), box).part
-            frames.append((part(estimate.clip.frame(number)), estimate.plates.at(number).through(part)))
+            frames.append((part(estimate.clip.frame(number)), estimate.plate.at(number).through(part)))
     return smoke_detail(frames, _pixels_along(camera.at(smoky[0]), box)) if smoky else None
 
 

@@ -72,7 +72,7 @@ def first_light(
         source = source_radiance(estimate.samples)
     else:
         # without shadows no smoke is brighter than the light makes all of it
-        brightest = brightest_smoke(estimate.clip, estimate.plates, estimate.samples.smoky[0], found)
+        brightest = brightest_smoke(estimate.clip, estimate.plate, estimate.samples.smoky[0], found)
         source = found * max(1.0, brightest / float(found.mean()))
     scattered = np.array(medium.albedos) / (4 * np.pi)
     red, green, blue = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0).tolist()
@@ -85,7 +85,7 @@ def _measured_source(estimate: FirstEstimate) -> Picture | None:
     """The source radiance (3,) of the smoke; None where what is behind it hardly shows it."""
     if estimate.source is None:
         return None
-    if not tells_source(visible_plate(estimate.plates, estimate.clip, estimate.samples.smoky[0])):
+    if not tells_source(visible_plate(estimate.plate, estimate.clip, estimate.samples.smoky[0])):
         return None
     return estimate.source
 

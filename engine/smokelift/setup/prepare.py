@@ -55,7 +55,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
     estimate = first_estimate(clip, scene.camera, scene.background, scene.medium)
-    plates, samples = estimate.plates, estimate.samples
+    plate, samples = estimate.plate, estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium = find_medium(scene, estimate, camera, domain)
@@ -73,10 +73,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         closed=scene.closed,
         inlets=scene.inlets,
     )
-    first = replace(ShotView.before(domain, estimate.clip, camera, plates), source=estimate.source)
+    first = replace(ShotView.before(domain, estimate.clip, camera, plate), source=estimate.source)
     if estimate.source is not None and scene.lights:
         lit = scene_optics(complete).unshadowed_source()
         lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
+        if estimate.found.source == "picture" and samples.exposure:
+            # a plate from a clip whose white balance changes has that of some frame, and no light's
+            lit = lit.mean() * estimate.source / estimate.source.mean()
         first = replace(first, source=np.asarray(lit, np.float32))
     # strokes give it where an alpha channel leaves nothing to estimate
     decided = scene.background is not None and (not scene.background.estimated or estimate.found.source == "alpha")
@@ -91,7 +94,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         complete = replace(complete, scattering=scattering)
         findings.append(chosen)
         if of_light:
-            findings += light_doubts(chosen, samples, plates.noise, burns=estimate.fire is not None)
+            findings += light_doubts(chosen, samples, plate.noise, burns=estimate.fire is not None)
     if complete.scattering == "absorption":
         findings = [found for found in findings if found.about != "source radiance"]
     others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)

@@ -28,17 +28,17 @@ class ShotView:
 
     clip: Clip
     camera: Camera
-    plates: Plate
+    plate: Plate
     working: WorkingPicture
     source: Image | None = None
 
     @staticmethod
-    def before(domain: Domain, clip: Clip, camera: Camera, plates: Plate) -> "ShotView":
+    def before(domain: Domain, clip: Clip, camera: Camera, plate: Plate) -> "ShotView":
         """Return a camera's view of a domain; CameraError if no frame shows it."""
         for frame in range(len(camera.matrices)):
             with suppress(CameraError):
-                return ShotView(clip, camera, plates, working_picture(camera.at(frame), domain))
-        return ShotView(clip, camera, plates, working_picture(camera, domain))
+                return ShotView(clip, camera, plate, working_picture(camera.at(frame), domain))
+        return ShotView(clip, camera, plate, working_picture(camera, domain))
 
     def observe(self, frame: int, domain: Domain) -> Observation | None:
         """What the camera saw in a frame, from 0, as a small picture; None if that shows nothing of the domain."""
@@ -46,9 +46,9 @@ class ShotView:
         if working is None:
             return None
         if self.camera.moves:
-            plate = self.plates.at(frame).through(working.cut, working.pixels)
+            plate = self.plate.at(frame).through(working.cut, working.pixels)
         else:
-            plate = self._still_plates.at(frame)
+            plate = self._still_plate.at(frame)
         image = working.of(self.clip, frame)
         return Observation(working.camera, image, plate, self.element(frame, working))
 
@@ -57,7 +57,7 @@ class ShotView:
         if self.source is None:
             return None
         picture = self.clip.stored(frame).cut(working.part).linear()
-        plate = self.plates.at(frame).through(working.part)
+        plate = self.plate.at(frame).through(working.part)
         return extract_element(picture, plate, self.source, working.camera.size)
 
     def working_at(self, frame: int, domain: Domain) -> WorkingPicture | None:
@@ -70,9 +70,9 @@ class ShotView:
             return None
 
     @cached_property
-    def _still_plates(self) -> Plate:
-        """Plates of a still camera's small picture."""
-        return self.plates.through(self.working.cut, self.working.pixels)
+    def _still_plate(self) -> Plate:
+        """The plate of a still camera's small picture."""
+        return self.plate.through(self.working.cut, self.working.pixels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +123,12 @@ class Shot:
 
         Where a mask hides all frames it is the clip's own, before one color, too.
         """
-        plates, background = self.views[0].plates, self.scene.background
+        plate, background = self.views[0].plate, self.scene.background
         painted = background.strokes is not None
-        if plates.images is not None or (background.image is not None and not painted):
+        if plate.images is not None or (background.image is not None and not painted):
             return None
-        shown = plates if self.moves else uncovered(plates, self.clip)
-        return None if background.color is not None and not painted and shown is plates else shown.image
+        shown = plate if self.moves else uncovered(plate, self.clip)
+        return None if background.color is not None and not painted and shown is plate else shown.image
 
     @property
     def inlets(self) -> tuple[Inlet, ...]:

@@ -58,12 +58,12 @@ def test_fog_that_fills_black_is_no_noise(tmp_path: Path, how: dict[str, Any], s
     with fog(tmp_path, **how) as clip:
         found = find_backdrop(clip, None, None)
         assert found.source == source
-        plate = found.plates.at(0)
+        plate = found.plate.at(0)
         if source == "color":
             assert plate.image.max() == 0
             assert plate.noise.total.max() < 2 / 255
         picture = clip.frame(len(clip) // 2)
-        probability = matte(picture, found.plates.at(len(clip) // 2)).probability[..., None]
+        probability = matte(picture, found.plate.at(len(clip) // 2)).probability[..., None]
         assert (probability * picture).sum() > 0.98 * picture.sum()
 
 
@@ -75,7 +75,7 @@ def test_faint_fog_before_one_color_is_no_noise(tmp_path: Path) -> None:
     with clip_of(tmp_path, (srgb_to_linear(each) for each in faint)) as clip:
         found = find_backdrop(clip, None, None)
     assert found.source == "color"
-    assert found.plates.noise.lasting.max() * 255 < 1.3
+    assert found.plate.noise.lasting.max() * 255 < 1.3
 
 
 def test_a_trimmed_clip_has_the_background_of_its_file(tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_what_follows_a_cut_is_not_behind_the_smoke(tmp_path: Path) -> None:
     clip = Clip.open(tmp_path / "frame_###.png", fps=24, frames=(4, 8))
     found = find_backdrop(clip, None, None)
     assert found.shot == (0, 13)
-    assert np.percentile(codes_apart(found.plates.at(0).image, truth), 95) < 8
+    assert np.percentile(codes_apart(found.plate.at(0).image, truth), 95) < 8
 
 
 @pytest.mark.parametrize(("color", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on gray"])

@@ -83,7 +83,7 @@ def test_what_is_added_to_the_background_counts() -> None:
 
 def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> None:
     clip = clip_of(tmp_path, map(picture, range(4)))
-    dark = without_fire(clip, known_plate(np.zeros(3), clip))
+    dark = without_fire(clip, known_plate(np.zeros(3), clip)[0])
     seen, before = dark.frame(2), clip.frame(2)
     assert before[40:, 28:36].max() > 0.9
     assert seen.max() < 2 * SMOKE
@@ -94,8 +94,20 @@ def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> Non
 def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
     """Where it is and nowhere else, in its own color; the smoke that is continued is thinner than that in the fire."""
     with clip_of(tmp_path, map(picture, range(3)), ".exr") as clip:
-        light = firelight(clip, without_fire(clip, known_plate(np.zeros(3), clip)))
+        light = firelight(clip, without_fire(clip, known_plate(np.zeros(3), clip)[0]))
         assert fire_color(clip, light) == pytest.approx(FLAME, abs=0.04)
         added = light.frame(1)
         np.testing.assert_allclose(added[44, 32], picture(1)[44, 32] - SMOKE, atol=0.045)
         assert not added[:20].any() and added.min() == 0
+
+
+def test_fire_is_found_in_frames_of_any_exposure(tmp_path: Path) -> None:
+    """In a frame at half the exposure fire adds too little light, before it is exposed as the others are."""
+    behind = 0.1 + 0.1 * np.random.default_rng(0).uniform(size=(ROWS, COLUMNS, 1)).repeat(3, 2)
+    shown = [picture(n, behind=behind) * (0.45 if n == 2 else 1.0) for n in range(4)]
+    with clip_of(tmp_path, shown, ".exr") as clip:
+        plate, exposed = known_plate(behind, clip)
+        dark = without_fire(exposed, plate)
+        assert exposed.gain(2) == pytest.approx(0.45, rel=0.02)
+        assert dark.frame(2).max() < 0.3
+        np.testing.assert_allclose(dark.frame(2)[:20], picture(2, behind=behind)[:20], rtol=0.03)

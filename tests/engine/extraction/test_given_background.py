@@ -30,7 +30,7 @@ def test_a_color_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
     color, picture = Background(color=(0.1, 0.2, 0.3)), Background(image=folder / "plate" / "frame_003.png")
     for background, behind, codes in ((color, (0.1, 0.2, 0.3), 0.1), (picture, passing_wall()[:, 6 : 6 + WIDTH], 6)):
-        plate = known_plate(read_background(background, None), clip)
+        plate, _ = known_plate(read_background(background, None), clip)
         assert plate.at(0) is plate.at(COUNT - 1)
         assert codes_apart(plate.image, np.broadcast_to(behind, plate.image.shape)).max() < codes
 
@@ -51,11 +51,12 @@ def test_frames_of_the_clip_are_its_plate_as_they_were_filmed(tmp_path: Path) ->
 
 def test_pictures_are_a_plate_a_frame_and_are_cut_like_one(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
-    plates = known_plate(read_background(Background(image=folder / "plate" / "frame_###.png"), CAMERA), clip)
-    part = plates.through(lambda picture: picture[8:40]).through(lambda picture: picture[:, 4:])
+    behind = read_background(Background(image=folder / "plate" / "frame_###.png"), CAMERA)
+    plate, _ = known_plate(behind, clip)
+    part = plate.through(lambda picture: picture[8:40]).through(lambda picture: picture[:, 4:])
     for n in (0, 9):
-        np.testing.assert_array_equal(part.at(n).image, plates.at(n).image[8:40, 4:])
-        np.testing.assert_array_equal(part.at(n).noise.total, plates.at(n).noise.total)
+        np.testing.assert_array_equal(part.at(n).image, plate.at(n).image[8:40, 4:])
+        np.testing.assert_array_equal(part.at(n).noise.total, plate.at(n).noise.total)
 
 
 def test_a_numbered_picture_begins_a_sequence_before_a_moving_camera(folder: Path) -> None:

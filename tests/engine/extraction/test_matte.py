@@ -21,7 +21,7 @@ def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
     for name, behind in (("black", np.zeros((HEIGHT, WIDTH, 3))), ("wall", wall(0.2, 0.5))):
         (tmp_path / name).mkdir()
         clip = film(tmp_path / name, behind, billows, 0.9)
-        plate = known_plate(behind, clip)
+        plate, _ = known_plate(behind, clip)
         assert 0.5 < plate.noise.total.mean() * 255 < 2.0
         for n in (4, 12, 20):
             assert overlap(matte(clip.frame(n), plate).mask, billows(n) > 0.002) > 0.9
@@ -39,7 +39,7 @@ def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
     veil = np.where(np.hypot(rows - 36, columns - 28) < 16, 0.09, 0.0)
     truth = wall(0.2, 0.3)
     clip = film(tmp_path, truth, lambda n: veil, 0.6, 25.0)
-    plate = known_plate(truth, clip)
+    plate, _ = known_plate(truth, clip)
     found = matte(without_noise_light(clip, plate.noise).frame(5), plate).mask
     assert overlap(found, veil > 0) > 0.7
 

@@ -45,7 +45,7 @@ def wall() -> np.ndarray:
 def found(clip: Clip) -> Plate:
     backdrop = find_backdrop(clip, None, None)
     assert backdrop.source == "picture"
-    return backdrop.plates
+    return backdrop.plate
 
 
 @pytest.mark.parametrize(

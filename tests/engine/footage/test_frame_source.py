@@ -59,7 +59,7 @@ def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path)
         for given in (None, Background(color=(0.0, 0.0, 0.0)), Background(strokes=tmp_path / "no.png")):
             found = find_backdrop(clip, None, given)
             assert found.background == Background(color=(1.0, 1.0, 1.0))
-            assert (found.plates.at(2).image == 1).all()
+            assert (found.plate.at(2).image == 1).all()
             assert (found.source, found.strokes) == ("alpha", None)
 
 

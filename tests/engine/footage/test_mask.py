@@ -25,10 +25,15 @@ def block(n: int) -> tuple[slice, slice]:
     return slice(2 * n, 2 * n + 12), slice(46, 55)
 
 
-def filmed(folder: Path, with_block: bool = True) -> Path:
-    """Write a clip of a puff before a wall, and of a dark block that moves beside it; its pattern."""
+def filmed(folder: Path, with_block: bool = True, drift: float = 0.0) -> Path:
+    """Write a clip of a puff before a wall, and of a dark block that moves beside it; its pattern.
+
+    It gets brighter by the fraction ``drift``.
+    """
     folder.mkdir()
-    film(folder, wall(0.3, 0.5), puff, 0.8).close()
+    clip = film(folder, wall(0.3, 0.5), puff, 0.8)
+    for n, shown in enumerate(clip) if drift else ():
+        write_image(folder / f"frame_{n:03d}.png", shown * np.float32(1 + drift * n / (COUNT - 1)))
     for n in range(COUNT) if with_block else ():
         file = folder / f"frame_{n:03d}.png"
         codes = np.array(Image.open(file))
@@ -128,35 +133,40 @@ def test_background_and_noise_are_those_of_what_is_seen(tmp_path: Path, mask: Pa
     file = filmed(tmp_path / "clip")
     with Clip.open(file, mask=mask) as clip:
         found = plate_of(clip)
-        before = known_plate(wall(0.3, 0.5), clip)
+        before, _ = known_plate(wall(0.3, 0.5), clip)
     assert codes_apart(found.image, expected.image)[:, :SIDE].max() < 4
     for plate in (found, before):
         np.testing.assert_allclose(plate.noise.total, expected.noise.total, rtol=0.25)
 
 
 @pytest.mark.parametrize("frames", [None, (10, 12)])
-def test_a_cleared_clip_shows_its_background_as_it_is_exposed(
+def test_a_cleared_clip_shows_its_background_at_one_exposure(
     tmp_path: Path, mask: Path, frames: tuple[int, int] | None
 ) -> None:
-    """Also beside the frames that are used, as the plate is found there, too."""
+    """The exposure is measured beside the mask; also beside the frames that are used, as the plate is found there."""
     file = filmed(tmp_path / "clip")
     plate = Plate(wall(0.3, 0.5).astype(np.float32) / 2, np.ones((HEIGHT, WIDTH), np.float32), None)
     with Clip.open(file, mask=mask, frames=frames) as clip:
-        shown = cleared(clip, plate)
+        exposed = clip.exposed(plate.gain)
+        shown = cleared(exposed, plate)
         for number in (0, COUNT - 1):
-            assert codes_apart(shown.whole().frame(number), 2 * plate.image)[:, SIDE:].max() < 3
-        np.testing.assert_array_equal(shown.frame(2)[:, :SIDE], clip.frame(2)[:, :SIDE])
+            np.testing.assert_array_equal(shown.whole().frame(number)[:, SIDE:], plate.image[:, SIDE:])
+        np.testing.assert_allclose(shown.gain(2), 2, rtol=0.02)
+        np.testing.assert_allclose(shown.frame(2)[:, :SIDE], clip.frame(2)[:, :SIDE] / shown.gain(2), rtol=1e-6)
     with Clip.open(file) as clip:
         assert cleared(clip, plate) is clip
 
 
-def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path) -> None:
-    file = filmed(tmp_path / "clip", with_block=False)
+@pytest.mark.parametrize("drift", [0.0, 0.3])
+def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path, drift: float) -> None:
+    file = filmed(tmp_path / "clip", with_block=False, drift=drift)
     with Clip.open(file, mask=mask) as clip:
         found = plate_of(clip)
-        assert codes_apart(found.image, wall(0.3, 0.5)).max() < 4
+        middle = float(np.median(found.image / wall(0.3, 0.5)))
+        assert middle == pytest.approx(1 + drift / 2, abs=0.05)
+        assert codes_apart(found.image / middle, wall(0.3, 0.5)).max() < 5
         assert found.confidence[:, SIDE + 4 :].mean() > 0.9
-        given = find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))).plates.at(0)
+        given = find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))).plate.at(0)
         np.testing.assert_allclose(given.image, 0.1, atol=1e-6)
     with Clip.open(file) as clip:
         assert uncovered(found, clip) is found
@@ -171,6 +181,6 @@ def test_what_a_tight_mask_hides_is_still_background(tmp_path: Path) -> None:
     with Clip.open(tmp_path / "frame_###.png", mask=tmp_path / "mask.png") as clip:
         found = find_backdrop(clip, None, None)
     assert found.source == "picture"
-    plate = found.plates.at(0)
+    plate = found.plate.at(0)
     assert plate.confidence.mean() > 0.5
     assert np.percentile(codes_apart(plate.image, truth)[~smoky], 95) < 5

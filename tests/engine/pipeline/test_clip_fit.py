@@ -44,7 +44,7 @@ def test_all_pixels_are_those_of_the_clips_camera(shot, sharp) -> None:
     whole = render(sharp.densities[1], sharp.scene)
     np.testing.assert_allclose(beside.shown, part(whole), atol=1e-5)
     np.testing.assert_array_equal(beside.seen, part(shot.clip.frame(1)))
-    plate = shot.views[0].plates.at(1).through(part)
+    plate = shot.views[0].plate.at(1).through(part)
     smoke = matte(beside.seen, plate).mask
     assert np.count_nonzero(beside.inside & smoke) > 0.9 * np.count_nonzero(beside.inside | smoke)
     wanted = -10 * np.log10(np.square(beside.seen - beside.shown)[beside.inside].mean())

@@ -20,7 +20,7 @@ from tests.engine.films import clear_plate, clip_of, coded, film, puff, wall
 
 COVERED = np.zeros((100, 50), np.bool_)
 COVERED[10:80] = True
-SEEN = SmokeSamples(1.0, COVERED, np.zeros_like(COVERED), *np.zeros((2, 0, 3), np.float32), (0,), {}, ())
+SEEN = SmokeSamples(1.0, COVERED, np.zeros_like(COVERED), *np.zeros((2, 0, 3), np.float32), (0,))
 """Frames that show smoke, in the middle of the picture."""
 
 RANDOM = np.random.default_rng(0)
@@ -77,7 +77,7 @@ def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
     found = first_findings(first_estimate(whole.part(2, 11), None, None), given=False)
     assert [each.figures["frame"] for each in found if each.kind == "clearest frame"] == [5]
     late = find_backdrop(whole.part(6, 11), None, None)
-    assert sample_smoke(late.clip, late.plates).clearest is None
+    assert sample_smoke(late.clip, late.plate).clearest is None
 
 
 def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
@@ -125,7 +125,7 @@ def test_one_frame_before_one_color_shows_its_background(tmp_path, color) -> Non
     with clip_of(tmp_path, [np.full((72, 56, 3), color) * (1 - smoke) + 0.6 * smoke]) as clip:
         found = find_backdrop(clip, None, None)
         given = find_backdrop(clip, None, Background(color=(color,) * 3))
-        masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
+        masks = [matte(clip.frame(0), each.plate.at(0)).mask for each in (found, given)]
     assert masks[0][smoke[..., 0] > 0.1].all() and (masks[0] != masks[1]).mean() < 0.01
     assert kinds(found) == ["background of one frame"]
     assert backdrop_findings(found)[0].kind == ("background of one color" if color else "black background")
@@ -154,9 +154,9 @@ def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(gray, rows, miss
     covered[slice(*rows)] = np.random.default_rng(0).random((rows[1] - rows[0], 80)) >= missing
     covered = covered.T if turned else covered
     seen = np.zeros((round(2 * at_a_time * covered.sum()), 3), np.float32)  # in two samples
-    gains = dict.fromkeys(range(2), np.ones(3, np.float32))
+    frames = dict.fromkeys(range(2), 0)
     nowhere = np.zeros_like(covered)
-    samples = replace(SEEN, covered=covered, unknown=nowhere, colors=seen, behind=seen, gains=gains)
+    samples = replace(SEEN, covered=covered, unknown=nowhere, colors=seen, behind=seen, over_known=frames)
     assert kinds(gray, samples) == ["bars"] * said
 
 
@@ -192,7 +192,7 @@ def test_a_mask_that_hides_all_smoke_is_said(tmp_path, plate, inverted, smoke) -
 
 
 def test_how_many_frames_were_examined_is_said(gray) -> None:
-    assert doubts(gray, sample_smoke(gray.clip, gray.plates), given=False) == [
+    assert doubts(gray, sample_smoke(gray.clip, gray.plate), given=False) == [
         Finding("no smoke examined", {"frames": 4}, doubt=True),
         Finding("no smoke before an estimated background", doubt=True),
     ]

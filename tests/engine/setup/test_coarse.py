@@ -66,7 +66,7 @@ def blob(plume) -> CoarseFrame:
     """A coarse frame of the blob in its own light."""
     scene, clip = completed(plume.scene), Clip.open(plume.scene.clip)
     behind = np.zeros((*clip.size[::-1], 3), np.float32)
-    view = ShotView(clip, scene.camera, known_plate(behind, clip), working_picture(scene.camera, scene.domain))
+    view = ShotView(clip, scene.camera, known_plate(behind, clip)[0], working_picture(scene.camera, scene.domain))
     found = coarse_frame([view], 2, scene)
     assert found is not None
     return found

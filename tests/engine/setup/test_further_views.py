@@ -136,7 +136,7 @@ def test_another_exposure_is_found_and_undone(filmed, draft, gain) -> None:
     assert found.about == "gain of view 1"
     np.testing.assert_allclose(found.value, gain, rtol=0.1)
     assert found.figures["error"] < found.figures["error_as_it_is"]
-    plate = shot.views[1].plates.at(0).image
+    plate = shot.views[1].plate.at(0).image
     np.testing.assert_allclose(plate.mean((0, 1)), BEHIND, rtol=0.1)
     with Clip.open(filmed((1.0, 1.0, 1.0)).views[0].clip) as untouched:
         np.testing.assert_allclose(shot.views[1].clip.frame(1).max((0, 1)), untouched.frame(1).max((0, 1)), rtol=0.1)

@@ -16,6 +16,7 @@ from smokelift.scene import Background, DirectionalLight, EnvironmentLight, Medi
 from smokelift.setup import illumination
 from smokelift.setup.coarse import HeldOut
 from smokelift.setup.illumination import light_doubts
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
 from tests.engine.conftest import Plume
 from tests.engine.setup.shots import shot_of
@@ -57,6 +58,23 @@ def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft
     assert found.source == "measured"
     assert [found.figures[name] for name in ("red", "green", "blue")] == pytest.approx(true, rel=0.3)
     assert shot.optics.unshadowed_source() == pytest.approx(shot.views[0].source, rel=1e-4)
+
+
+def test_a_given_light_has_the_white_balance_of_a_clip_in_which_that_changes(plume, draft, tmp_path) -> None:
+    """Before a plate that was found in it: that is as red as the clip's middle, and so is the smoke before it."""
+    detail = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None]
+    write_image(tmp_path / "wall.png", (0.05 + 0.2 * detail * (1.0, 0.8, 0.6)).astype("f4"))
+    before = replace(plume.scene, background=Background(image=tmp_path / "wall.png"))
+    passing = [plume.blob(plume.scene, height) for height in np.linspace(-0.3, 1.9, 14)]
+    scene = replace(plume.write(tmp_path / "clip", passing, before), background=None)
+    sources = []
+    with Clip.open(scene.clip) as clip:
+        for red in (0.0, 0.05):
+            drifting = clip.changed(lambda n, picture, red=red: picture * (1 + n * np.array([red, 0, 0], np.float32)))
+            sources.append(prepare_shot(drifting, scene, draft).views[0].source)
+    red, green, blue = sources[1] / sources[0]
+    assert 1.2 < red / green < 1.5 and green == pytest.approx(blue, rel=0.15)
+    assert sources[1].mean() == pytest.approx(sources[0].mean(), rel=1e-3), "as bright as the light makes it"
 
 
 # what light is doubted

@@ -21,7 +21,7 @@ def samples(source, behind, thickest=0.9):
     opacity = rng.random((500, 1)) * thickest
     behind = np.broadcast_to(behind, (500, 3))
     colors = (1 - opacity) * behind + opacity * source + 0.002 * rng.standard_normal((500, 3))
-    return SmokeSamples(1.0, *np.ones((2, 1, 1), bool), colors.astype("f4"), behind.astype("f4"), (0,), {})
+    return SmokeSamples(1.0, *np.ones((2, 1, 1), bool), colors.astype("f4"), behind.astype("f4"), (0,))
 
 
 def apart(one, other):
@@ -101,7 +101,7 @@ def two_kinds(one, other, behind=BLACK):
     """Smoke of two colors, as much of each."""
     parts = samples(one, behind), samples(other, behind)
     colors, grounds = (np.concatenate([getattr(part, name) for part in parts]) for name in ("colors", "behind"))
-    return SmokeSamples(1.0, *np.ones((2, 1, 1), bool), colors, grounds, (0,), {})
+    return SmokeSamples(1.0, *np.ones((2, 1, 1), bool), colors, grounds, (0,))
 
 
 def test_smoke_of_more_than_one_color_is_said():
