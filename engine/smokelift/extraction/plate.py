@@ -130,8 +130,8 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
     if not raised.any():
         return replace(plate, noise=noise_about(deviations, blocks))
     noise = noise_about(deviations - some_blocks(raised), blocks - block_means(raised[None]))
-    lasting = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
-    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting))
+    shared = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
+    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, shared=shared))
 
 
 def _with_coarse_colors(plate: Plate, clip: Clip) -> Plate:
