@@ -35,7 +35,11 @@ HOLDOUTS = "Smokelift Holdouts"
 """Name of the collection whose objects hide the smoke, and show the plate."""
 
 GRAIN_PIXELS = 4
-"""What is finer than this is grain: the blur that separates it (pixels). Sensor noise differs from pixel to pixel."""
+"""What is finer than this is grain: the blur that separates it (pixels of the clip). Sensor noise differs from pixel to
+pixel."""
+
+_CLIP_SIZE = ("Clip Width", "Clip Height")
+"""Names of the group's inputs for the clip's size: grain is as wide as its pixels, whatever the render's size."""
 
 LARGEST_DIFFERENCE = 0.05
 """Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
@@ -46,6 +50,7 @@ _INPUTS = (
     color("Clip", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)),
     number("Foreground", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
     number("Grain", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
+    *(number(name, "Pixels of the clip, whatever the render's size", 1.0, 1.0) for name in _CLIP_SIZE),
 )
 
 SINCE_5 = bpy.app.version >= (5, 0, 0)
@@ -181,6 +186,9 @@ def _connect_plate(tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.ty
 
 def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
     name, socket = f"{GROUP} Clip", node.inputs["Clip"]
+    for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
+        if side in node.inputs:  # the group may be an artist's own
+            node.inputs[side].default_value, node.inputs[side].hide = pixels, True
     source = tree.nodes.get(name)
     if source is None:
         if socket.links:
@@ -206,24 +214,26 @@ def _build(tree: bpy.types.NodeTree) -> None:
     source = given.outputs
     over = tree.nodes.new("CompositorNodeAlphaOver")
     below, above = (over.inputs[0], over.inputs[1]) if SINCE_5 else (over.inputs[1], over.inputs[2])
-    plate, clip = _at_render_size(tree, source["Plate"]), _at_render_size(tree, source["Clip"])
-    tree.links.new(plate, below)
+    tree.links.new(_scaled(tree, source["Plate"], "Render Size"), below)
     tree.links.new(source["Render"], above)
-    grain = _grain(tree, clip, plate)
+    grain = _scaled(tree, _grain(tree, source), "Render Size")
     grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], grain)
-    front = _mix(tree, "MIX", source["Foreground"], grainy, clip)
+    front = _mix(tree, "MIX", source["Foreground"], grainy, _scaled(tree, source["Clip"], "Render Size"))
     tree.links.new(front, output.inputs[0])
     for place, node in enumerate(tree.nodes):
         node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
 
 
-def _grain(tree: bpy.types.NodeTree, clip: bpy.types.NodeSocket, plate: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """The clip's own grain, frame by frame.
+def _grain(tree: bpy.types.NodeTree, source: bpy.types.bpy_prop_collection) -> bpy.types.NodeSocket:
+    """The clip's own grain, frame by frame, at the clip's pixels.
 
     The plate has no grain, and the same edges as the clip: their difference less its blur is grain. Where the blurred
     difference is large the clip shows smoke, and the grain fades out.
     """
-    differs = _mix(tree, "SUBTRACT", 1.0, clip, plate)
+    plate = _scaled(tree, source["Plate"], "Absolute")
+    for socket, side in zip("XY", _CLIP_SIZE, strict=True):
+        tree.links.new(source[side], plate.node.inputs[socket])
+    differs = _mix(tree, "SUBTRACT", 1.0, source["Clip"], plate)
     blurred = _blurred(tree, differs)
     fine = _mix(tree, "SUBTRACT", 1.0, differs, blurred)
     steep = (*[1.0 / LARGEST_DIFFERENCE] * 3, 1.0)
@@ -233,12 +243,13 @@ def _grain(tree: bpy.types.NodeTree, clip: bpy.types.NodeSocket, plate: bpy.type
     return _mix(tree, "MULTIPLY", 1.0, fine, clear)
 
 
-def _at_render_size(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _scaled(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket, kind: str) -> bpy.types.NodeSocket:
+    """A picture at the render's size, or at an absolute one."""
     node = tree.nodes.new("CompositorNodeScale")
     if "Type" in node.inputs:  # since 5.0
-        node.inputs["Type"].default_value = "Render Size"
+        node.inputs["Type"].default_value = kind
     else:
-        node.space = "RENDER_SIZE"
+        node.space = kind.upper().replace(" ", "_")
     tree.links.new(picture, node.inputs["Image"])
     return node.outputs[0]
 

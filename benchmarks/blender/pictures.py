@@ -47,8 +47,13 @@ def beside(pictures: list[Image.Image]) -> Image.Image:
 
 
 def save(name: str, picture: Image.Image) -> None:
-    """Write a picture that takes little room."""
-    picture.quantize(COLORS, dither=Image.Dither.FLOYDSTEINBERG).save(DOCS / name, optimize=True)
+    """Write a picture of the docs that takes little room: dithered, in the colors that are farthest apart.
+
+    So white is among them. A name may be a whole path.
+    """
+    # Pillow dithers only to a palette that is there already
+    palette = picture.quantize(COLORS, Image.Quantize.MAXCOVERAGE)
+    picture.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(DOCS / name, optimize=True)
 
 
 if __name__ == "__main__":

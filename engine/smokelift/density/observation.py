@@ -331,13 +331,14 @@ def shadowed_optical_depth(
 def _faint_smoke(element: Element, clear: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Probability (rows, columns) that an element shows smoke, where the opacity that is found in clear air is noise.
 
-    Smoke of the plate's own brightness hardly changes the picture, but it hides the plate's detail.
+    Smoke of the plate's own brightness hardly changes the picture, but it hides the plate's detail. So does a codec, a
+    little, in patches of any size.
     """
     if not clear.any():
         return np.ones(clear.shape, np.float32)
     opacity = 1 - element.transmittance
     noise = max(float(np.quantile(opacity[clear], CLEAR_QUANTILE)), MIN_OPACITY_NOISE) / CLEAR_DEVIATIONS
-    return certainty(opacity / np.float32(noise), OPACITY_WIDTH)
+    return certainty(opacity / np.float32(noise), OPACITY_WIDTH, element.shared / np.float32(noise))
 
 
 def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Image, Image, Image]:

@@ -19,7 +19,8 @@ import smokelift._core as _core
 from smokelift.checks.array_types import Mask
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture, area_average, blurred, channel_mean, reduced_size
+from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, reduced_size
+from smokelift.footage.noise import linear_per_srgb
 
 FULL_SCALE = 0.12
 """Distance, over the longer side of the picture, at which smoke's opacity has its whole range."""
@@ -104,6 +105,8 @@ class Element:
         T, from 0 to 1.
     deviation : (rows, columns)
         Standard deviation of T at a fixed S + T B, which is known within the plate's noise.
+    shared : (rows, columns)
+        That of T in clear air by noise that many pixels share: a mean over them keeps all of it.
     weight : (rows, columns)
         Weight of the picture, from 0 to 1: little for what is neither smoke nor its plate.
     """
@@ -111,6 +114,7 @@ class Element:
     radiance: Picture
     transmittance: Picture
     deviation: Picture
+    shared: Picture
     weight: Picture
 
     def over(self, color: Picture) -> Picture:
@@ -133,13 +137,17 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     cells = Cells.of(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
     fields, deviation, weight = extracted(cells, source)
     deviation = blurred(deviation, WINDOW_BLUR)
+    lasting = plate.noise.shared * linear_per_srgb(linear_to_srgb(cells.seen))
+    shared = deviation * np.sqrt(np.square(lasting).mean(-1) / cells.noise.mean(-1))
     small, behind = (area_average(each, columns, rows) for each in (picture, plate.image))
-    fields, deviation, weight = (area_average(each, columns, rows) for each in (fields, deviation, weight))
+    fields, deviation, shared, weight = (
+        area_average(each, columns, rows) for each in (fields, deviation, shared, weight)
+    )
     clear = 1 - fields[..., 0]
     smooth = fields[..., :1] * source_of(fields, source)
     # what is finer than the cells is the smoke's own
     left = small - clear[..., None] * behind - smooth
-    return Element(smooth + weight[..., None] * left, clear, deviation, weight)
+    return Element(smooth + weight[..., None] * left, clear, deviation, shared, weight)
 
 
 def source_of(fields: Picture, source: Picture) -> Picture:

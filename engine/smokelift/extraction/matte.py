@@ -2,7 +2,8 @@
 
 A patch is smoke if noise makes so large and so strong a one too rarely: `FALSE_ALARMS` are expected in a picture of any
 size (Desolneux, Moisan and Morel, "Meaningful alignments", 2000). So a wide veil may be hardly above the noise, while a
-speck must be far above it. Within a patch, the more a pixel deviates, the more certain it is.
+speck must be far above it. Noise that a whole patch shares does not become rarer with its size: the likeliest shift is
+taken off first, at the price of its own probability. Within a patch, the more a pixel deviates, the more certain it is.
 Figures: docs/experiments/background.md, docs/experiments/density-profile.md.
 """
 
@@ -27,6 +28,10 @@ PATCH_GROWTH = 4.06
 
 MIN_DEVIATION, FULL_DEVIATION = 1.5, 3.0
 """Deviations above which a pixel counts, and counts fully, in units of noise (docs/experiments/density-profile.md)."""
+
+SHIFTS = np.linspace(0, 5, 11)
+"""Shifts that are tried, in units of the noise that a patch shares: a larger one alone is a false alarm less often than
+once in a million patches."""
 
 MEASURED_DEVIATION = 4.0
 """Deviation, in units of noise, above which smoke is used to measure the box, the light and the color."""
@@ -84,29 +89,34 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     return Matte(deviation, certainty(deviation, smoothing(plate.noise)))
 
 
-def certainty(deviation: Picture, width: float) -> Picture:
+def certainty(deviation: Picture, width: float, shared: Picture | float = 0.0) -> Picture:
     """Return the probability (rows, columns) that a pixel shows smoke, by its deviation in units of noise.
 
-    ``width`` is the standard deviation, in pixels, of the Gaussian that smoothed the deviation.
+    ``width`` is the standard deviation, in pixels, of the Gaussian that smoothed the deviation; ``shared`` is that of
+    noise that a patch of any size shares, in the deviation's units.
     """
     probability: Picture = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
-    probability[~_meaningful(deviation, 4 * np.pi * width**2)] = 0
+    probability[~_meaningful(deviation, 4 * np.pi * width**2, shared)] = 0
     return probability
 
 
-def _meaningful(deviation: Picture, sample: float) -> npt.NDArray[np.bool_]:
+def _meaningful(deviation: Picture, sample: float, shared: Picture | float) -> npt.NDArray[np.bool_]:
     """Patches (rows, columns) of a deviation above `MIN_DEVIATION` that noise makes too rarely.
 
-    ``sample`` is the number of pixels that share noise. So the probability of a patch of noise is the product of its
-    samples' probabilities to deviate as far.
+    ``sample`` is the number of pixels that share all other noise. So the probability of a patch of noise is the product
+    of its samples' probabilities to deviate as far, and of that of the shift by ``shared`` noise that makes it largest.
     """
     patches, count = ndimage.label(deviation > MIN_DEVIATION, structure=np.ones((3, 3)))
     inside = patches > 0
-    # that a normal value is as far from zero, to either side
-    probability = np.log(2 * PATCH_GROWTH) + special.log_ndtr(-deviation[inside])
-    surprise = -np.bincount(patches[inside], probability, count + 1) / sample
-    expected = np.log(max(deviation.size / sample, 1)) - surprise
-    rare = expected < np.log(FALSE_ALARMS)
+    beyond, step = deviation[inside], np.broadcast_to(np.float32(shared), deviation.shape)[inside]
+    rare = np.ones(count + 1, np.bool_)
+    for shift in SHIFTS if np.any(step) else SHIFTS[:1]:
+        # that a normal value is as far from zero, to either side; what a shift explains is no shape of its own
+        probability = np.minimum(np.log(2 * PATCH_GROWTH) + special.log_ndtr(np.float32(shift) * step - beyond), 0)
+        surprise = -np.bincount(patches[inside], probability, count + 1) / sample
+        surprise -= np.log(2) + special.log_ndtr(-shift)
+        expected = np.log(max(deviation.size / sample, 1)) - surprise
+        rare &= expected < np.log(FALSE_ALARMS)
     rare[0] = False
     return np.asarray(rare[patches])
 

@@ -157,8 +157,8 @@ def _measured(plate: Plate, reach: Picture, clip: Clip) -> tuple[Plate, Clip]:
     if not raised.any():
         return replace(plate, image=image, noise=noise_about(*samples)), clip
     noise = noise_about(*_less(samples, raised))
-    lasting = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
-    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, lasting=lasting)), clip
+    shared = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
+    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, shared=shared)), clip
 
 
 def _less(samples: tuple[Picture, Picture], change: Picture) -> tuple[Picture, Picture]:

@@ -8,7 +8,7 @@ pixels change from frame to frame: smoke has hardly any detail so fine. Lasting 
 background spread about it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,10 +47,19 @@ and some for rounding."""
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Standard deviations (3,) of a static pixel, in sRGB values: of the white and of the lasting noise."""
+    """Standard deviations (3,) of a static pixel, in sRGB values: of the white and of the lasting noise.
+
+    The lasting noise is ``shared`` by many pixels, as far as it was measured, but ``least`` at least.
+    """
 
     white: Picture
-    lasting: Picture
+    shared: Picture
+    least: float = 0.0
+
+    @property
+    def lasting(self) -> Picture:
+        """Standard deviation (3,) of the lasting noise."""
+        return np.maximum(self.shared, self.least)
 
     @property
     def total(self) -> Picture:
@@ -60,7 +69,7 @@ class Noise:
 
     def averaged(self, pixels: float) -> "Noise":
         """Return the noise of means over a number of pixels."""
-        return Noise(self.white / np.float32(np.sqrt(max(pixels, 1.0))), self.lasting)
+        return replace(self, white=self.white / np.float32(np.sqrt(max(pixels, 1.0))))
 
 
 def lasting_noise(deviation: npt.ArrayLike) -> Noise:
@@ -68,7 +77,7 @@ def lasting_noise(deviation: npt.ArrayLike) -> Noise:
     return Noise(np.zeros(3, np.float32), np.broadcast_to(np.asarray(deviation, np.float32), (3,)).copy())
 
 
-EIGHT_BIT_NOISE = lasting_noise(EIGHT_BIT_STEP)
+EIGHT_BIT_NOISE = Noise(np.zeros(3, np.float32), np.full(3, MIN_SPREAD), float(EIGHT_BIT_STEP))
 """Noise of footage as clean as eight bits allow."""
 
 
@@ -148,8 +157,8 @@ def noise_about(deviations: Picture, blocks: Picture) -> Noise:
 
 def noise_of(white: Picture, spread: Picture, pixels: float) -> Noise:
     """Return the noise with a ``white`` part (3,) whose means over a number of pixels have a ``spread`` (3,)."""
-    shared = np.sqrt(np.maximum(spread**2 - white**2 / np.float32(pixels), 0))
-    return Noise(white, np.maximum(shared, EIGHT_BIT_STEP).astype(np.float32))
+    shared = np.sqrt(np.maximum(spread**2 - white**2 / np.float32(pixels), MIN_SPREAD**2))
+    return Noise(white, shared.astype(np.float32), float(EIGHT_BIT_STEP))
 
 
 def clipped_black(deviations: Picture, blocks: Picture) -> Picture:

@@ -11,15 +11,17 @@ import pytest
 from smokelift import _core
 from smokelift.density import DensitySettings, Observation, RoundDepth, ViewSet, reconstruct_density
 from smokelift.density.fit import GradientFit
-from smokelift.density.observation import USEFUL_DEVIATION, WHITE, eight_bit_plate
-from smokelift.extraction import Element
+from smokelift.density.observation import USEFUL_DEVIATION, WHITE, ObservedView, eight_bit_plate
+from smokelift.extraction import Element, extract_element
 from smokelift.extraction.plate import Plate, noise_at
-from smokelift.footage.images import blurred
+from smokelift.footage.images import Picture, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.render import render, scene_optics, scene_renderer
 from smokelift.scene import Background, Scene, completed
 
 QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)
 GRAY = np.array((0.1, 0.12, 0.15), np.float32)
+VEIL = np.clip(1.5 * (1 - np.hypot(*(np.mgrid[:140, :100] - np.array((45, 50))[:, None, None])) / 25), 0, 1)
+"""How dense a veil is beside its middle, pixel by pixel."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +36,8 @@ def element(plume, small) -> Element:
     """What the plume's smoke sends and lets through, as it is known of a render."""
     renderer = scene_renderer(completed(small), background=np.zeros(3, np.float32))
     radiance, clear = renderer.image(plume.densities[1]), renderer.transmittance
-    return Element(radiance, clear, np.full(clear.shape, 0.01, np.float32), np.ones(clear.shape, np.float32))
+    certain = np.full(clear.shape, 0.01, np.float32)
+    return Element(radiance, clear, certain, 0.1 * certain, np.ones(clear.shape, np.float32))
 
 
 def seen(small: Scene, picture: np.ndarray, plate: Plate, element: Element) -> ViewSet:
@@ -97,6 +100,45 @@ def test_smoke_before_a_wall_is_extracted_and_fitted(plume, small, wall, element
     shown = render(found, replace(small, background=Background(color=tuple(map(float, gray)))))
     assert np.abs(shown - element.over(gray)).mean() < 0.1 * np.abs(element.over(gray) - gray).mean()
     assert found.sum() == pytest.approx(plume.densities[1].sum(), rel=0.2)
+
+
+def filmed(small: Scene, contrast: float, opacity: float, codes: float) -> list[Picture]:
+    """Where six pictures of a veil before a wall of the same mean color show smoke, in noise and a codec's shifts.
+
+    The wall's detail has a contrast, and its blocks of 8 to 64 pixels shift by so many codes.
+    """
+    rows, columns = 140, 100
+    camera = small.camera.resized(columns, rows)
+    detail = blurred(np.random.default_rng(2).standard_normal((rows, columns, 3)).astype(np.float32), 1.0)
+    wall = (np.array((0.16, 0.13, 0.1)) * np.maximum(1 + contrast * detail / detail.std(), 0.05)).astype(np.float32)
+    plate = eight_bit_plate(wall, camera.size)
+    veil = opacity * VEIL[..., None]
+    behind, shown = 255 * linear_to_srgb(wall * (1 - veil) + veil * wall.mean((0, 1))), []
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        noisy = behind + random.normal(0, 0.5, behind.shape)
+        for side in (8, 16, 32, 64):
+            shifts = random.normal(0, codes / 2, (-(-rows // side), -(-columns // side), 3))
+            noisy += np.kron(shifts, np.ones((side, side, 1)))[:rows, :columns]
+        picture = srgb_to_linear((np.round(noisy) / 255).astype(np.float32))
+        element = extract_element(picture, plate, np.full(3, 0.2, np.float32), camera.size)
+        observed = Observation(camera, picture, plate, element)
+        shown.append(ObservedView.of(observed, scene_optics(completed(small))).probability)
+    return shown
+
+
+@pytest.mark.parametrize(("contrast", "codes"), [(0.1, 0.2), (0.1, 0.4), (0.4, 0.4)])
+def test_shifts_of_wide_blocks_are_no_smoke(small, contrast, codes) -> None:
+    """A codec's fractions of a step are certain in the mean of a wide patch, but no smoke."""
+    assert not any(probability.any() for probability in filmed(small, contrast, 0.0, codes))
+
+
+@pytest.mark.parametrize("codes", [0.0, 0.2])
+def test_a_faint_veil_is_seen_by_the_detail_that_it_hides(small, codes) -> None:
+    """It hides a tenth of the detail, and lies apart from all other smoke."""
+    for probability in filmed(small, 0.4, 0.1, codes):
+        assert probability[VEIL > 0.9].mean() > 0.3
+        assert not probability[VEIL == 0].any()
 
 
 STATM = Path("/proc/self/statm")

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.extraction.matte import FULL_DEVIATION, MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
+from smokelift.extraction.matte import (
+    FULL_DEVIATION,
+    MAX_SMOOTHING,
+    MIN_DEVIATION,
+    SMOOTHING,
+    certainty,
+    matte,
+    smoothing,
+)
 from smokelift.extraction.plate import known_plate, without_noise_light
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import Noise, lasting_noise
@@ -82,3 +90,14 @@ def test_a_speck_has_to_be_stronger_than_a_veil() -> None:
         encoded = linear_to_srgb(plate.image)
         encoded[50 : 50 + side, 50 : 50 + side] += np.float32(codes / 255)
         assert matte(srgb_to_linear(encoded), plate).probability.any() == found
+
+
+def test_noise_that_a_patch_shares_is_as_likely_in_a_wide_one() -> None:
+    """Unlike other noise; what is beyond all that such noise may be is smoke, and so is what lies beside that."""
+    deviation = np.zeros((120, 160), np.float32)
+    deviation[20:100, 20:140] = 3
+    assert certainty(deviation, 2.0)[60, 80] == 1
+    assert not certainty(deviation, 2.0, 1.0).any()
+    assert certainty(deviation, 2.0, np.full(deviation.shape, 0.3))[60, 80] == 1
+    deviation[40:80, 40:80] = 20
+    assert certainty(deviation, 2.0, 1.0)[60, 120] == 1
