@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Array, Doubles
 from smokelift.scene import Camera, Domain
+from smokelift.scene.domain import LATERAL
 from smokelift.scene.projection import world_to_pixel
-
-LATERAL = ((1, 2), (0, 2), (0, 1))
-"""The two other axes of each axis."""
 
 INSIDE = 1e-3
 """The footprint is open, so places are kept so many voxels inside: floats then round to the same cell everywhere."""

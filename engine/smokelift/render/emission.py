@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from smokelift.checks.array_types import Mask
-from smokelift.render.camera_rays import LATERAL, camera_rays
-from smokelift.render.optics import Optics
-from smokelift.render.renderer import Image, Volume
+from smokelift.render.camera_rays import camera_rays
+from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera
-from smokelift.scene.domain import box_around
+from smokelift.scene.domain import LATERAL, box_around
 from smokelift.scene.projection import project_points
 
 

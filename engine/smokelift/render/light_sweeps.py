@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.checks.array_types import Doubles
-from smokelift.render.camera_rays import LATERAL
 from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 from smokelift.scene.checks import Vector
+from smokelift.scene.domain import LATERAL
 
 Voxel = tuple[int, int, int]
 Shape = tuple[int, int, int]
