@@ -20,9 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Doubles
-from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis, depth_at
 from smokelift.density.observation import ObservedClip, ObservedView
-from smokelift.density.upright_plane import PlanePicture, on_upright_plane, reach_along, seen_at, view_frame
+from smokelift.density.upright_plane import (
+    AxisEstimate,
+    Cue,
+    PlanePicture,
+    SmokeAxis,
+    depth_at,
+    on_upright_plane,
+    reach_along,
+    seen_at,
+    view_frame,
+)
 from smokelift.extraction.matte import matte
 from smokelift.scene import Camera, Domain, Inlet
 from smokelift.scene.projection import ray_through_pixels
