@@ -5,7 +5,7 @@
 namespace smokelift {
 namespace {
 
-// The nodes beside a place in a lattice that repeats, and how near the upper one is.
+// The nodes beside a place in a lattice that repeats, and how much the upper one counts: without creases.
 struct Between {
     int low, high;
     float weight;
@@ -14,7 +14,8 @@ struct Between {
 SMOKELIFT_INLINE Between between(float place, int count) {
     const float length = float(count), inside = place - length * std::floor(place / length);
     const int node = int(inside), low = node < count ? node : 0; // rounding may reach the end
-    return {low, low + 1 < count ? low + 1 : 0, inside - float(node)};
+    const float part = inside - float(node);
+    return {low, low + 1 < count ? low + 1 : 0, part * part * (3.0f - 2.0f * part)};
 }
 
 // Values along a row of voxels: the first lies at `start`, the others `scale` apart along z.

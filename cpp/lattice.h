@@ -1,4 +1,4 @@
-// Values between the nodes of a lattice that repeats.
+// Values between the nodes of a lattice that repeats: the twin of density/lattice_noise.py.
 #pragma once
 
 #include "marked_voxels.h"

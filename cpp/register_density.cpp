@@ -69,7 +69,7 @@ void register_density(py::module_ &module) {
                  return values;
              }),
              "lattice"_a, "scale"_a, "shift"_a, "motion"_a, "stretch"_a,
-             R"(A lattice that repeats, read at the voxels (count,), linear between nodes at whole numbers.
+             R"(A lattice that repeats, read at the voxels (count,), smooth between nodes at whole numbers.
 
         A voxel lies at its index x scale + shift (3,) + its motion (3, count) x stretch, which is finite.)")
         .def("scale_along_rays",

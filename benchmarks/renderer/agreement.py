@@ -27,7 +27,8 @@ from benchmarks.tables import markdown
 from smokelift.evaluation.metrics import volume_error
 from smokelift.output.images import write_image
 from smokelift.render import Renderer
-from smokelift.render.environment import environment_count, environment_lights
+from smokelift.render.environment import environment_lights
+from smokelift.render.image import environment_count
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium, PointLight
 
 Array = npt.NDArray[np.floating[Any]]

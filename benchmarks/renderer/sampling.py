@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
 from smokelift.checks.array_types import Array
-from smokelift.render.camera_rays import LATERAL, camera_rays
+from smokelift.render.camera_rays import camera_rays
+from smokelift.scene.domain import LATERAL
 
 Ints = NDArray[np.int32]
 

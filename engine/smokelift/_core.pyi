@@ -366,7 +366,7 @@ class MarkedVoxels:
         """
 
     def read_lattice(self, lattice: Reals, scale: float, shift: npt.ArrayLike, motion: Reals, stretch: float) -> Array:
-        """A lattice that repeats, read at the voxels (count,), linear between nodes at whole numbers.
+        """A lattice that repeats, read at the voxels (count,), smooth between nodes at whole numbers.
 
         A voxel lies at its index x scale + shift (3,) + its motion (3, count) x stretch, which is finite.
         """

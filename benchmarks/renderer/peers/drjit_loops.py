@@ -20,7 +20,7 @@ from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.reference import phase_volume
 from benchmarks.renderer.sampling import LightTable, RayTable, light_table, ray_table
 from benchmarks.renderer.scene import BenchScene
-from smokelift.render.camera_rays import LATERAL
+from smokelift.scene.domain import LATERAL
 
 
 def without_atomics() -> Any:

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render.gpu import taichi_runtime as taichi
+from smokelift.render import taichi_runtime as taichi
 
 # isort: split
 # what imports Taichi comes after the runtime, which suppresses its greeting

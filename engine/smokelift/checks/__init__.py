@@ -1,4 +1,11 @@
-"""What every package says of a value that it is given: in which words, and when it refuses it; what a finding is."""
+"""What every package says of a value that it is given, and the kind and figures of what it finds of a shot or a result.
+
+`arguments` has the words for a value, and refuses it; those for findings are in `smokelift.report`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Literal
 
 from smokelift.checks.arguments import (
     counted,
@@ -11,7 +18,6 @@ from smokelift.checks.arguments import (
     require_kind,
     shown,
 )
-from smokelift.checks.finding import UNDETERMINED, Figure, Figures, Finding, Source
 
 __all__ = [
     "UNDETERMINED",
@@ -29,3 +35,48 @@ __all__ = [
     "require_kind",
     "shown",
 ]
+
+Figure = float | str | tuple[float, ...]
+"""What a sentence fills in."""
+
+Figures = Mapping[str, Figure]
+
+Source = Literal["given", "measured", "estimated", "assumed", "made up"]
+
+UNDETERMINED = "undetermined"
+"""Value of a choice that nothing in the clip or the scene decides."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that was given, measured, assumed or noticed.
+
+    Attributes
+    ----------
+    kind
+        Name of its words.
+    figures
+        What the words fill in, by name. ``view`` is the number of the further view that it is about, ``tolerance`` what
+        the deciding figure of a choice was compared with.
+    about
+        What it decides or explains, such as ``"background"`` or ``"scattering"``; empty of what is only noticed.
+    value
+        What a choice takes, or `UNDETERMINED`; None where nothing was chosen.
+    source
+        The user gives it, the pictures show it (``"measured"``), or it follows from what they show (``"estimated"``).
+        The pictures leave the others undetermined: ``"assumed"`` is one answer for all clips, ``"made up"`` one of many
+        for this one. None of what is only noticed.
+    spread
+        Standard deviation of the value: meters of a depth; None if it is unknown.
+    doubt
+        Whether it says why the result may be nothing, or wrong.
+    """
+
+    kind: str
+    figures: Figures = field(default_factory=dict)
+    _: KW_ONLY
+    about: str = ""
+    value: Figure | None = None
+    source: Source | None = None
+    spread: float | None = None
+    doubt: bool = False

@@ -7,7 +7,6 @@ The default estimate (synthesis) is round, smooth smoke with detail: from every 
 patches that the clip shows from the front. The fit has the last word.
 """
 
-from smokelift.density.axis import AxisEstimate
 from smokelift.density.axis_cues import clip_axis
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, Detail, RoundDepth
 from smokelift.density.fit import (
@@ -26,6 +25,7 @@ from smokelift.density.temporal_prior import (
     Start,
     TemporalPrior,
 )
+from smokelift.density.upright_plane import AxisEstimate
 
 __all__ = [
     "AxisEstimate",

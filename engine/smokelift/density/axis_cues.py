@@ -11,8 +11,6 @@ Several cameras need none of them: `depth_prior` reads the axis from what they h
 docs/experiments/density-axis.md has the worth of each cue. It chose the constants of this page that cite no other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -20,9 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Doubles
-from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis, depth_at
 from smokelift.density.observation import ObservedClip, ObservedView
-from smokelift.density.upright_plane import PlanePicture, on_upright_plane, reach_along, seen_at, view_frame
+from smokelift.density.upright_plane import (
+    AxisEstimate,
+    Cue,
+    PlanePicture,
+    SmokeAxis,
+    depth_at,
+    on_upright_plane,
+    reach_along,
+    seen_at,
+    view_frame,
+)
 from smokelift.extraction.matte import matte
 from smokelift.scene import Camera, Domain, Inlet
 from smokelift.scene.projection import ray_through_pixels

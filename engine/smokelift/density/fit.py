@@ -5,8 +5,6 @@ A depth prior gives the start, the voxels that may hold smoke, and what makes up
 exact gradient of the cameras' pictures.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -7,16 +7,13 @@ the emission until it shows the picture. The emission stays at least 0, and its 
 what it was. Figures: docs/experiments/fire.md.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
-from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.profile import DepthProfile
-from smokelift.density.upright_plane import view_frame
+from smokelift.density.upright_plane import SmokeAxis, view_frame
 from smokelift.render import Optics, Volume
 from smokelift.render.emission import emission_matrix
 from smokelift.scene import Camera, Domain

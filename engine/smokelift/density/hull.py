@@ -1,7 +1,5 @@
 """Which voxels can hold smoke: those where every calibrated picture shows smoke."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

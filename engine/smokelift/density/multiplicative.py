@@ -19,8 +19,6 @@ Several pictures take turns, so that the density becomes the one nearest to the 
 multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -13,8 +13,6 @@ noise, so it stops there (discrepancy principle: Morozov 1966). The figures that
 the cameras alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -17,17 +17,14 @@ density can have, so a ray's middle is moved along it until most of the profile 
 (docs/experiments/density-profile.md).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.special import gamma, gammainc
 
 import smokelift._core as _core
-from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places
-from smokelift.density.upright_plane import TINY, PlanePicture, PlaneRays, on_upright_plane, view_frame
+from smokelift.density.upright_plane import TINY, PlanePicture, PlaneRays, SmokeAxis, on_upright_plane, view_frame
 from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
 

@@ -10,8 +10,6 @@ shadow or of the velocity, a frame takes over no more than that fraction, so non
 (docs/experiments/temporal-prior.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol

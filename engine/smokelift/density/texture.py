@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.density.detail_noise import MAX_NODE_DISTANCE, MIN_NODE_DISTANCE
+from smokelift.density.lattice_noise import LARGEST_BLUR, SMALLEST_BLUR
 from smokelift.density.observation import ObservedClip, ObservedView
 from smokelift.density.turntable import Turntable
 from smokelift.scene import Camera, Domain
@@ -185,11 +185,11 @@ def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
     """Standard deviation of the logarithm of some smoke's density by octave, the coarsest first.
 
     The pictures are optical depths, one pixel per voxel; the smoke is ``width`` voxels wide (standard deviation across
-    its axis). A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart,
-    is divided by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
+    its axis). A picture's energy in a band, the difference of an octave's blur and half of that, is divided by that of
+    smoke with a Gaussian profile whose octaves of noise all have unit strength.
     """
-    octaves = max(1, 1 + int(np.log2(MAX_NODE_DISTANCE * width / MIN_NODE_DISTANCE)))
-    blurs = [MAX_NODE_DISTANCE * width / 2**octave / np.sqrt(6) for octave in range(octaves)]
+    octaves = max(1, 1 + int(np.log2(LARGEST_BLUR * width / SMALLEST_BLUR)))
+    blurs = [LARGEST_BLUR * width / 2**octave for octave in range(octaves)]
     return tuple(float(np.sqrt(np.log1p(_energy(pictures, blur) / _unit_energy(blur, width)))) for blur in blurs)
 
 

@@ -6,15 +6,13 @@ roughen the pictures too. So each octave of the scatter is as strong as the clip
 smoke stays straight. The scatter travels with the smoke.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
+from smokelift.density.lattice_noise import lattices
 from smokelift.density.upright_plane import PlaneRays, view_frame
 from smokelift.scene import Camera, Domain
 
@@ -22,7 +20,7 @@ DEVIATION = 0.5
 """Standard deviation of the rays' middles over the smoke's in depth, where all octaves are of unit strength
 (docs/experiments/wander.md)."""
 
-NODES = (1.6, 0.8)
+NODE_DISTANCES = (2.5, 1.25)
 """Distances between nodes of the octaves, in standard deviations of the smoke's width: lobes, and half of them
 (docs/experiments/wander.md)."""
 
@@ -31,13 +29,6 @@ LARGEST_DEVIATION = 0.9
 
 LARGEST = 2.0
 """Bound of the scatter, in its standard deviations: smoke stays where the domain is likely to hold it."""
-
-LATTICE = 32
-"""Nodes along each side of a lattice, which repeats."""
-
-NODE_DEVIATION = (151 / 315) ** 1.5
-"""Standard deviation of cubic B-splines in three dimensions with coefficients of unit variance: along each dimension
-the squares of those that reach a place add up to 151 / 315 on the mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,27 +68,22 @@ class Wander:
         """How the rays of a camera's pixels scatter in a frame."""
         lateral, _, height = view_frame(camera)
         rays = PlaneRays.of(camera, domain)
-        up, right = (each[..., None] / domain.voxel_size for each in (rays.height, rays.lateral))
-        offset = self.offset(up * height + right * lateral, frame)
-        return Scatter(np.asarray(offset, np.float32), self.deviation, self.width * domain.voxel_size)
+        crossed = zip((rays.height, rays.lateral), (height, lateral), strict=True)
+        places = np.stack([place / domain.voxel_size - frame * (self.velocity @ along) for place, along in crossed])
+        return Scatter(self.offset(places).astype(np.float32), self.deviation, self.width * domain.voxel_size)
 
-    def offset(self, places: Doubles, frame: int) -> Doubles:
+    def offset(self, places: Doubles) -> Doubles:
         """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
 
-        ``places`` (rows, columns, 3) are where the pixels' rays cross an upright plane through the domain's center, in
-        voxels from there.
+        ``places`` (2, rows, columns) are where the pixels' rays cross the upright plane through the domain's center:
+        heights and laterals from there in voxels, less what the smoke has moved since the first frame.
         """
-        random = np.random.default_rng(self.seed)
-        at = np.moveaxis(places - frame * self.velocity, -1, 0)
-        offset = np.zeros(at.shape[1:])
-        for deviation, nodes in zip(self._deviations, NODES, strict=False):
-            lattice = random.standard_normal((LATTICE,) * 3) / NODE_DEVIATION
-            nodes_at = at / (nodes * self.width) + random.uniform(0, LATTICE, (3, 1, 1))
-            offset += deviation * ndimage.map_coordinates(lattice, nodes_at, order=3, mode="grid-wrap", prefilter=False)
+        octaves = zip(self._deviations, NODE_DISTANCES, lattices(self.seed, len(NODE_DISTANCES), 2), strict=False)
+        offset = sum(deviation * lattice.read(places / (nodes * self.width)) for deviation, nodes, lattice in octaves)
         return np.asarray(np.clip(offset, -LARGEST * self.deviation, LARGEST * self.deviation))
 
     @property
     def _deviations(self) -> Doubles:
         """`deviation` by octave."""
-        deviations = DEVIATION * np.array(self.roughness[: len(NODES)])
+        deviations = DEVIATION * np.array(self.roughness[: len(NODE_DISTANCES)])
         return deviations * (LARGEST_DEVIATION / max(float(np.linalg.norm(deviations)), LARGEST_DEVIATION))

@@ -7,8 +7,6 @@ refused; one color is the same wherever it points. The clip's noise is measured 
 (`noise`). Strokes of the scene change what was found (`strokes`); an alpha channel leaves nothing for them to say.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal
 

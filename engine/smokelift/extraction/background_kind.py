@@ -10,8 +10,6 @@ A frame that is black everywhere says nothing against a picture, since clips fad
 cut decide, whatever part of it is used.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ where it is, each its own way. So the camera of a frame has moved if most of the
 similarity that moves them, and hardly any are in place (docs/experiments/turning-camera.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache

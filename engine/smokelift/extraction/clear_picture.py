@@ -16,8 +16,6 @@ Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_pl
 whole frames.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -6,8 +6,6 @@ the same light. Without emission, a flame would be read as the densest smoke of 
 rest. What a flame hides is unknown: the smoke beside it is continued there. Figures: docs/experiments/fire.md.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The background that a scene gives: one color, a clean plate, or one clean plate for each frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@ next to nothing, and what is behind it stays as it was. Of the J that is found b
 them, that with which the frames are likelier is the smoke's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

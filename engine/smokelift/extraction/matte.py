@@ -7,8 +7,6 @@ taken off first, at the price of its own probability. Within a patch, the more a
 Figures: docs/experiments/background.md, docs/experiments/density-profile.md.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

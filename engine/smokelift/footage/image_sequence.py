@@ -6,7 +6,7 @@ from pathlib import Path
 from PIL import Image
 
 from smokelift.checks import Finding
-from smokelift.footage.alpha import association, association_notes
+from smokelift.footage.color import association, association_notes
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,

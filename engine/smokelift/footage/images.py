@@ -34,8 +34,7 @@ from PIL.TiffImagePlugin import (
 )
 
 import smokelift._core as _core
-from smokelift.footage.alpha import Association
-from smokelift.footage.color import Encoding, hlg_to_linear, pq_to_linear
+from smokelift.footage.color import Association, Encoding, hlg_to_linear, pq_to_linear
 from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]

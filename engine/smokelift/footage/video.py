@@ -27,8 +27,15 @@ from av.video.reformatter import ColorRange, Interpolation
 from av.video.stream import VideoStream
 
 from smokelift.checks import Finding
-from smokelift.footage.alpha import Association, association, association_notes
-from smokelift.footage.color import ENCODINGS, Encoding, primaries_name, to_bt709
+from smokelift.footage.color import (
+    ENCODINGS,
+    Association,
+    Encoding,
+    association,
+    association_notes,
+    primaries_name,
+    to_bt709,
+)
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,

@@ -26,6 +26,7 @@ from smokelift.output.files import (
     LOCK,
     MAX_START_NUMBER,
     RESUME,
+    Lock,
     checksum,
     frame_path,
     is_foreign,
@@ -33,7 +34,6 @@ from smokelift.output.files import (
 )
 from smokelift.output.images import write_image
 from smokelift.output.index import BOX, DirectoryBusyError, Index, SequenceError, first_change, json_value
-from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, checked_volume, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict

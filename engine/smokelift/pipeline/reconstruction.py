@@ -3,22 +3,23 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from smokelift.checks import require_kind
 from smokelift.footage.clip import Clip
+from smokelift.output.files import checksum
 from smokelift.output.index import directory_path
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
-from smokelift.pipeline.source_files import sources
 from smokelift.report.result import provenance
 from smokelift.report.views import choices, part
-from smokelift.scene import Scene
+from smokelift.scene import Background, EnvironmentLight, Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
+from smokelift.setup.shot import Shot, ShotView
 from smokelift.transport import Velocity, halved
 
 
@@ -166,3 +167,35 @@ def _resumed(state: ResumeState, shot: Shot) -> Frame:
         shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
     smooth, steady = (state.extra.get(name) for name in ("smooth", "steady"))
     return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)
+
+
+def sources(shot: Shot) -> dict[str, dict[str, Any]]:
+    """Return size and content of what a shot is read from, by its table in a scene file.
+
+    Frames of the clip that are its background are named: the sequence keeps their picture alone.
+    """
+    files: dict[str, tuple[Path, ...]] = {}
+    frames: dict[str, dict[str, Any]] = {}
+    for number, view in enumerate(shot.views):
+        table = f"views.{number - 1}." if number else ""
+        files[f"{table}clip"] = view.clip.files
+        files[f"{table}mask"] = () if view.clip.mask is None else view.clip.mask.files
+        given = shot.scene.views[number - 1].background if number else shot.scene.background
+        files[f"{table}background"] = _background(given, view)
+        if given is not None and given.strokes is not None:
+            files[f"{table}strokes"] = (given.strokes,)
+        if given is not None and given.frame is not None:
+            frames[f"{table}background"] = {"frame": list(given.frame)}
+    for number, light in enumerate(shot.scene.lights):
+        if isinstance(light, EnvironmentLight):
+            files[f"lights.{number}"] = (light.image,)
+    return frames | {
+        table: {"bytes": sum(path.stat().st_size for path in paths), "sha256": checksum(paths)}
+        for table, paths in files.items()
+        if paths
+    }
+
+
+def _background(given: Background | None, view: ShotView) -> tuple[Path, ...]:
+    """The files of a background; none where it is a color, or estimated."""
+    return view.plate.files or (() if given is None or given.image is None else (given.image,))

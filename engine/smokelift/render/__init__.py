@@ -1,18 +1,17 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
-    Scene -> Optics     domain, medium, lights, scattering           optics
-      lights            all as directional and point lights          optics, environment
+    Scene -> Optics     domain, medium, lights, scattering           image
+      lights            all as directional and point lights          image, environment
     Optics -> Renderer  one camera before one background             renderer
       RenderPlan        rays and light sweeps in voxel coordinates   plan, camera_rays, light_sweeps
-      Backend           light to every voxel, then along the rays    device: cpu_backend (cpp/) or gpu/ (Taichi)
+      Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu/ (Taichi), by device
 
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
 from smokelift.render.device import DeviceError, start
-from smokelift.render.image import render, render_gradient
-from smokelift.render.optics import Optics, scene_optics, scene_renderer
-from smokelift.render.renderer import Image, Renderer, Volume
+from smokelift.render.image import render, render_gradient, scene_optics, scene_renderer
+from smokelift.render.renderer import Image, Optics, Renderer, Volume
 
 __all__ = [
     "DeviceError",

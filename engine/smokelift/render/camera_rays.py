@@ -8,8 +8,6 @@ bilinear look-up in one plane, and the position in the plane is linear in the pl
 The distance between samples is between one voxel edge and sqrt(3) of it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -19,10 +17,8 @@ from numpy.typing import NDArray
 
 from smokelift.checks.array_types import Array, Doubles
 from smokelift.scene import Camera, Domain
+from smokelift.scene.domain import LATERAL
 from smokelift.scene.projection import world_to_pixel
-
-LATERAL = ((1, 2), (0, 2), (0, 1))
-"""The two other axes of each axis."""
 
 INSIDE = 1e-3
 """The footprint is open, so places are kept so many voxels inside: floats then round to the same cell everywhere."""

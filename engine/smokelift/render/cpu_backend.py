@@ -4,8 +4,6 @@ Sweeps of light are fastest along rows of memory, and slow where the light trave
 light comes from above or below, y and z change places: the voxels are copied into the sweeps' own grid anyway.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

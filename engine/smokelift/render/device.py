@@ -7,24 +7,16 @@ product. They keep the cores from the engine's own threads: a frame of 64 x 64 x
 beside them on two cores (docs/experiments/memory-and-time.md). The command ``smokelift`` starts without them.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from contextlib import AbstractContextManager
 from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import scipy.linalg  # noqa: F401  its OpenBLAS is another than NumPy's, and is limited only if it is loaded
 from threadpoolctl import ThreadpoolController
-
-from smokelift.render.cpu_backend import CpuBackend
-from smokelift.render.plan import RenderPlan
-
-if TYPE_CHECKING:
-    from smokelift.render.gpu.backend import GpuBackend
 
 DeviceName = Literal["auto", "cpu", "gpu"]
 
@@ -88,16 +80,8 @@ def start(device: DeviceName = "auto") -> str:
     return _running
 
 
-def backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
-    """What renders a plan on the device of this process."""
-    if start() == "cpu":
-        return CpuBackend(plan)
-    on_gpu: GpuBackend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
-    return on_gpu
-
-
 def _taichi() -> Any:
-    return import_module("smokelift.render.gpu.taichi_runtime")
+    return import_module("smokelift.render.taichi_runtime")
 
 
 def driver_installed() -> bool:

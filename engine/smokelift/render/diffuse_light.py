@@ -5,8 +5,6 @@ directions, and conjugate gradients solve for all orders of scattering. What the
 sharp shadows, stays on the voxels. Figures: docs/experiments/scattering.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

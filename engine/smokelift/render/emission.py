@@ -7,8 +7,6 @@ constant extinction kappa and emission e, which adds e (1 - exp(-kappa d)) / kap
 linear in the picture, so that a matrix says all of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -16,11 +14,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from smokelift.checks.array_types import Mask
-from smokelift.render.camera_rays import LATERAL, camera_rays
-from smokelift.render.optics import Optics
-from smokelift.render.renderer import Image, Volume
+from smokelift.render.camera_rays import camera_rays
+from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera
-from smokelift.scene.domain import box_around
+from smokelift.scene.domain import LATERAL, box_around
 from smokelift.scene.projection import project_points
 
 

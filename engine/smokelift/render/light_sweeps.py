@@ -5,8 +5,6 @@ a voxel apart; those of a point diverge, through the sides of a cube around it. 
 sweep of the light that travels the other way.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.checks.array_types import Doubles
-from smokelift.render.camera_rays import LATERAL
 from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 from smokelift.scene.checks import Vector
+from smokelift.scene.domain import LATERAL
 
 Voxel = tuple[int, int, int]
 Shape = tuple[int, int, int]

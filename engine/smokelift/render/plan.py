@@ -1,7 +1,5 @@
 """What stays the same from picture to picture: a camera and lights, in coordinates of the voxels that are rendered."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import get_args

@@ -1,4 +1,4 @@
-"""One camera before one grid: a density in, an image out, and the derivative back.
+"""Optics, and one camera before one grid: a density in, an image out, and the derivative back.
 
 Smoke takes the same fraction of all colors away, so a picture is scattered radiance S, in one channel where all that is
 scattered has the same color and in three otherwise, and transmittance T = exp(-optical depth). Colors are a matter of
@@ -10,17 +10,65 @@ the last line:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
+from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.device import products_on_one_thread
-from smokelift.render.plan import plan_render
-from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
+from smokelift.render.plan import RenderPlan, plan_render
+from smokelift.scene import Camera, Domain, FiniteLight, Medium, PointLight, Scattering
+
+if TYPE_CHECKING:
+    from smokelift.render.gpu.backend import GpuBackend
 
 Image = NDArray[np.float32]
 Volume = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Optics:
+    """How light travels through the smoke of a domain.
+
+    Attributes
+    ----------
+    domain, medium
+        Where the smoke is, and what it does to light.
+    lights
+        Directional and point lights only; an environment is split into many.
+    scattering
+        ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
+    """
+
+    domain: Domain
+    medium: Medium
+    lights: tuple[FiniteLight, ...]
+    scattering: Scattering
+
+    def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
+        """The renderer of a camera before a background; see `Renderer` for the parameters."""
+        return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
+
+    def unshadowed_source(self) -> NDArray[np.float64]:
+        """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.
+
+        Light that is scattered many times raises it as it raises that of the surface of a half-space, on the mean over
+        all directions of the light: 2 / (1 + sqrt(1 - albedo)), the mean of Chandrasekhar's H function (1950,
+        Radiative Transfer, section 38).
+        """
+        total = np.zeros(3)
+        for light in self.lights:
+            if isinstance(light, PointLight):
+                total += np.array(light.intensity) / np.sum((np.array(self.domain.centre) - light.position) ** 2)
+            else:
+                total += light.irradiance
+        albedos = np.array(self.medium.albedos)
+        orders = 2 / (1 + np.sqrt(1 - albedos)) if self.scattering == "multiple" else 1.0
+        return np.asarray(orders * albedos / (4 * np.pi) * total)
 
 
 class Renderer:
@@ -63,7 +111,7 @@ class Renderer:
         self._background = np.asarray(background, np.float32)
         sent = np.asarray(plan.color, np.float32)
         self._color = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
-        self._backend = device.backend(plan)
+        self._backend = _backend(plan)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
@@ -118,3 +166,11 @@ class Renderer:
         with products_on_one_thread():
             scattered_gradient = np.ascontiguousarray(image_gradient @ self._color.T)
         return self._backend.gradient(scattered_gradient, transmittance_gradient, out)
+
+
+def _backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
+    """What renders a plan on the device of this process."""
+    if device.start() == "cpu":
+        return CpuBackend(plan)
+    on_gpu: GpuBackend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
+    return on_gpu

@@ -16,7 +16,7 @@ from smokelift.checks.array_types import Doubles
 from smokelift.extraction import brightest_smoke, tells_source
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
-from smokelift.render.environment import environment_count
+from smokelift.render.image import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples, visible_plate

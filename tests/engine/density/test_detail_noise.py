@@ -2,7 +2,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.density.detail_noise import stretched_noise
@@ -82,17 +81,3 @@ def test_fine_octaves_are_drawn_out() -> None:
         return float(np.median(most / least))
 
     assert drawn_out(WIDTH, (0.0, 0.0, 1.0)) > 1.5 * drawn_out(WIDTH / 4, (1.0,))
-
-
-def test_a_lattice_is_read_as_scipy_does() -> None:
-    random = np.random.default_rng(0)
-    lattice = random.standard_normal((5, 6, 7)).astype(np.float32)
-    marked = random.random((12, 13, 14)) > 0.5
-    index = np.array(np.nonzero(marked))
-    motion = random.uniform(-40, 40, index.shape).astype(np.float32)
-    motion[:, :200] = np.round(motion[:, :200])
-    where, shift = _core.MarkedVoxels(marked), (-3.0, 4.5, 50.0)
-    places = 0.5 * index + np.array(shift)[:, None] + 0.25 * motion
-    expected = ndimage.map_coordinates(lattice, places, output=np.float32, order=1, mode="grid-wrap")
-    found = where.read_lattice(lattice, 0.5, shift, motion, 0.25)
-    np.testing.assert_allclose(found, expected, atol=1e-4)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels
 from smokelift.density.profile import DepthProfile, inflated
+from smokelift.density.upright_plane import SmokeAxis
 from smokelift.scene import Camera, Domain
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))

@@ -1,9 +1,21 @@
-"""How files encode light: the curves and matrices of the standards."""
+"""How files encode light: the curves and matrices of the standards, and colors beside alpha.
+
+Those are straight, premultiplied in linear light or premultiplied in code values; all are read alike.
+"""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from smokelift.footage.color import hlg_to_linear, pq_to_linear, primaries_name, to_bt709
+from smokelift.footage.clip import Clip
+from smokelift.footage.color import association, hlg_to_linear, pq_to_linear, primaries_name, to_bt709
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from tests.engine.films import encode, write_exr
+
+STRAIGHT, IN_LIGHT, IN_CODES = "straight", "premultiplied in linear light", "premultiplied in code values"
+COUNT, HEIGHT, WIDTH = 5, 64, 48
+TINT = np.array([1.0, 0.97, 0.93])
 
 
 def test_hlg_is_light_at_the_camera() -> None:
@@ -31,3 +43,77 @@ def test_wider_colors() -> None:
     matrix = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]])
     np.testing.assert_allclose(found[0], matrix @ [0.5, 0.4, 0.3], atol=2e-4)
     np.testing.assert_allclose(found[1], [0, 1.1329, 0], atol=2e-4)
+
+
+def opacity(n: int, most: float = 0.9) -> np.ndarray:
+    """The opacity (rows, columns, 1) of a soft puff that rises."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    distance = np.hypot(rows - HEIGHT + 14 + 8 * n, columns - WIDTH / 2)
+    return (most * np.clip(1.4 - distance / 12, 0, 1) * (1 + 0.1 * np.sin(n + rows / 3)))[..., None].clip(0, 1)
+
+
+def stored(held: str, n: int, gray: float, shade: float = 0.0, most: float = 0.9) -> np.ndarray:
+    """Encoded values (rows, columns, rgba) of smoke of a linear gray whose light varies by a share."""
+    alpha, (rows, columns) = opacity(n, most), np.mgrid[:HEIGHT, :WIDTH]
+    own = np.clip(gray * (1 + shade * np.sin(columns / 7 + n) * np.cos(rows / 9))[..., None] * TINT, 0, 1)
+    colors = {
+        STRAIGHT: linear_to_srgb(own) * (alpha > 0),
+        IN_LIGHT: linear_to_srgb(own * alpha),
+        IN_CODES: linear_to_srgb(own) * alpha,
+    }[held]
+    return np.concatenate([colors, alpha], -1)
+
+
+def written(folder: Path, kind: str, pictures: list[np.ndarray]) -> Path:
+    """Write a clip: ProRes 4444, numbered PNG, TIFF of 16 or 8 bits, or DPX pictures."""
+    codes = [np.rint(picture * 65535).astype(np.uint16) for picture in pictures]
+    if kind == "mov":
+        return encode(folder / "a.mov", codes, "prores_ks", "yuva444p10le")
+    codec, pixels = {"png": ("png", "rgba64be"), "dpx": ("dpx", "rgba"), "tif": ("tiff", "rgba64le")}.get(
+        kind, ("tiff", "rgba")
+    )
+    for n, picture in enumerate(codes):
+        encode(folder / f"a{n}.{kind}", [picture], codec, pixels)
+    return folder / f"a#.{kind}"
+
+
+@pytest.mark.parametrize("kind", ["png", "tif", "tiff", "dpx", "mov"])
+@pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
+@pytest.mark.parametrize("gray", [0.715, 0.1])
+def test_smoke_is_as_bright_however_a_program_held_it(tmp_path: Path, kind: str, held: str, gray: float) -> None:
+    path = written(tmp_path, kind, [stored(held, n, gray) for n in range(COUNT)])
+    with Clip.open(path, fps=24) as clip:
+        assert clip.backdrop == float(gray < 0.2)
+        for n in range(COUNT):
+            alpha = opacity(n)
+            shown = gray * TINT * alpha + (1 - alpha) * clip.backdrop
+            np.testing.assert_allclose(clip.frame(n), shown, atol=0.012)
+        assert [note.figures.get("held") for note in clip.findings()] == ([] if held == STRAIGHT else [held])
+
+
+@pytest.mark.parametrize("held", [STRAIGHT, IN_LIGHT, IN_CODES])
+@pytest.mark.parametrize("gray", [0.1, 0.3, 0.7])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_shading_and_grain_do_not_hide_the_convention(held: str, gray: float, noise: float) -> None:
+    random = np.random.default_rng(0)
+    pictures = [stored(held, n, gray, shade=0.5) for n in range(COUNT)]
+    for picture in pictures:
+        picture[..., :3] += random.normal(0, noise, picture[..., :3].shape)
+    assert association([picture.clip(0, 1) for picture in pictures], srgb_to_linear) == held
+
+
+def test_opaque_and_empty_pictures_are_straight() -> None:
+    picture = np.random.default_rng(0).random((8, 8, 4)).astype(np.float32)
+    for alpha in (0.0, 1.0):
+        picture[..., 3] = alpha
+        assert association([picture], srgb_to_linear) == STRAIGHT
+    assert association([], srgb_to_linear) == STRAIGHT
+
+
+def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path: Path) -> None:
+    for n in range(COUNT):
+        write_exr(tmp_path / f"a{n}.exr", {"RGBA": stored(IN_CODES, n, 0.715).astype(np.float32)})
+    with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
+        assert clip.backdrop == 0
+        np.testing.assert_allclose(clip.frame(2), stored(IN_CODES, 2, 0.715)[..., :3], rtol=1e-5)
+        assert clip.findings() == ()

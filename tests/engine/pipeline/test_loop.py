@@ -20,7 +20,7 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
-from smokelift.pipeline.source_files import sources
+from smokelift.pipeline.reconstruction import sources
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
 from smokelift.setup.prepare import prepare_shot

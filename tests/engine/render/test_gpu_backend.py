@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from smokelift.render import taichi_runtime
 from smokelift.render.cpu_backend import CpuBackend
-from smokelift.render.gpu import taichi_runtime
 from smokelift.render.gpu.backend import GpuBackend
 from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight

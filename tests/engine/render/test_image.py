@@ -1,4 +1,7 @@
-"""The public functions: exact, by the model that the scene says, with examples that run, strict about input."""
+"""The public functions: exact, by the model that the scene says, with examples that run, strict about input.
+
+And what lights a scene: an environment becomes many simple lights, the same for every camera and frame.
+"""
 
 import doctest
 from dataclasses import replace
@@ -7,8 +10,12 @@ import numpy as np
 import pytest
 
 from smokelift import render, render_gradient
+from smokelift.render import Optics, Renderer, scene_optics, scene_renderer
 from smokelift.render import image as image_module
-from smokelift.scene import Camera, DirectionalLight, Domain, Medium, Scene, completed
+from smokelift.render.environment import environment_lights
+from smokelift.render.image import environment_count, sampled_lights
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight, Scene, completed
+from tests.engine.render.environments import sky
 
 SHAPE = (14, 12, 16)
 SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
@@ -18,6 +25,8 @@ SCENE = Scene(
     medium=Medium(4.0, 0.8, -0.4),
     lights=(SUN,),
 )
+COMPLETE = completed(SCENE)
+LAMP = PointLight((4.0, -3.0, 5.0), (60.0, 50.0, 40.0))
 ASIDE = Camera.look_at((3.0, 0.2, 1.1), (0.7, 0.6, 0.8), fov_y_degrees=40, size=(18, 14))
 
 
@@ -82,3 +91,42 @@ def test_incomplete_scenes_and_other_shapes_are_refused(density, target):
     for wanted in (target[1:], np.full_like(target, np.nan)):
         with pytest.raises(ValueError):
             render_gradient(density, SCENE, wanted)
+
+
+def test_optics_are_those_of_the_scene() -> None:
+    scene = replace(COMPLETE, scattering="unshadowed", lights=(SUN, LAMP))
+    assert scene_optics(scene) == Optics(scene.domain, scene.medium, (SUN, LAMP), "unshadowed")
+
+
+def test_a_moving_camera_needs_a_frame() -> None:
+    moving = replace(ASIDE, matrices=(ASIDE.matrix, ASIDE.matrix))
+    with pytest.raises(ValueError):
+        scene_renderer(replace(COMPLETE, camera=moving))
+
+
+def test_an_environment_becomes_parallel_lights_in_its_place(light_of) -> None:
+    first, *between, last = sampled_lights(replace(COMPLETE, lights=(LAMP, light_of(sky(), directions=9), SUN)))
+    assert (first, last, len(between)) == (LAMP, SUN, 9)
+    assert all(isinstance(light, DirectionalLight) for light in between)
+
+
+def test_lights_do_not_change_while_the_camera_moves(light_of) -> None:
+    away = Camera.look_at((0.0, -30.0, 1.0), (0.0, 0.0, 0.7), fov_y_degrees=35, size=(64, 48))
+    scene = replace(COMPLETE, lights=(light_of(sky()),))
+    moving = replace(scene, camera=replace(scene.camera, matrices=(scene.camera.matrix, away.matrix)))
+    assert sampled_lights(moving) == sampled_lights(scene)
+
+
+def test_the_count_is_enough_and_few_where_few_are(light_of, plume) -> None:
+    domain, camera, medium = plume.scene.domain, plume.scene.camera, Medium(8.0, 0.9, 0.3)
+    lamp = np.zeros((64, 128, 3))
+    lamp[10, 20] = 1
+    assert environment_count(light_of(lamp), camera, domain, medium) == 4
+    light, black = light_of(sky()), np.zeros(3, np.float32)
+    count = environment_count(light, camera, domain, medium)
+    assert 8 <= count < 256
+    few, many = (
+        Renderer(camera, domain, medium, environment_lights(light, number), black).image(plume.densities[0])
+        for number in (count, 256)
+    )
+    assert np.linalg.norm(few - many) < 0.01 * np.linalg.norm(many)

@@ -11,7 +11,7 @@ import renderer_reference as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smokelift.render import Renderer
+from smokelift.render import Optics, Renderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 8, 10)
@@ -212,3 +212,14 @@ def test_a_gradient_is_written_where_an_earlier_one_was() -> None:
 def test_a_point_light_inside_the_domain_is_refused() -> None:
     with pytest.raises(ValueError):
         Renderer(DIAGONAL, DOMAIN, Medium(), (PointLight(tuple(CENTER), (1, 1, 1)),), np.zeros(3))
+
+
+def test_unshadowed_source_is_the_radiance_of_thin_smoke() -> None:
+    domain = Domain((-0.1, -0.1, 0.4), (0.1, 0.1, 0.6), (1, 1, 1))
+    medium = Medium(1e-3, 0.8, 0.0)
+    optics = Optics(domain, medium, (SUN, PointLight((2.0, 0.0, 0.5), (4.0, 8.0, 12.0))), "unshadowed")
+    through = Camera.look_at((0.0, -3.0, 0.5), (0.0, 0.0, 0.5), fov_y_degrees=1, size=(1, 1))
+    renderer = optics.renderer(through, np.zeros(3, np.float32))
+    image = renderer.image(np.ones((1, 1, 1), np.float32))
+    opacity = 1 - float(np.exp(-1e-3 * 0.2))
+    np.testing.assert_allclose(image[0, 0], opacity * optics.unshadowed_source(), rtol=1e-3)

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from smokelift.checks import UNDETERMINED, Finding
-from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
-from smokelift.density.upright_plane import view_frame
+from smokelift.density.upright_plane import AxisEstimate, Cue, SmokeAxis, view_frame
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image

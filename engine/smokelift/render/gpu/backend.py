@@ -1,7 +1,5 @@
 """The renderer on a GPU: Taichi kernels (``light_kernels``, ``camera_kernels``) over the box around the smoke."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,10 +7,10 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks.array_types import Array
+from smokelift.render import taichi_runtime as taichi
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
-from smokelift.render.gpu import taichi_runtime as taichi
 from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep, Sweep
 from smokelift.render.plan import RenderPlan
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from smokelift.density.axis import SmokeAxis, depth_at
 from smokelift.density.axis_cues import estimate_axis
+from smokelift.density.upright_plane import SmokeAxis, depth_at
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Inlet, Medium
 

@@ -4,8 +4,6 @@ Taichi compiles the kernels for a GPU; on the processor it runs the paper's base
 There a device array is a NumPy array, which kernels use in place; on a GPU it is a Taichi array.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import sys
