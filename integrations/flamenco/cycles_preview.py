@@ -37,6 +37,8 @@ def main(words: list[str]) -> None:
     scene.render.engine = "CYCLES"
     scene.cycles.samples = options.samples
     scene.cycles.volume_bounces = 4
+    if hasattr(scene.cycles, "volume_biased"):  # null scattering begins late and is noisy
+        scene.cycles.volume_biased = True
     scene.view_settings.view_transform = "Standard"
     for number in spread(numbers, options.frames):
         scene.frame_set(number)
