@@ -3,14 +3,16 @@
 A plate that was found in a clip is continued from its surroundings where no frame is clear. But smoke lets through some
 of what is there, in each frame another part. The turns start from the plate that explains all frames best: in each of
 them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T, and it goes on from what is known around it,
-above and below it, or on its sides, unless it is an object there. Then what an element leaves of a picture,
+above and below it, or on its sides, unless it is an object there. Its detail is that of one of the frames, and what
+smoke leaves of it in the others has to be T times as strong. Then what an element leaves of a picture,
 (I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to the last shows
 next to nothing, and what is behind it stays as it was. Of the J that is found before the turns and the one found after
 them, that with which the frames are likelier is the smoke's.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +47,12 @@ CANDIDATES = 1.0, 0.6, 0.36
 """Values of T for which each frame proposes a plate."""
 
 NEIGHBORHOOD = 2.0
-"""Standard deviation, in cells, of the Gaussian over which neighbors decide together: T of elements of eleven composed
-clips is off by .164, .159 and .158 with 1, 2 and 4, and by .162 cell by cell."""
+"""Standard deviation, in cells, of the Gaussian over which neighbors decide together, and that detail is finer than: T
+of elements of eleven composed clips is off by .164, .159 and .158 with 1, 2 and 4, and by .162 cell by cell."""
+
+DETAIL_WEIGHT = 0.2
+"""Weight of what detail leaves unexplained, beside colors of cells: T of elements of five composed clips is off by
+.185, .176 and .190 with 0, .2 and 1."""
 
 INDEPENDENT = 3
 """Number of independent frames that the frames count as: errors of smoke last (.75 to .95 from a frame to the next)."""
@@ -71,7 +77,7 @@ def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int])
         return plate, source
     after = clip_source(clip, better, smoky)
     # a plate that holds bright smoke makes what it leaves look like dark smoke
-    return better, source if loss <= _likeliest(*_shrunk(shot, plate), after)[1] else after
+    return better, source if loss <= _likeliest(*_shrunk(shot, plate), after).loss else after
 
 
 def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> tuple[Plate, float]:
@@ -82,21 +88,24 @@ def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> tuple[Plate, flo
     if (1 - plate.confidence).mean() < MIN_UNKNOWN or not plate.errors.any():
         return plate, 0.0
     pictures, first, size = _shrunk(clip, plate)
-    behind = area_average(first.image, *size)
     variance = float(np.trace(plate.errors)) / 3
-    start, loss = _likeliest(pictures, first, size, source)
-    found = replace(first, image=_changed(first, start - behind))
+    start = _likeliest(pictures, first, size, source)
+    first = _with_detail(first, start.detail, pictures.__getitem__)
+    behind = area_average(first.image, *size)
+    found = replace(first, image=_changed(first, start.image - behind))
     for _ in range(TURNS):
-        best, clearest = np.zeros_like(behind[..., :1]), start
+        best, clearest = np.zeros_like(behind[..., :1]), start.image
         for picture in pictures:
             shown, weight = _shown(Cells.of(picture, found, size), source)
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
         left = 1 / (1 + variance * best)
-        change = start + (1 - left) * (clearest - start) - behind
+        change = start.image + (1 - left) * (clearest - start.image) - behind
         found = replace(first, image=_changed(first, change))
+    frames = clip.spread(FRAMES)
+    plate = _with_detail(plate, start.detail, lambda each: clip.stored(frames[each]).averaged(*clip.size))
     confidence = 1 - (1 - plate.confidence) * area_average(left[..., 0], *clip.size)
-    return replace(plate, image=_changed(plate, change), confidence=confidence), loss
+    return replace(plate, image=_changed(plate, change), confidence=confidence), start.loss
 
 
 def _shrunk(clip: Clip, plate: Plate) -> tuple[list[Picture], Plate, tuple[int, int]]:
@@ -108,38 +117,112 @@ def _shrunk(clip: Clip, plate: Plate) -> tuple[list[Picture], Plate, tuple[int, 
     return pictures, plate.through(lambda part: area_average(part, *finer), pixels), size
 
 
-def _likeliest(
-    pictures: Sequence[Picture], plate: Plate, size: tuple[int, int], source: Picture
-) -> tuple[Picture, float]:
-    """The plate by cell (rows, columns, 3) that best explains all frames as mixtures, beside its continuations.
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """The plate by cell (rows, columns, 3) that turns start from, and its mean loss.
 
-    The other value is its mean loss. A frame's is that of the noise's Student t distribution at the likeliest T. The
-    brightness of J varies by `BRIGHTNESS_RANGE`, and so does that of S = (1 - T) J. Where a frame is clear it is clear
-    around there as well, so neighbors decide together.
+    ``detail`` has a factor (rows, columns) for each frame: 1 / T where the plate has its detail, seen through smoke.
+    """
+
+    image: Picture
+    loss: float
+    detail: list[Picture]
+
+
+class _Hypothesis(NamedTuple):
+    """A plate's colors (n, 3), and without detail; the frame, if any, that has its detail, and T of smoke before it."""
+
+    color: NDArray[np.floating[Any]]
+    smooth: NDArray[np.floating[Any]]
+    frame: int = -1
+    clear: float = 1.0
+
+
+def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int], source: Picture) -> _Start:
+    """The plate that best explains all frames as mixtures, beside its continuations.
+
+    A frame's loss is that of the noise's Student t distribution at the likeliest T. The brightness of J varies by
+    `BRIGHTNESS_RANGE`, and so does that of S = (1 - T) J; neither has detail. Where a frame is clear it is clear around
+    there as well, so neighbors decide together.
     """
     frames = [Cells.of(picture, plate, size) for picture in pictures]
     start = frames[0].behind
     where = frames[0].unknown > MIN_UNKNOWN
-    continued = _continuations(start, ~where)[:, where]
+    continued = _continuations(start, ~where)
+    expected, extent = continued[:, where], np.subtract(*_range_of(plate)[::-1])
     seen = [(cells.seen[where].astype(np.float64), cells.noise[where].mean(-1, dtype=np.float64)) for cells in frames]
-    light = np.asarray(source, np.float64)
-    low, high = _range_of(plate)
-    proposed = (np.clip((values - (1 - t) * light) / t, low, high) for values, _ in seen for t in CANDIDATES)
     nearby = blurred(where.astype(np.float32), NEIGHBORHOOD)[where]
-    best, least = continued[0], np.full(continued.shape[1], np.inf)
-    for each in (*continued, *proposed):
-        loss = _prior_loss(each, continued, plate.errors, high - low)
-        for values, noise in seen:
-            misfits = [_misfit(values - t * each, (1 - t) * light, noise) for t in MIXTURES]
-            loss += INDEPENDENT / FRAMES * np.min(misfits, axis=0)
+
+    def around(values: Picture) -> Picture:
+        """The means (n,) of the cells' values over their neighborhoods."""
         whole = np.zeros(where.shape, np.float32)
-        whole[where] = loss
-        loss = blurred(whole, NEIGHBORHOOD)[where] / nearby
-        better = loss < least
-        best, least = np.where(better[:, None], each, best), np.minimum(loss, least)
-    found = start.copy()
-    found[where] = best
-    return found, float(least.mean())
+        whole[where] = values
+        return blurred(whole, NEIGHBORHOOD)[where] / nearby
+
+    details = [_detail(picture, size) for picture in (*pictures, plate.image)]
+    products = [[around(area_average((a * b).mean(-1), *size)[where]) for b in details] for a in details]
+    coarse = [area_average(detail, *size)[where] for detail in details]
+    hypotheses = _hypotheses([values for values, _ in seen], coarse, continued, where, source, _range_of(plate))
+    best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
+    for index, (color, smooth, number, clear) in enumerate(hypotheses):
+        loss = _prior_loss(smooth, expected, plate.errors, extent)
+        for frame, (values, noise) in enumerate(seen):
+            misfits = []
+            for t in MIXTURES:
+                left = t / clear
+                detail = products[frame][frame] - 2 * left * products[number][frame]
+                detail += left**2 * products[number][number]
+                misfits.append(_misfit(values - t * color, (1 - t) * source, noise, detail))
+            loss += INDEPENDENT / FRAMES * np.min(misfits, axis=0)
+        loss = around(loss)
+        best, least = np.where(loss < least, index, best), np.minimum(loss, least)
+    image, factors = start.copy(), np.zeros((len(pictures), *where.shape), np.float32)
+    for index, hypothesis in enumerate(hypotheses):
+        taken = where.copy()
+        taken[where] = best == index
+        image[taken] = hypothesis.color[best == index]
+        if hypothesis.frame >= 0:
+            factors[hypothesis.frame][taken] = 1 / hypothesis.clear
+    return _Start(image, float(least.mean()), list(factors))
+
+
+def _hypotheses(
+    seen: Sequence[NDArray[np.float64]],
+    details: Sequence[Picture],
+    continued: NDArray[np.float64],
+    where: Mask,
+    source: Picture,
+    extent: tuple[Picture, Picture],
+) -> list[_Hypothesis]:
+    """Plates that are continued, that frames show through smoke, and that are continued with the detail of a frame.
+
+    ``seen`` and ``details`` are the colors (n, 3) of the cells ``where`` a plate is not known, and of their detail.
+    """
+    hypotheses = [_Hypothesis(color, color) for color in continued[:, where]]
+    evened = [blurred(each.astype(np.float32), NEIGHBORHOOD)[where] for each in continued]
+    for frame, values in enumerate(seen):
+        for t in CANDIDATES:
+            own = np.clip((values - (1 - t) * source) / t, *extent)
+            hypotheses.append(_Hypothesis(own, own, frame, t))
+            hypotheses += [_Hypothesis(np.clip(each + details[frame] / t, *extent), each, frame, t) for each in evened]
+    return hypotheses
+
+
+def _detail(picture: Picture, cells: tuple[int, ...]) -> Picture:
+    """What of a picture (rows, columns, 3) is finer than the neighborhoods of its cells."""
+    return picture - blurred(picture, NEIGHBORHOOD * max(picture.shape[:2]) / max(cells))
+
+
+def _with_detail(plate: Plate, factors: Sequence[Picture], picture: Callable[[int], Picture]) -> Plate:
+    """A plate that has the detail of frames, times their factors (rows, columns), where it is not known."""
+    rows, columns = plate.confidence.shape
+    unknown = (1 - plate.confidence)[..., None]
+    image, own = plate.image.copy(), _detail(plate.image, factors[0].shape)
+    for frame, factor in enumerate(factors):
+        if factor.any():
+            taken, times = (area_average(each, columns, rows)[..., None] for each in ((factor > 0) * 1.0, factor))
+            image += unknown * (times * _detail(picture(frame), factor.shape) - taken * own)
+    return replace(plate, image=np.maximum(image, 0))
 
 
 def _continuations(plate: Picture, known: Mask) -> NDArray[np.float64]:
@@ -170,11 +253,14 @@ def _prior_loss(plate: Picture, continued: NDArray[np.float64], errors: Picture,
     return np.asarray(-np.logaddexp.reduce(np.concatenate([each, any_color]), axis=0))
 
 
-def _misfit(left: Picture, sent: Picture, noise: Picture) -> Picture:
-    """The loss (n,) of cells of which T B leaves ``left`` (n, 3) for S, whose mean is ``sent`` (3,)."""
+def _misfit(left: Picture, sent: Picture, noise: Picture, detail: Picture) -> Picture:
+    """The loss (n,) of cells of which T B leaves ``left`` (n, 3) for S, whose mean is ``sent`` (3,).
+
+    ``detail`` (n,) is the mean square of the detail that T B leaves.
+    """
     apart, spread = left - sent, np.square(BRIGHTNESS_RANGE)
     along = spread * np.square(apart @ sent) / (noise + spread * (sent @ sent))
-    squares = (np.square(apart).sum(-1) - along) / noise
+    squares = (np.square(apart).sum(-1) - along + 3 * DETAIL_WEIGHT * detail) / noise
     return np.asarray(0.5 * (OUTLIER_FREEDOM + 3) * np.log1p(squares / OUTLIER_FREEDOM))
 
 

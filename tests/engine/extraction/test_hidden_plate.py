@@ -32,17 +32,17 @@ class Pictures:
         return area_average(self.shown, columns, rows)
 
 
-def wall() -> Picture:
-    detail = blurred(np.random.default_rng(1).standard_normal((ROWS, COLUMNS, 3)).astype("f4"), 2.4)
+def wall(grain: float = 2.4) -> Picture:
+    detail = blurred(np.random.default_rng(1).standard_normal((ROWS, COLUMNS, 3)).astype("f4"), grain)
     return np.maximum(0.25 * (1 + 0.4 * detail / detail.std()), 0.02).astype("f4")
 
 
-def filmed(behind: Picture, centers: list[float], depth: float) -> Pictures:
+def filmed(behind: Picture, centers: list[float], depth: float, source: Picture = SOURCE) -> Pictures:
     noise = np.random.default_rng(2)
     pictures = []
     for center in centers:
         clear = np.exp(-depth * np.exp(-((X - center) ** 2 + (Y - 80) ** 2) / 1000))[..., None]
-        picture = clear * behind + (1 - clear) * SOURCE + 0.002 * noise.standard_normal(behind.shape)
+        picture = clear * behind + (1 - clear) * source + 0.002 * noise.standard_normal(behind.shape)
         pictures.append(picture.astype("f4"))
     return Pictures(pictures)
 
@@ -89,6 +89,17 @@ def test_a_post_goes_on_behind_smoke_from_above_and_below() -> None:
     plate = replace(continued(behind), errors=0.01 * np.eye(3, dtype="f4"))
     plate.image[plate.confidence < 0.5] = 0.03
     better, _ = plate_in_turn(filmed(behind, list(np.linspace(70, 122, FRAMES)), 3.0), plate, SOURCE)
+    assert off(better, behind) < 0.5 * off(plate, behind)
+
+
+def test_detail_is_that_of_frames_that_show_most_of_it() -> None:
+    """Smoke as bright as the wall changes its contrast alone, and that is finer than what is extracted."""
+    behind = wall(0.8)
+    color = behind.mean((0, 1))
+    plate = continued(behind)
+    plate = replace(plate, image=behind + (1 - plate.confidence)[..., None] * (blurred(behind, 6.0) - behind))
+    pictures = filmed(behind, [96.0, 120.0, 144.0, 168.0, 192.0], 3.0, color)
+    better, _ = plate_in_turn(pictures, plate, color)
     assert off(better, behind) < 0.5 * off(plate, behind)
 
 
