@@ -22,6 +22,7 @@ from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,
     FINER,
+    MIN_VARIANCE,
     OUTLIER_FREEDOM,
     Cells,
     clip_source,
@@ -163,9 +164,13 @@ def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int],
     products = [[around(area_average((a * b).mean(-1), *size)[where]) for b in details] for a in details]
     coarse = [area_average(detail, *size)[where] for detail in details]
     hypotheses = _hypotheses([values for values, _ in seen], coarse, continued, where, source, _range_of(plate))
+    # no detail is likely that is stronger than that of the known plate
+    known = np.maximum(1 - frames[0].unknown, MIN_VARIANCE)
+    usual = np.average(area_average(np.square(details[-1]).mean(-1), *size), weights=known) + MIN_VARIANCE
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
         loss = _prior_loss(smooth, expected, plate.errors, extent)
+        loss += 1.5 * DETAIL_WEIGHT * products[number][number] / (clear**2 * usual)
         for frame, (values, noise) in enumerate(seen):
             misfits = []
             for t in MIXTURES:

@@ -103,6 +103,20 @@ def test_detail_is_that_of_frames_that_show_most_of_it() -> None:
     assert off(better, behind) < 0.5 * off(plate, behind)
 
 
+def test_detail_of_smoke_is_not_that_of_a_smooth_wall() -> None:
+    """Billows that stay within the middle, before a wall that has none wherever it is seen."""
+    behind = np.repeat((0.05 + 0.5 * X / COLUMNS)[..., None], 3, 2).astype("f4")
+    plate = replace(continued(behind), image=behind + (1 - continued(behind).confidence)[..., None] * 0.05)
+    pictures = []
+    for seed in range(FRAMES):
+        billows = np.roll(wall(3.0)[..., :1], 7 * seed, 0)
+        clear = np.exp(-4 * billows / billows.mean() * np.exp(-((X - 96) ** 2 + (Y - 80) ** 2) / 1500)[..., None])
+        pictures.append((clear * behind + (1 - clear) * SOURCE).astype("f4"))
+    better, _ = plate_in_turn(Pictures(pictures), plate, SOURCE)
+    middle = np.hypot(X - 96, Y - 80) < 25
+    assert (better.image - blurred(better.image, 6.0))[middle].std() < 0.02
+
+
 def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
     behind = wall()
     plate = continued(behind)
