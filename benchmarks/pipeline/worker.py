@@ -84,5 +84,5 @@ def measure(path: Path, settings: Settings, size: tuple[int, int, int], frames: 
         solves=times.solves,
         memory_mib=peak_mib(),
         psnr=float(np.mean([found["psnr_working"] for found in figures[UNTIMED:]])),
-        occupied=float(np.mean([found["hull_fraction"] for found in figures[UNTIMED:]])),
+        occupied=float(np.mean([found["hull_share"] for found in figures[UNTIMED:]])),
     )

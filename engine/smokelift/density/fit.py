@@ -88,7 +88,7 @@ class FittedDensity:
         picture as its view has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
         ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``relative_error``, the
         root mean square of the input's differences over that of what changes there, with what its element leaves out as
-        no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_fraction``, the hull's
+        no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_share``, the hull's
         fraction of the voxels.
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
@@ -291,7 +291,7 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
         **decibels,
         **({"relative_error": math.sqrt((losses[0] + left_out) / (change + left_out))} if change > 0 else {}),
         "iterations": float(iterations),
-        "hull_fraction": np.count_nonzero(views.hull) / views.hull.size,
+        "hull_share": np.count_nonzero(views.hull) / views.hull.size,
     }
 
 

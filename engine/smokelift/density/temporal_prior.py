@@ -81,16 +81,16 @@ class GuidedSimulation:
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume) -> Start:
         """The carried density with the smooth answer's low pass; see `TemporalPrior`.
 
-        Its figure ``taken_over`` is the fraction of the smoke that is.
+        Its figure ``share`` is the fraction of the smoke that is.
         """
         prior, detail, where = depth.density, depth.detail, views.where
         if detail is None or not where.count:
             blend = self.blend if prior.any() and carried.any() else 0.0
-            return Start(np.float32(1 - blend) * prior + np.float32(blend) * carried, {"taken_over": blend})
+            return Start(np.float32(1 - blend) * prior + np.float32(blend) * carried, {"share": blend})
         wanted, have = (detail.low_pass(values) for values in (detail.smooth, carried))
         reached = np.float32(RETENTION) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         taken_over = where.take(carried) * reached / np.maximum(have, TINY)
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * where.take(prior)
         total = float(started.sum(dtype=np.float64))
         fraction = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
-        return Start(views.volume(started), {"taken_over": fraction})
+        return Start(views.volume(started), {"share": fraction})

@@ -101,7 +101,7 @@ def loop_sequence(
                 fraction = number / (overlap + 1)
                 start, end = read_state(sequence, source), read_state(sequence, source + length)
                 state = seam(end, start, fraction, (overlap + 1) * (1 / sequence.fps))
-                further = {"place": source, "fraction": fraction}
+                further = {"place": source, "share": fraction}
                 yield write_simulated(writer, number, state, "looped", further, started=started)
             else:
                 yield write_copy(sequence, source, writer, number, {"place": source})

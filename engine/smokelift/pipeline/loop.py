@@ -206,5 +206,5 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
 def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:
     """The density of a frame whose picture shows nothing of the domain: what was carried along."""
     nothing: Array = np.zeros(domain.resolution, np.float32)
-    figures = {"loss": 0.0, "iterations": 0.0, "hull_fraction": 0.0}
+    figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
     return FittedDensity(nothing if carried is None else carried, nothing > 0, figures)

@@ -63,7 +63,7 @@ def expected_shortcomings(shot: Shot) -> list[Finding]:
 
 def count_empty(figures: Sequence[Mapping[str, Any]]) -> int:
     """Return how many frames show no smoke."""
-    return sum(not (of_frame.get("hull_fraction") or 0) > 0 for of_frame in figures)
+    return sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
 
 
 def shortcomings(figures: Sequence[Mapping[str, Any]], *, burns: bool = False) -> list[Finding]:

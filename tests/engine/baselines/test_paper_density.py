@@ -29,7 +29,7 @@ def test_an_empty_picture_gives_zeros(small) -> None:
     for initial in (None, np.ones(small.domain.resolution, np.float32)):
         found = fitted(small, {0.0: nothing}, 5, initial)
         assert not found.density.any()
-        assert found.figures["hull_fraction"] == 0
+        assert found.figures["hull_share"] == 0
 
 
 def test_the_descent_lowers_the_loss(plume, small) -> None:

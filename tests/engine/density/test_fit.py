@@ -213,7 +213,7 @@ def test_the_figures_are_those_of_the_density(plume, small) -> None:
     assert found.figures["loss"] == pytest.approx(error.sum(), rel=1e-3)
     pixels = error.sum() / 3 * 10 ** (found.figures["psnr"] / 10)
     assert np.count_nonzero(render(found.density, small).any(-1)) <= 1.01 * pixels < error[..., 0].size
-    assert found.figures["hull_fraction"] == pytest.approx(found.hull.mean())
+    assert found.figures["hull_share"] == pytest.approx(found.hull.mean())
 
 
 @pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
@@ -238,7 +238,7 @@ def test_an_empty_picture_gives_zeros(small) -> None:
     for initial in (None, full):
         found = reconstruct_density(nothing, small, initial)
         assert not found.density.any()
-        assert found.figures["hull_fraction"] == 0
+        assert found.figures["hull_share"] == 0
 
 
 # several views

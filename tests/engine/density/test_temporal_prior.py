@@ -45,7 +45,7 @@ def moment(plume) -> Moment:
 
 def test_a_fraction_is_taken_over(moment) -> None:
     start = moment.start(moment.true)
-    assert start.figures == {"taken_over": BLEND}
+    assert start.figures == {"share": BLEND}
     np.testing.assert_allclose(start.density, (moment.prior + moment.true) / 2, rtol=1e-6)
 
 
@@ -55,7 +55,7 @@ def test_without_smoke_the_priors_density_stays(moment, empty) -> None:
     prior, carried = (nothing, moment.true) if empty == "prior" else (moment.prior, nothing)
     start = replace(moment, depth=replace(moment.depth, density=prior)).start(carried)
     np.testing.assert_array_equal(start.density, prior)
-    assert start.figures == {"taken_over": 0.0}
+    assert start.figures == {"share": 0.0}
 
 
 def blurred(density: Volume) -> Volume:
@@ -100,8 +100,8 @@ def test_detail_is_born_where_nothing_is_carried(moment, detailed) -> None:
     hull = moment.depth.views.hull
     empty = detailed.start(np.zeros_like(moment.true))
     np.testing.assert_array_equal(empty.density[hull], detailed.prior[hull])
-    assert empty.figures["taken_over"] == 0
+    assert empty.figures["share"] == 0
     little = detailed.start(np.float32(0.01) * moment.prior)
-    assert 0 < little.figures["taken_over"] <= 0.011 * LARGEST_GAIN
+    assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
     np.testing.assert_allclose(little.density.sum(), detailed.prior[hull].sum(), rtol=0.02)
-    assert detailed.start(moment.prior).figures["taken_over"] == pytest.approx(RETENTION, rel=0.01)
+    assert detailed.start(moment.prior).figures["share"] == pytest.approx(RETENTION, rel=0.01)

@@ -99,7 +99,7 @@ def test_density_is_carried_from_the_third_frame_on(run, plume, draft) -> None:
         assert np.array_equal(one.density, carried.density) == (one.number <= 2)
     taken = [frame.figures["transport"] for frame in run[0]]
     assert taken[:2] == [{}, {}]
-    assert all(0.5 < figures["taken_over"] < 1 for figures in taken[2:])
+    assert all(0.5 < figures["share"] < 1 for figures in taken[2:])
 
 
 def test_picture_mass_and_motion_are_about_right(run, plume) -> None:
@@ -289,7 +289,7 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
     poses = (*tracked.camera.matrices[:4], look_at_matrix((0, -4, 0.8), target, (0, 0, 1)))
     scene = plume.write(tmp_path, plume.densities, replace(tracked, camera=replace(tracked.camera, matrices=poses)))
     frames = frames_of(scene, draft)
-    assert frames[4].figures["hull_fraction"] == 0
+    assert frames[4].figures["hull_share"] == 0
     assert frames[4].density.sum() == pytest.approx(frames[3].density.sum(), rel=1e-3)
     assert centroid(frames[4].density, tracked)[2] > centroid(frames[3].density, tracked)[2] + 0.02
 
@@ -309,7 +309,7 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
     scene = replace(tracked, clip=clip, background=Background(image=tmp_path / "plate_#.exr"))
     frames = frames_written(scene, draft, tmp_path / "out")
     assert all(frame.figures["psnr"] >= 35 for frame in frames)
-    assert all(frame.figures["hull_fraction"] < 0.5 for frame in frames)
+    assert all(frame.figures["hull_share"] < 0.5 for frame in frames)
     assert Sequence.open(tmp_path / "out").scene == completed(scene)
 
 
@@ -321,7 +321,7 @@ def test_frames_without_smoke_are_empty(plume, draft, tmp_path, detail) -> None:
     assert [bool(frame.density.any()) for frame in frames] == [bool(density.any()) for density in clip]
     for frame in frames:
         assert all(np.isfinite(face).all() for face in frame.velocity.faces)
-        assert (frame.figures["hull_fraction"] > 0) == bool(clip[frame.number - 1].any())
+        assert (frame.figures["hull_share"] > 0) == bool(clip[frame.number - 1].any())
 
 
 def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:

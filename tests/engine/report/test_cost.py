@@ -142,7 +142,7 @@ def shot(plume) -> Iterator[Shot]:
 
 def test_the_fraction_that_may_hold_smoke_is_that_of_the_run(shot) -> None:
     found = Workload.of(shot, SMOOTH, moment())
-    fractions = [frame.figures["hull_fraction"] for frame in Reconstruction(shot, compose(shot.settings))]
+    fractions = [frame.figures["hull_share"] for frame in Reconstruction(shot, compose(shot.settings))]
     assert found.smoky_max == pytest.approx(max(fractions), rel=0.02)
     assert found.smoky_mean == pytest.approx(sum(fractions) / len(fractions), rel=0.1)
     assert (found.frames, found.views, found.pixels) == (len(fractions), 1, 40 * 56)

@@ -88,7 +88,7 @@ def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
 )
 def test_a_fit_that_explains_little_is_said(left: float, kind: str | None) -> None:
     errors = ({"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {})
-    figures = [{"hull_fraction": 0.1, **figures} for figures in errors]
+    figures = [{"hull_share": 0.1, **figures} for figures in errors]
     assert shortcomings(figures) == ([Finding(kind, {"error": left}, doubt=True)] if kind else [])
     assert [found.kind for found in shortcomings([*figures, {}], burns=True)] == (
         ["empty frames", "fire beside what is fitted"] if kind else ["empty frames"]
