@@ -150,7 +150,8 @@ def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int],
     start = frames[0].behind
     where = frames[0].unknown > MIN_UNKNOWN
     continued = _continuations(start, ~where)
-    expected, extent = continued[:, where], np.subtract(*_range_of(plate)[::-1])
+    expected = continued[:, where]
+    low, high = _range_of(plate)
     seen = [(cells.seen[where].astype(np.float64), cells.noise[where].mean(-1, dtype=np.float64)) for cells in frames]
     nearby = blurred(where.astype(np.float32), NEIGHBORHOOD)[where]
 
@@ -160,16 +161,17 @@ def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int],
         whole[where] = values
         return blurred(whole, NEIGHBORHOOD)[where] / nearby
 
+    # the plate's own comes last, as that of frame -1
     details = [_detail(picture, size) for picture in (*pictures, plate.image)]
     products = [[around(area_average((a * b).mean(-1), *size)[where]) for b in details] for a in details]
     coarse = [area_average(detail, *size)[where] for detail in details]
-    hypotheses = _hypotheses([values for values, _ in seen], coarse, continued, where, source, _range_of(plate))
+    hypotheses = _hypotheses([values for values, _ in seen], coarse, continued, where, source, (low, high))
     # no detail is likely that is stronger than that of the known plate
     known = np.maximum(1 - frames[0].unknown, MIN_VARIANCE)
     usual = np.average(area_average(np.square(details[-1]).mean(-1), *size), weights=known) + MIN_VARIANCE
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
-        loss = _prior_loss(smooth, expected, plate.errors, extent)
+        loss = _prior_loss(smooth, expected, plate.errors, high - low)
         loss += 1.5 * DETAIL_WEIGHT * products[number][number] / (clear**2 * usual)
         for frame, (values, noise) in enumerate(seen):
             misfits = []

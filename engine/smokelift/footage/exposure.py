@@ -19,8 +19,8 @@ COMPARED_SIDE = 160
 USABLE = (0.005, 0.9)
 """Linear values between which a ratio is usable: below there is noise, above clipping."""
 
-MIN_USABLE_SHARE = 0.01
-"""Smallest usable share of a picture."""
+MIN_USABLE_FRACTION = 0.01
+"""Smallest usable fraction of a picture."""
 
 AGREEING = 1 / 3
 """Share of the usable pixels that must show one gain."""
@@ -42,7 +42,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     """
     gains = np.ones(3, np.float32)
     usable = _usable(background) & _usable(picture)
-    if usable.mean() < MIN_USABLE_SHARE:
+    if usable.mean() < MIN_USABLE_FRACTION:
         return gains
     ratios = np.log(picture[usable] / background[usable])
     if _all_three(np.abs(ratios) < SAME).mean() >= UNCHANGED:
@@ -55,7 +55,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
 
 def shows_exposure(background: Picture) -> bool:
     """Return whether enough of a linear background (rows, columns, 3) is usable to measure gains against it."""
-    return bool(_usable(background).mean() >= MIN_USABLE_SHARE)
+    return bool(_usable(background).mean() >= MIN_USABLE_FRACTION)
 
 
 def small(picture: Picture) -> Picture:
@@ -86,7 +86,7 @@ def _all_three(holds: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 
 def _shorth(values: npt.NDArray[np.float32]) -> tuple[float, float]:
-    """Middle and width of the shortest interval that holds the share `AGREEING` of the values."""
+    """Middle and width of the shortest interval that holds the fraction `AGREEING` of the values."""
     ordered = np.sort(values)
     count = max(1, int(AGREEING * len(ordered)))
     widths = ordered[count - 1 :] - ordered[: len(ordered) - count + 1]

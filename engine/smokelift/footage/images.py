@@ -2,7 +2,7 @@
 
 Integer pictures (PNG, JPEG, TIFF, DPX) are sRGB unless said otherwise, EXR and HDR are linear. A gray picture gets
 three equal channels. Alpha is shown over black: EXR colors are premultiplied in linear light, by the format's rule;
-those of integer pictures are read by one of the three conventions of `alpha`.
+those of integer pictures are read by one of the three conventions of `color`.
 """
 
 import io
