@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 CODES = (np.uint8, np.uint16)
 """What picture files hold in place of light."""
 
+MAX_MAGNITUDE = 1e12
+"""Largest density, velocity or residual: sums of squares of larger ones are not finite in 32 bits."""
+
 
 def require_kind(
     value: object,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import smokelift._core as _core
 from smokelift.checks import listed, numbers, require_kind
+from smokelift.checks.arguments import MAX_MAGNITUDE
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.levels import BLUR_REACH
@@ -28,9 +29,6 @@ from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.device import products_on_one_thread
 from smokelift.scene import CompleteScene, Domain, Scene, completed
 from smokelift.scene.domain import box_around
-
-LARGEST_START = 1e12
-"""Initial density, at most: squares of larger ones are not finite in 32 bits."""
 
 MIN_DENSITY = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
@@ -303,6 +301,6 @@ def _checked_initial(initial: Volume, domain: Domain) -> Volume:
         )
     if not np.isfinite(initial).all() or initial.min() < 0:
         raise ValueError("The initial density must be finite and not negative; set other values to 0.")
-    if initial.max() > LARGEST_START:
-        raise ValueError(f"The initial density must be {LARGEST_START:g} at most, not {initial.max():g}.")
+    if initial.max() > MAX_MAGNITUDE:
+        raise ValueError(f"The initial density must be {MAX_MAGNITUDE:g} at most, not {initial.max():g}.")
     return initial

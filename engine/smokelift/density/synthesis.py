@@ -56,9 +56,6 @@ AZIMUTHS = 5
 OWN_PICTURE_DEGREES = 10.0
 """Degrees from a camera within which its own picture decides."""
 
-GOLDEN = (np.sqrt(5) - 1) / 2
-"""Its multiples, less their whole parts, are spread evenly however many there are."""
-
 FRESH_STEP, CARRIED_STEP = 0.6, 0.5
 """Fractions of a step towards a picture that are made, for fresh smoke and for carried smoke: more of the second
 flickers (docs/experiments/every-view.md)."""
@@ -236,11 +233,12 @@ class EveryView:
     def azimuths(self) -> Iterator[tuple[int, float]]:
         """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""
         cameras = [self.texture.turntable.degrees(view.camera) for view in self.level.views.views]
+        golden = (np.sqrt(5) - 1) / 2  # its multiples, less their whole parts, are spread evenly
         # a frame never takes as many, and 997 is prime to the number of the bases
         turn = 997 * self.level.views.frame
         while True:
             turn += 1
-            degrees = 180 * (GOLDEN * turn % 1)
+            degrees = 180 * (golden * turn % 1)
             if _unseen(degrees, cameras):
                 yield turn, degrees
 

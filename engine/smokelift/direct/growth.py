@@ -32,9 +32,6 @@ FADE = 0.25
 FADE_EXPONENT = 2.0
 """Power of the distance to such a side that is left of the smoke: its value and its slope end at zero."""
 
-HALF_VOXEL = np.float32(0.5)
-"""Voxels from the surface at which smoke is gone to a voxel's center, at least."""
-
 BUMPS = 0.6
 """Fraction of that length by which the surface has bumps at which the smoke is gone."""
 
@@ -164,7 +161,8 @@ def dissolve(state: SmokeState, stopped: tuple[Side, ...], dt: float, first: tup
         moved = np.maximum(voxels * at_centres(state.velocity.faces)[axis], 0)
         now = np.clip(distance, 0, band)
         before = np.minimum(now + moved, band)
-        left = left * ((now + HALF_VOXEL) / (before + HALF_VOXEL)) ** np.float32(FADE_EXPONENT)
+        # a voxel's center is half a voxel from the surface at which smoke is gone, at least
+        left = left * ((now + 0.5) / (before + 0.5)) ** np.float32(FADE_EXPONENT)
     return state.scaled(left)
 
 

@@ -22,6 +22,7 @@ from smokelift.direct.state import SmokeState
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, advect, faces_in
 from smokelift.transport.constraint import FaceMasks, faces_of
+from smokelift.velocity.linearization import SMOKE_THRESHOLD
 
 BLUR_VOXELS = 2.0
 """Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets. This and the three
@@ -43,9 +44,6 @@ MIN_SCORE = 0.5
 MIN_LASTING_FRACTION = 0.25
 """Smoke that lasts in an inlet over that of the strongest, at least, where the weaker half of the frames counts: what a
 wrong velocity leaves is scattered and moves on."""
-
-MIN_DENSITY_FRACTION = 0.01
-"""Fraction of the largest density below which a voxel is not in the smoke."""
 
 MIN_RESIDUAL_FRACTION = np.float32(1e-4)
 """Fraction of the largest density below which a residual means nothing."""
@@ -136,7 +134,7 @@ def _detect_inlets(states: Sequence[SmokeState], dt: float) -> Mask:
         carried = advect(before.density, after.velocity, dt)
         largest = np.maximum(after.density, carried)
         changes.append((after.density - carried) / max(largest.max(), np.float32(1e-30)))
-    entering = inlet_score(changes, largest > MIN_DENSITY_FRACTION * largest.max()) > MIN_SCORE
+    entering = inlet_score(changes, largest > SMOKE_THRESHOLD * largest.max()) > MIN_SCORE
     middle = len(states) // 2
     lasting = np.minimum.reduce([_blurred_mean(part) for part in (changes[:middle], changes[middle:]) if part])
     outflow = sum(map(_outflow, states[1:]), _outflow(states[0]))

@@ -26,8 +26,6 @@ Association = Literal["straight", "premultiplied in linear light", "premultiplie
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
 """Encodings by transfer characteristics; all others are read as sRGB, as screens do."""
 
-_D65 = (0.3127, 0.3290)
-_BT709 = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))
 _PRIMARIES = {
     5: ("BT.601 (625 lines)", ((0.640, 0.330), (0.290, 0.600), (0.150, 0.060))),
     6: ("BT.601 (525 lines)", ((0.630, 0.340), (0.310, 0.595), (0.155, 0.070))),
@@ -37,29 +35,24 @@ _PRIMARIES = {
 }
 """Names of primaries other than BT.709, all with a D65 white, and chromaticities of red, green and blue."""
 
-_HLG = (0.17883277, 0.28466892, 0.55991073)
-_PQ = (2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32)
-_HLG_WHITE = 0.75
-_PQ_WHITE = 203 / 10_000
-
 
 def hlg_to_linear(signal: npt.ArrayLike) -> Array:
     """Decode hybrid log-gamma (BT.2100, inverse OETF: light at the camera, not on a screen)."""
-    a, b, c = _HLG
+    a, b, c = 0.17883277, 0.28466892, 0.55991073
 
     def scene(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         return np.where(values <= 0.5, values**2 / 3, (np.exp((np.maximum(values, 0.5) - c) / a) + b) / 12)
 
     e = np.maximum(np.asarray(signal, np.float64), 0.0)
-    return np.asarray(scene(e) / scene(np.array(_HLG_WHITE)), np.float32)
+    return np.asarray(scene(e) / scene(np.array(0.75)), np.float32)  # reference white (BT.2408)
 
 
 def pq_to_linear(signal: npt.ArrayLike) -> Array:
     """Decode the perceptual quantizer (BT.2100 and SMPTE ST 2084, EOTF)."""
-    m1, m2, c1, c2, c3 = _PQ
+    m1, m2, c1, c2, c3 = 2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
     e = np.maximum(np.asarray(signal, np.float64), 0.0) ** (1 / m2)
     screen = (np.maximum(e - c1, 0.0) / (c2 - c3 * e)) ** (1 / m1)
-    return np.asarray(screen / _PQ_WHITE, np.float32)
+    return np.asarray(screen / (203 / 10_000), np.float32)  # reference white of 203 cd/m2 (BT.2408)
 
 
 def primaries_name(primaries: int) -> str | None:
@@ -71,14 +64,16 @@ def to_bt709(linear: Array, primaries: int) -> Array:
     """Convert linear colors [row, column, rgb] to BT.709; colors outside it are clipped at 0."""
     if primaries not in _PRIMARIES:
         return linear
-    matrix = np.linalg.solve(_to_xyz(_BT709), _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)
+    bt709 = _to_xyz(((0.640, 0.330), (0.300, 0.600), (0.150, 0.060)))
+    matrix = np.linalg.solve(bt709, _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)
     converted: Array = np.maximum(linear @ matrix.T, np.float32(0.0))
     return converted
 
 
 def _to_xyz(chromaticities: tuple[tuple[float, float], ...]) -> npt.NDArray[np.float64]:
     """The matrix from RGB with a D65 white to CIE XYZ (SMPTE RP 177)."""
-    red, green, blue, white = (np.array([x / y, 1.0, (1 - x - y) / y]) for x, y in (*chromaticities, _D65))
+    points = (*chromaticities, (0.3127, 0.3290))
+    red, green, blue, white = (np.array([x / y, 1.0, (1 - x - y) / y]) for x, y in points)
     columns = np.stack([red, green, blue], axis=1)
     return np.asarray(columns * np.linalg.solve(columns, white))
 

@@ -15,13 +15,10 @@ from smokelift.checks import Finding
 from smokelift.footage.images import Layer, Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
-"""Frames a second if neither the file nor the user gives a rate: that of film."""
+"""Frames per second if neither the file nor the user gives a rate: that of film."""
 
 FOCAL_LENGTHS = (4.0, 2000.0)
 """Focal lengths in millimeters on 35 mm film, from a fisheye to a telescope; others, often 0, mean it is unknown."""
-
-MIDDLE = 0.5
-"""sRGB value as far from black as from white."""
 
 OPAQUE = 0.999
 """Alpha from which on a pixel is opaque: less than a step of 8 bits below 1."""
@@ -205,4 +202,4 @@ def backdrop_of(layers: Iterable[Layer]) -> float | None:
         opaque = opaque and bool((alpha >= OPAQUE).all())
     if opaque:
         return None
-    return 1.0 if opacity > 0 and linear_to_srgb(light / opacity) < MIDDLE else 0.0
+    return 1.0 if opacity > 0 and linear_to_srgb(light / opacity) < 0.5 else 0.0

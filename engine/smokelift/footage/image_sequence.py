@@ -33,7 +33,6 @@ from smokelift.footage.images import (
     readable_size,
 )
 
-_EXIF, _FOCAL_LENGTH_IN_35MM_FILM = 0x8769, 0xA405
 _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
 """How a shell or another program writes the number of a picture."""
 
@@ -150,6 +149,6 @@ def _focal_length(path: Path) -> float | None:
     """The focal length in a picture's EXIF, in millimeters on 35 mm film; None if there is none."""
     try:
         with Image.open(path) as picture:
-            return focal_length(picture.getexif().get_ifd(_EXIF).get(_FOCAL_LENGTH_IN_35MM_FILM))
+            return focal_length(picture.getexif().get_ifd(0x8769).get(0xA405))  # FocalLengthIn35mmFilm of Exif
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # a picture without such tags
         return None

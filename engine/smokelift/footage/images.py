@@ -61,8 +61,7 @@ MAX_PIXELS = 2**28
 """Largest number of pixels of a picture."""
 
 MAX_PICTURE_SIDE = 4096
-"""Longest side of a clip's pictures, in pixels; larger ones are reduced when read. The finest grid has 144 voxels along
-a side, so smoke on a twentieth of the picture still has more pixels than voxels."""
+"""Longest side of a clip's pictures, in pixels; larger ones are reduced when read."""
 
 OPENING_BYTES = 2**25
 """Memory in bytes that FFmpeg needs to open a file: its decoders' contexts, and some frames to know them by."""
@@ -78,9 +77,6 @@ BEAUTY = ("combined", "beauty", "rgba")
 
 DEPTHS = ("Z", "ZBack")
 """Names that OpenEXR gives to depths."""
-
-FLOAT = 3
-"""Sample format of floating point numbers (TIFF 6.0, section 19)."""
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue (ITU-R BT.709)."""
@@ -306,7 +302,8 @@ def _is_plain_tiff(path: Path, head: bytes) -> bool:
         tags.load(file)
     gray_or_rgb = tags.get(PHOTOMETRIC_INTERPRETATION) in (1, 2) and TILEWIDTH not in tags
     wide = max(tags.get(BITSPERSAMPLE, (1,))) > 8
-    if FLOAT in tags.get(SAMPLEFORMAT, ()) or (wide and not gray_or_rgb):
+    floating = 3 in tags.get(SAMPLEFORMAT, ())  # TIFF 6.0, section 19
+    if floating or (wide and not gray_or_rgb):
         raise PictureKindError(
             f"{path}: is neither gray nor RGB in whole numbers, or is stored in tiles; save it as .exr, or as an "
             "ordinary TIFF of 8 or 16 bits"

@@ -23,9 +23,6 @@ from smokelift.footage.images import LUMINANCE, Picture, area_average, read_imag
 from smokelift.footage.inpainting import push_pull
 from smokelift.footage.video import Video
 
-HALF = 0.5
-"""Value from which on a pixel of a mask is white."""
-
 CONTINUED_SIDE = 320
 """Pixels along the longer side of the continued picture, which is too smooth to need more."""
 
@@ -90,7 +87,7 @@ class Mask:
 
         @lru_cache(maxsize=KEPT_MASKS)
         def resized(n: int, width: int, height: int) -> Seen:
-            return area_average(picture(n) @ LUMINANCE.astype(np.float32), width, height) >= HALF
+            return area_average(picture(n) @ LUMINANCE.astype(np.float32), width, height) >= 0.5
 
         def seen(n: int, width: int, height: int) -> Seen:
             return resized(n if count else 0, width, height)

@@ -10,15 +10,13 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks.arguments import MAX_MAGNITUDE
 from smokelift.checks.whole_files import atomic_path
 
 Shape = tuple[int, ...]
 
 NUMBERS = "biuf"
 """NumPy's kinds of real numbers."""
-
-MAX_MAGNITUDE = 1e12
-"""Magnitude that no density, velocity or residual reaches; sums of squares of larger ones are not finite in 32 bits."""
 
 VELOCITY = ("velocity_x", "velocity_y", "velocity_z")
 """Names of the components of a velocity on faces."""

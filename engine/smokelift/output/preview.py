@@ -24,19 +24,14 @@ from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, orbit
 
-SHEET_ANGLES = (20, 45, 90)
-ORBIT_ANGLES = tuple(range(0, 360, 30))
-SIDE_DEGREES = 90
+SHEET_ANGLES, ORBIT_ANGLES, SIDE_DEGREES = (20, 45, 90), tuple(range(0, 360, 30)), 90
 """Degrees by which the scene's camera is carried around the smoke."""
 
 SHEET_HEIGHT, PREVIEW_HEIGHT = 320, 480
 """Rows of a picture, in pixels."""
 
-SHEET_ROWS = 5
-
-ORBIT_COLUMNS = 6
-
-STRIP_FRAMES = 8
+SHEET_ROWS, ORBIT_COLUMNS, STRIP_FRAMES = 5, 6, 8
+"""Frames that the contact sheet shows, pictures of the orbit side by side, and frames of the strip."""
 
 MAX_DEGREES_PER_SECOND = 90.0
 """Degrees per second by which the video's camera turns at most; in longer clips it goes around once."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import shown
+from smokelift.footage.frame_source import DEFAULT_FPS
 from smokelift.output.archive import FLAME, VELOCITY, read_arrays
 from smokelift.output.files import INDEX, checksum, frame_path
 from smokelift.output.index import Index, SequenceError, directory_path
@@ -16,9 +17,6 @@ from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from_dict
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
-
-DEFAULT_FPS = 24.0
-"""Frames per second of a sequence whose scene does not say the clip's."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 from smokelift.checks import UNDETERMINED, Figure, Figures, Finding
 from smokelift.checks.array_types import Doubles
 from smokelift.extraction import brightest_smoke, tells_source
+from smokelift.extraction.fire import MIN_COLORED_VALUE
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.image import environment_count
@@ -21,7 +22,7 @@ from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light,
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples, visible_plate
 from smokelift.setup.geometry import Geometry
-from smokelift.setup.medium import MIN_SOURCE_VALUE, source_radiance
+from smokelift.setup.medium import source_radiance
 from smokelift.setup.settings import Settings
 
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
@@ -119,7 +120,7 @@ def light_doubts(scattering: Finding, samples: SmokeSamples, noise: Noise, *, bu
     if error < MAX_LIGHT_ERROR or not len(samples.behind) or noise.total.max() > MAX_QUIET_NOISE:
         return []
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
-    if high < MIN_SOURCE_VALUE or high - low > MAX_COLOR_SPREAD * high:
+    if high < MIN_COLORED_VALUE or high - low > MAX_COLOR_SPREAD * high:
         return []
     return [Finding("light of fire" if burns else "likely wrong light", {"error": error}, doubt=True)]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from smokelift.checks import UNDETERMINED, Finding
 from smokelift.checks.array_types import Doubles
-from smokelift.extraction.fire import CLIPPED_VALUE
+from smokelift.extraction.fire import CLIPPED_VALUE, MIN_COLORED_VALUE
 from smokelift.footage.images import brightest_channel
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
@@ -36,9 +36,6 @@ THICK_PERCENTILE = 90
 
 MIN_COLOR_PIXELS = 50
 """Smallest number of smoke pixels that show a color: their thickest tenth are five."""
-
-MIN_SOURCE_VALUE = 0.01
-"""Smallest linear value of the brightest channel: 8 bits show no color of a darker source."""
 
 WHITE: Vector = (1.0, 1.0, 1.0)
 """Color of gray smoke."""
@@ -105,7 +102,7 @@ def smoke_color(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding]
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
-    least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_SOURCE_VALUE else white
+    least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_COLORED_VALUE else white
     if least.min() < MIN_COLOR_DEGREES:
         figures["degrees"] = float(least.min())
         return WHITE, replace(undetermined, kind="smoke color near the light's", figures=figures)
@@ -125,9 +122,9 @@ def several_colors(samples: SmokeSamples) -> list[Finding]:
     """
     usable = samples.colors.min(-1, initial=1.0) < CLIPPED_VALUE
     shown = samples.colors[usable].astype(np.float64)
-    if len(shown) < MIN_COLOR_PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
+    if len(shown) < MIN_COLOR_PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_COLORED_VALUE:
         return []
-    if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
+    if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_COLORED_VALUE:
         return []
     off = _degrees_off_one_color(shown)
     if off < MIN_COLOR_DEGREES:
@@ -168,7 +165,7 @@ def _thickest_smoke(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
     thick = amount >= np.percentile(amount, THICK_PERCENTILE)
     start = np.maximum(behind[thick].mean(0), 0)
     seen = start + amount[thick].mean() * axis if samples.brightens else colors[thick].mean(0)
-    return (start, np.maximum(seen, 0)) if seen.max() >= MIN_SOURCE_VALUE else None
+    return (start, np.maximum(seen, 0)) if seen.max() >= MIN_COLORED_VALUE else None
 
 
 def _sources(behind: Doubles, seen: Doubles) -> Doubles:

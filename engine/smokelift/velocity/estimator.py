@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.checks import numbers, require_kind
+from smokelift.checks.arguments import MAX_MAGNITUDE
 from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
 from smokelift.scene.checks import set_fields
@@ -32,9 +33,6 @@ Density = npt.NDArray[np.floating[Any]]
 
 REACH = 1
 """Coarse voxels around a box that its fine velocity depends on; see `prolong`."""
-
-LARGEST_DENSITY = 1e12
-"""Largest density of which sums of fourth powers are finite in 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +156,6 @@ def _density(name: str, values: Density) -> Array:
         raise ValueError(f"{name} holds densities that are not finite; set them to 0.")
     if least < 0:
         raise ValueError(f"{name} holds negative densities; set them to 0.")
-    if most > LARGEST_DENSITY:
-        raise ValueError(f"{name} holds densities up to {most:g}; scale them to {LARGEST_DENSITY:g} at most.")
+    if most > MAX_MAGNITUDE:
+        raise ValueError(f"{name} holds densities up to {most:g}; scale them to {MAX_MAGNITUDE:g} at most.")
     return np.ascontiguousarray(values)

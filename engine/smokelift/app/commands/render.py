@@ -11,9 +11,6 @@ from smokelift.output.viewer import Viewer
 from smokelift.render import device
 from smokelift.scene import Camera, CompleteScene, Scene, orbit
 
-SIDE_YAW = 90.0
-"""Degrees about the vertical from the scene's camera to the side view."""
-
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
@@ -56,7 +53,7 @@ def _camera(name: str, scene: CompleteScene) -> Camera:
     if name == "front":
         return scene.camera
     if name == "side":
-        return orbit(scene.camera, scene.domain, SIDE_YAW)
+        return orbit(scene.camera, scene.domain, 90.0)
     if name.endswith(".toml"):
         camera = Scene.load(name).camera
         if camera is None:
