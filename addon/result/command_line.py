@@ -28,6 +28,7 @@ from ..scene.smoke import activate, active_smoke, new_smoke, smokes
 from . import smoke_takes
 
 POLL_SECONDS = 0.05
+"""Seconds between two checks of a run."""
 
 
 def main(words: Sequence[str]) -> int:

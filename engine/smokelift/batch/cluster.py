@@ -19,7 +19,7 @@ from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, ShotMemory, Task, read_record
 
 CONNECT_SECONDS, RETURN_SECONDS = 30, 1800
-"""Time for the scheduler to answer, and to return if it goes away; set by hand."""
+"""Seconds for the scheduler to answer, and to return if it goes away."""
 
 MEMORY = "memory"
 """Resource of a worker, in bytes, that its shots take together; ``dask worker --resources memory=32e9``."""

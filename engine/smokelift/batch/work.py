@@ -28,10 +28,11 @@ ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
 """The command line, which ends with the process that started it."""
 
 POLL_SECONDS, GRACE_SECONDS = 0.25, 20.0
-"""Between two measurements of a running engine, and for a cancelled one to end, which kills itself before that."""
+"""Seconds between two measurements of a running engine, and for a cancelled one to end, which kills itself before
+that."""
 
 WAKE_SECONDS = 0.5
-"""Python handles no signal while it waits on some systems, so that no wait for a shot is longer."""
+"""Seconds of a wait for a shot, at most: on some systems Python handles no signal while it waits."""
 
 RETRIES, PAUSE_SECONDS, PATIENCE_SECONDS = 2, 30.0, 3600.0
 """New tries after a crash. Seconds between tries while a disk is full, say, and in all without a new frame."""

@@ -8,7 +8,7 @@ One picture of smoke looks the same whether the smoke is near and small or far a
   alone speaks.
 
 Several cameras need none of them: `depth_prior` reads the axis from what they have in common.
-docs/experiments/density-axis.md has the worth of each cue. It chose the constants of this page that cite no other.
+docs/experiments/density-axis.md has the worth of each cue.
 """
 
 from collections.abc import Sequence
@@ -56,7 +56,8 @@ MIN_CONTACT_FRAMES = 0.6
 """Smallest fraction of the frames that show a floor contact where there is one."""
 
 CONTACT_TRUST = 0.7
-"""Weight of the depth that a floor contact shows, at most: smoke that begins above the floor shows one as well."""
+"""Weight of the depth that a floor contact shows, at most: smoke that begins above the floor shows one as well
+(docs/experiments/density-axis.md)."""
 
 FAR_BEHIND = 1.5
 """Distance behind the middle, in `BOX_DEVIATION`, from which a contact is more likely smoke that begins above the
@@ -66,14 +67,14 @@ MIN_CONTACT_TRUST = 0.2
 """Smallest weight of a contact that shows the place: less leaves about what the box does."""
 
 LEANING = 0.2
-"""Fraction of the box's variance that stays of a column whose base is known: it may lean."""
+"""Fraction of the box's variance that stays of a column whose base is known: it may lean
+(docs/experiments/density-axis.md)."""
 
 WIDENING = 0.15
-"""Growth of a column's radius per meter of height: it takes in air (docs/experiments/density-axis.md)."""
+"""Growth of a column's radius per meter of height: it takes in air."""
 
 INERTIA = 0.5
-"""Weight of a column's place in the row below, in units of its smoke: other smoke in a row may not be its own
-(docs/experiments/density-axis.md)."""
+"""Weight of a column's place in the row below, in units of its smoke: other smoke in a row may not be its own."""
 
 
 def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate | None:

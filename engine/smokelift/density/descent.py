@@ -37,14 +37,15 @@ FLOOR = 0.1
 The voxel may fill, but more slowly than others (docs/experiments/density-descent.md)."""
 
 SUFFICIENT = 1e-4
-"""Fraction of the linear prediction that a step has to gain (Armijo's constant)."""
+"""Fraction of the linear prediction that a step has to gain (Armijo's constant: Nocedal and Wright, "Numerical
+Optimization", 2006)."""
 
 MAX_CHANGE = 0.25
 """Largest change of a voxel in one step, as a fraction of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
 MAX_FIRST_STEP = 1e30
-"""Largest first step: a start of next to nothing asks for more than 32 bits hold."""
+"""Largest factor of the first step: a start of next to nothing asks for more than 32 bits hold."""
 
 SHORTEN = 0.3
 """Factor of a step that gains too little."""

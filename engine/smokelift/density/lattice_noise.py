@@ -26,11 +26,11 @@ NODES = 32
 """Nodes along each side of a lattice, which repeats."""
 
 NODE_BLUR = (2 / 15) ** 0.5
-"""Standard deviation of what a node adds about it, in distances between nodes."""
+"""Standard deviation of what a node adds about it, in distances between nodes (by definition)."""
 
 DEVIATION = (26 / 35) ** 0.5
 """Standard deviation of the noise of nodes of unit variance, for each axis: the root of the mean sum of squares of both
-weights."""
+weights (by definition)."""
 
 
 class Lattice(NamedTuple):

@@ -31,14 +31,14 @@ from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 
 STEP_RANGE = (0.4, 2.5)
-"""Largest change of a ray's smoke in one iteration."""
+"""Smallest and largest factor on a ray's smoke in one iteration."""
 
 RELAXATION = 0.9
 """Fraction of a step that is made."""
 
 MAX_UNEVENNESS = 2.0
 """Largest factor by which the plausible smoke scales a step. With `RELAXATION`, less than twice the step that a ray
-asks for is made, so that the iterations converge."""
+asks for is made, so that the iterations converge (docs/experiments/every-view.md)."""
 
 DAMPING = 0.4
 """Relative sensitivity at which the step is halved."""
@@ -50,7 +50,7 @@ MIN_SCALE = 1e-30
 """Lower bound of that density, so that empty smoke is no division by zero."""
 
 PROBE = 1.05
-"""Scale of the density for the difference quotient dL / d ln s."""
+"""Factor on the density for the difference quotient dL / d ln s."""
 
 
 def fit_multiplicative(

@@ -29,8 +29,8 @@ THINNEST_CLEAR = 0.05
 """Lower bound of the transmittance: a brightness does not show an optical depth above 3."""
 
 SHADED, PATCH = 4.0, 3
-"""Noise by which a shaded side of smoke turns away from its source radiance, and pixels along it, at least
-(docs/experiments/thick-smoke.md)."""
+"""Distance, in units of noise, by which a shaded side of smoke turns away from its source radiance, and pixels along
+it, at least (docs/experiments/thick-smoke.md)."""
 
 SHADED_DEPTH = 1.5
 """Optical depth over ln(1 + r), r the fraction of the contrast that a pixel shows: right where that is about a half
@@ -54,10 +54,10 @@ USEFUL_DEVIATION = 0.4
 
 CLEAR_QUANTILE, CLEAR_DEVIATIONS = 0.98, 2.33
 """Quantile of the opacity that is found in clear air, and the deviations of normal noise's size there. With .9 and
-1.645 a codec's errors at the rim of a puff are taken for smoke."""
+1.645 a codec's errors at the rim of a puff are taken for smoke (measured)."""
 
 MIN_OPACITY_NOISE = 0.01
-"""Smallest such opacity: a step or two of eight bits before a bright plate."""
+"""Smallest opacity that noise is taken to have: a step or two of eight bits before a bright plate."""
 
 OPACITY_WIDTH = 2.0
 """Standard deviation, in pixels, of the Gaussian whose noise is as smooth as that of an opacity."""
@@ -74,7 +74,7 @@ def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
 
 
 BLACK = eight_bit_plate(np.zeros(3, np.float32), (1, 1))
-"""Stands for a black plate of any size."""
+"""Stands for a black plate of any size (by definition)."""
 
 
 @dataclass(frozen=True, eq=False)

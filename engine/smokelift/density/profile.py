@@ -33,7 +33,7 @@ FLATNESS = 3.5
 (docs/experiments/density-profile.md)."""
 
 SCALE = float(np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS)))
-"""A in standard deviations."""
+"""A in standard deviations (by definition)."""
 
 PROFILE_CUT = 0.0056
 """Fraction of the profile's peak from which smoke is expected. The profile is 1.6 times as wide there as assumed, which

@@ -65,17 +65,18 @@ GAIN = (np.pi / 2) ** 0.5
 its layers are taken out (docs/experiments/every-view.md)."""
 
 STEP_RANGE = (0.3, 3.0)
-"""Largest change of a ray's smoke in one step."""
+"""Smallest and largest factor on a ray's smoke in one step."""
 
 ROW_RANGE = (0.5, 2.0)
-"""Largest factor that gives a row of a picture the smooth answer's amount."""
+"""Smallest and largest factor that gives a row of a picture the smooth answer's amount
+(docs/experiments/made-up-detail.md)."""
 
 OUTLINE = 0.02
 """Fraction of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades. So it stays
-within the outline that the smooth answer has from there."""
+within the outline that the smooth answer has from there (docs/experiments/made-up-detail.md)."""
 
 OUTLINE_BLUR = 3.0
-"""Standard deviation (voxels) of that blur."""
+"""Standard deviation (voxels) of the blur that `OUTLINE` is measured on."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,7 @@ MAX_PATCHES = 8192
 error of a fraction of one half."""
 
 PASSES = 2
-"""Times that a picture's patches are moved, each time along another basis."""
+"""Times that a picture's patches are moved, each time along another basis (docs/experiments/every-view.md)."""
 
 MIN_DEPTH = 0.01
 """Fraction of a picture's largest optical depth below which a patch, or a row, shows no smoke."""
@@ -69,7 +69,8 @@ ACROSS = 6.0
 """Width of a row's smoke in its standard deviations: three to either side hold all but 0.3 % of a Gaussian profile."""
 
 VOXEL = 12**-0.5
-"""Standard deviation (voxels) of smoke that fills one voxel: the smallest, even for a thread of single pixels."""
+"""Standard deviation (voxels) of smoke that fills one voxel: the smallest, even for a thread of single pixels (by
+definition)."""
 
 BODY = 0.1
 """Fraction of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not

@@ -36,7 +36,7 @@ COARSE_SIDE_VOXELS = 64
 
 MIN_BUOYANCY_FRAMES = 8
 """Frames that show a buoyancy, at least: over fewer one of 1 m/s2 moves the smoke by less than a tenth of a voxel,
-which is within its error."""
+which is within its error (docs/experiments/continuation.md)."""
 
 MAX_SPEED_RATIO = 2.0
 """Times the median speed above which a state's velocity is taken to be wrong."""

@@ -25,8 +25,8 @@ from smokelift.transport.constraint import FaceMasks, faces_of
 from smokelift.velocity.linearization import SMOKE_THRESHOLD
 
 BLUR_VOXELS = 2.0
-"""Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets. This and the three
-ramps below: docs/experiments/velocity-solver.md."""
+"""Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets
+(docs/experiments/velocity-solver.md)."""
 
 COHERENCE = (0.4, 0.6)
 """Mean residual over mean magnitude: nothing is an inlet below the first, everything that stands out is one above the
@@ -36,7 +36,8 @@ STRENGTH = (3.0, 6.0)
 """Mean residual in medians of its magnitude over the smoke, likewise."""
 
 PROMINENCE = (0.1, 0.2)
-"""Mean residual over that of the strongest inlet, likewise: inlets of one scene are of one kind."""
+"""Mean residual over that of the strongest inlet, likewise: inlets of one scene are of one kind
+(docs/experiments/velocity-solver.md)."""
 
 MIN_SCORE = 0.5
 """Score above which a voxel is in an inlet."""

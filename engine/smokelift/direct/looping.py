@@ -22,7 +22,7 @@ MAX_OVERLAP = 24
 to the other is slow beside the smoke's own motion."""
 
 TINY = 1e-20
-"""Keeps quotients of no smoke finite."""
+"""Smallest density, or sum of densities, that is divided by."""
 
 BORDER, BORDER_FACTOR = 0.2, 16.0
 """Fraction of the box's length before an open side where smoke of one end alone goes sooner, and how many times the

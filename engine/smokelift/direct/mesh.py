@@ -23,13 +23,14 @@ from smokelift.transport import Array, Faces
 Integers = npt.NDArray[np.int64]
 
 HEADER, RECORD = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""Sizes in a binary STL file: bytes before the triangles, the last four of them their number, and a triangle."""
+"""Sizes in a binary STL file: bytes before the triangles, the last four of them their number, and a triangle (by
+definition)."""
 
 PAIRS_AT_ONCE = 2**20
 """Pairs of a triangle and a column in one pass, which bounds the memory."""
 
 ORDERS = [1, 2, 0], [2, 0, 1], [0, 1, 2]
-"""Axes of the columns along x, y and z: their own comes last."""
+"""Axes of the columns along x, y and z: their own comes last (by definition)."""
 
 
 class Crossings(NamedTuple):

@@ -27,7 +27,8 @@ MODES = 64
 """Waves in the sum: enough that it shows no pattern."""
 
 OCTAVES = 1.0
-"""Over which the sizes of the waves are spread, about that asked for. The flow makes smaller eddies by itself."""
+"""Octaves over which the sizes of the waves are spread, about that asked for. The flow makes smaller eddies by
+itself."""
 
 
 class _Modes(NamedTuple):
@@ -97,7 +98,7 @@ class _Octave(NamedTuple):
 
 
 SIZES = (_Octave(3, 2.2), _Octave(7, 4.0), _Octave(13, 8.0), _Octave(27, 16.0))
-"""Voxels, from the finest on; what is larger the estimate shows."""
+"""Voxels of each average and of its eddies, from the finest on; what is larger the estimate shows."""
 
 INTENSITY = 0.23
 """Speed of an octave's eddies, of each component, over that of a clip's smoke: .14 of the true one, of which estimates

@@ -19,7 +19,7 @@ from smokelift.output.viewer import Viewer
 from smokelift.render import Volume
 
 TILE_AZIMUTHS, TILE_ROWS = tuple(range(0, 180, 18)), 240
-"""Azimuths of the pictures (degrees), and their pixels."""
+"""Azimuths of the pictures, in degrees, and their rows of pixels."""
 
 LABEL_SCORES = ("patches", "patches_worst", "patches_own", "edges", "flicker")
 """Scores in the label of a picture's row."""

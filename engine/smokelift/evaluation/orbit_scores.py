@@ -19,14 +19,15 @@ Densities = Callable[[int], Volume]
 """Returns the density (nx, ny, nz) of a frame, from 0."""
 
 AZIMUTHS = tuple(range(15, 180, 15))
-"""Degrees. From behind smoke has nearly the outline that it has from the front, so half a turn says all."""
+"""Azimuths (degrees) of the pictures. From behind smoke has nearly the outline that it has from the front, so half a
+turn says all."""
 
 OWN_STEP = 5
 """Azimuths, of 15 degrees each, from one picture of the truth to the one that it is compared with for its own distance:
 pictures that far from each other have next to no detail in common."""
 
 FLICKER_AZIMUTHS = (45, 75, 105, 135)
-"""Azimuths at which three consecutive frames are compared."""
+"""Azimuths (degrees) at which three consecutive frames are compared."""
 
 SCORED_FRAMES, FIRST_FRAMES = 6, 4
 """Frames that are scored, spread over the clip, and the first ones, which have hardly any before them to start from

@@ -21,7 +21,7 @@ SHAPES = ("several_modes", "scatter", "depth_over_width", "row_middles", "ray_le
 """Figures of `RayShapes`."""
 
 SHAPE_AZIMUTHS = (0, 45, 90, 135)
-"""Degrees. Along the rays of 0, the camera's, nothing shows how smoke stands."""
+"""Azimuths (degrees) of the rays. Along those of 0, the camera's, nothing shows how smoke stands."""
 
 BANDS = 6
 """Bands of equal height, from the floor of the box up, for depth over width."""

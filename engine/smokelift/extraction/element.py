@@ -27,7 +27,8 @@ FULL_SCALE = 0.12
 
 ROUGHNESS = 0.85
 """Exponent of the distance by which differences of opacity and of ln J grow: the Hurst exponent of turbulence seen
-through its depth, (11/3 - 2) / 2 = .83 by Kolmogorov's spectrum, and .8 to .95 in eight baked scenes."""
+through its depth, (11/3 - 2) / 2 = .83 by Kolmogorov's spectrum, and .8 to .95 in eight baked scenes
+(docs/experiments/extraction.md)."""
 
 OPACITY_RANGE, BRIGHTNESS_RANGE = 0.5, 0.5
 """Standard deviations of the opacity and of the brightness of ln J over that distance."""
@@ -36,7 +37,7 @@ BRIGHTNESS_SCALE = 2.25
 """Distance over which the brightness has its range, in those of the opacity: shadows are wider than wisps."""
 
 CHROMA = 0.005
-"""Variation of the chroma of ln J over that of its brightness: light of one color."""
+"""Variation of the chroma of ln J over that of its brightness: light of one color (docs/experiments/extraction.md)."""
 
 MEAN_OPACITY, MEAN_BRIGHTNESS = 1.0, 1.0
 """Standard deviations of the means of the opacity and of ln J over the picture: neither is known."""
@@ -49,11 +50,12 @@ OUTLIER_FREEDOM = 5.0
 """Degrees of freedom of the noise's Student t distribution: outliers of more than three deviations hardly count."""
 
 ROUNDS, ITERATIONS = 6, 40
-"""Linearizations of ln J, and steps of conjugate gradients for each: twice as many of both change T by .003."""
+"""Linearizations of ln J, and steps of conjugate gradients for each: twice as many of both change T by .003
+(measured)."""
 
 SOURCE_ROUNDS = 6
 """Times that the usual source radiance is found from the smoke, and that from it: six leave T rms within .01 of what
-nine do, in 36 composed clips in white, warm and cold light."""
+nine do (measured on 36 composed clips in white, warm and cold light)."""
 
 MIN_CHROMA = 0.01
 """Lower bound of a channel of the usual source radiance over its mean, for logarithms."""
@@ -62,12 +64,12 @@ START_PERCENTILE = 90
 """Percentile, of what brightens its plate, that the search for J starts from: what is brighter may be no smoke."""
 
 BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
-"""Percentile of a picture's brightness that it starts from where smoke only darkens, and its lower bound: a picture
-darker than that shows no light in eight bits."""
+"""Percentile of a picture's brightness that it starts from where smoke only darkens, and its lower bound, linear: a
+picture darker than that shows no light in eight bits."""
 
 FINER = 1.5
-"""Pixels along a cell whose detail is compared: a codec takes the finest detail of a plate away, and that of thin
-smoke with it (T rms of twelve composed clips at crf 18: .064 with all pixels, .056 with these)."""
+"""Pixels along a cell whose detail is compared: a codec takes the finest detail of a plate away, and that of thin smoke
+with it (docs/experiments/extraction.md)."""
 
 WINDOW_BLUR = 2.0
 """Standard deviation, in cells, of the Gaussian that smooths the deviation of T, which is found in windows of four."""
@@ -82,15 +84,15 @@ SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and cells along their longer side, from which the source radiance is found."""
 
 LIT_PERCENTILE = 90
-"""Percentile of what thick smoke sends that an assumed light has to reach: with 99 the transmittance of three composed
-clips is off by .02 to .04 more, with 75 the picture of a real one loses 2 dB."""
+"""Percentile of what thick smoke sends that an assumed light has to reach: with 99 T of three composed clips is off by
+.02 to .04 more, with 75 the picture of a real one loses 2 dB (measured)."""
 
 HUE = 2 * MODEL_ERROR
 """Smallest difference of two colors of mean 1, root mean square, from which on they differ: both may be off by the
 model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
 
 CHROMA_BASIS = np.array([[1.5**0.5, 0.5**0.5], [0, -(2**0.5)], [-(1.5**0.5), 0.5**0.5]], np.float32)
-"""Two components of chroma by channel, as in `cpp/extraction.cpp`."""
+"""Two components of chroma by channel, as in `cpp/extraction.cpp` (by definition)."""
 
 
 @dataclass(frozen=True, eq=False)

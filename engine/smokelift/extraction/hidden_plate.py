@@ -49,14 +49,16 @@ CANDIDATES = 1.0, 0.6, 0.36
 
 NEIGHBORHOOD = 2.0
 """Standard deviation, in cells, of the Gaussian over which neighbors decide together, and that detail is finer than: T
-of elements of eleven composed clips is off by .164, .159 and .158 with 1, 2 and 4, and by .162 cell by cell."""
+of elements of eleven composed clips is off by .164, .159 and .158 with 1, 2 and 4, and by .162 cell by cell
+(docs/experiments/hidden-plate.md)."""
 
 DETAIL_WEIGHT = 0.2
 """Weight of what detail leaves unexplained, beside colors of cells: T of elements of five composed clips is off by
-.185, .176 and .190 with 0, .2 and 1."""
+.185, .176 and .190 with 0, .2 and 1 (docs/experiments/hidden-plate.md)."""
 
 INDEPENDENT = 3
-"""Number of independent frames that the frames count as: errors of smoke last (.75 to .95 from a frame to the next)."""
+"""Number of independent frames that the frames count as: errors of smoke last (.75 to .95 from a frame to the next)
+(docs/experiments/hidden-plate.md)."""
 
 MIN_UNKNOWN = 0.01
 """Smallest fraction of a plate that has to be unknown for turns to change the smoke."""

@@ -18,7 +18,7 @@ from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_s
 from smokelift.footage.noise import Noise
 
 FALSE_ALARMS = 0.01
-"""Mean number of patches of noise in a picture that are taken for smoke."""
+"""Mean number of patches of noise in a picture that are taken for smoke (docs/experiments/density-profile.md)."""
 
 PATCH_GROWTH = 4.06
 """Growth of the number of shapes of a patch with each sample of its area (lattice animals: Jensen and Guttmann,

@@ -38,7 +38,7 @@ UNCOVERED = 5
 """Frames whose median is the background where a mask hides all of them."""
 
 NO_NOISE = lasting_noise(0.0)
-"""Noise of a plate until it is measured."""
+"""Noise of a plate until it is measured (by definition)."""
 
 
 @dataclass(frozen=True, eq=False)

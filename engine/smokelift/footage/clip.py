@@ -23,8 +23,8 @@ from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
 
 STORED_BYTES, LINEAR_BYTES = 128 * 2**20, 64 * 2**20
-"""Memory for kept frames: as stored, twenty of 1080p at 8 bits, since the same ones spread over a clip are read again;
-linear, two of 1080p."""
+"""Bytes of memory for kept frames: as stored, twenty of 1080p at 8 bits, since the same ones spread over a clip are
+read again; linear, two of 1080p."""
 
 Kept = OrderedDict[int, StoredPicture]
 Value = TypeVar("Value")

@@ -24,7 +24,7 @@ Encoding = Literal["srgb", "linear", "hlg", "pq"]
 Association = Literal["straight", "premultiplied in linear light", "premultiplied in code values"]
 
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
-"""Encodings by transfer characteristics; all others are read as sRGB, as screens do."""
+"""Encodings by transfer characteristics (ITU-T H.273); all others are read as sRGB, as screens do."""
 
 _PRIMARIES = {
     5: ("BT.601 (625 lines)", ((0.640, 0.330), (0.290, 0.600), (0.150, 0.060))),
@@ -33,7 +33,7 @@ _PRIMARIES = {
     9: ("BT.2020", ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046))),
     12: ("Display P3", ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060))),
 }
-"""Names of primaries other than BT.709, all with a D65 white, and chromaticities of red, green and blue."""
+"""Primaries other than BT.709, all with a D65 white (ITU-T H.273): name, and chromaticities of red, green and blue."""
 
 
 def hlg_to_linear(signal: npt.ArrayLike) -> Array:

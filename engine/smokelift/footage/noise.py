@@ -17,8 +17,8 @@ import numpy.typing as npt
 from smokelift.footage.images import Picture, srgb_to_linear
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
-"""One step of 8 bit video, in sRGB values: the smallest noise a clip is taken to have, since codecs shift whole blocks
-by it."""
+"""One step of 8 bit video (by definition), in sRGB values: the smallest noise a clip is taken to have, since codecs
+shift whole blocks by it."""
 
 BLOCK = 5
 """Pixels along the blocks in which white noise is measured, and on whose means lasting noise is; `matte` averages over
@@ -29,7 +29,7 @@ BLOCKS_APART = 3
 
 MEDIAN_OF_BLOCK = 0.955
 """Median over mean of a block's sum of squared differences. 20 differences of neighbors in rows of five have k = 14.5
-degrees of freedom, and the median of chi-squared is (1 - 2 / (9 k))^3 of its mean."""
+degrees of freedom, and the median of chi-squared is (1 - 2 / (9 k))^3 of its mean (by definition)."""
 
 LARGEST_LASTING = np.float32(4 / 255)
 """Largest lasting noise, in sRGB values: a codec's changes are up to twice as large (`clear_picture.DRIFT`)."""
@@ -38,7 +38,7 @@ SPREAD_SAMPLES, SPREAD_ROUNDS = 50_000, 25
 """Largest number of deviations that a spread is measured on, and rounds in which it settles to a hundredth."""
 
 MIN_SPREAD = EIGHT_BIT_STEP / 4
-"""Smallest spread that is distinguished from none: rounding to 8 bits makes as much."""
+"""Smallest spread, in sRGB values, that is distinguished from none: rounding to 8 bits makes as much."""
 
 CLIPPED_MEAN = 1.1
 """Largest mean of normal noise whose negative half is clipped, over the median difference of two of its values: 1.02,
@@ -78,7 +78,7 @@ def lasting_noise(deviation: npt.ArrayLike) -> Noise:
 
 
 EIGHT_BIT_NOISE = Noise(np.zeros(3, np.float32), np.full(3, MIN_SPREAD), float(EIGHT_BIT_STEP))
-"""Noise of footage as clean as eight bits allow."""
+"""Noise of footage as clean as eight bits allow (by definition)."""
 
 
 def block_means(pictures: Picture) -> Picture:

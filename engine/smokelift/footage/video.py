@@ -72,7 +72,7 @@ SQUARE = 0.01
 """Largest difference of a pixel's shape from 1 that is ignored: half a pixel in fifty."""
 
 _COARSE_COLORS = {(2, 2): "yuv420p16le", (2, 1): "yuv422p16le"}
-"""Layouts of 16 bits that hold one color for so many pixels along rows and columns."""
+"""Layouts of 16 bits that hold one color for so many pixels along rows and columns (by definition)."""
 
 QUANTIZED_FRAMES = 21
 """Frames at a file's start whose quantizers are read: their median needs no more."""

@@ -46,7 +46,7 @@ MIN_OPACITY = 1e-3
 """Fraction of the light that smoke may hide and yet be left out."""
 
 HALF_CODE = 1 / 510
-"""Half a step of a picture of 8 bits."""
+"""Half a step of a picture of 8 bits (by definition)."""
 
 VELOCITY_STEP = 1 / 16
 """Step of a quantized velocity in voxels per frame."""

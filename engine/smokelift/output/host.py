@@ -65,8 +65,6 @@ HOSTS: Mapping[HostName, Host] = {
     "houdini": Host(velocity="vel", up_axis="Y", axes=((0, 1), (2, 1), (1, -1))),
     "unreal": Host(axes=((0, 1), (1, -1), (2, 1)), left_handed=True, eight_bits=True, whole_box=True),
 }
-"""Hosts by the name of the program.
-
-Unreal's importer (5.4) takes voxels for those of its left-handed axes, the corner of the box around all active voxels
-of a sequence for the pivot, and a grid ``density`` for 8 bits from 0 to 1.
-"""
+"""Hosts by the name of the program. Unreal's importer (5.4) takes voxels for those of its left-handed axes, the corner
+of the box around all active voxels of a sequence for the pivot, and a grid ``density`` for 8 bits from 0 to 1 (by
+definition)."""

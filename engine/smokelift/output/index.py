@@ -21,7 +21,7 @@ from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
 
 FORMAT = 1
-"""Version of the file's structure; any other is refused."""
+"""Version of the file's structure (by definition); any other is refused."""
 
 BOX = "box"
 """Key in the figures of a frame whose files have a box of their own, with the keys of a scene's domain: smoke that

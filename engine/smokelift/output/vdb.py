@@ -43,7 +43,7 @@ PROXY_TIMES = 4
 
 MIN_PROXY_VOXELS = 4_000_000
 """Voxels of a box from which on a run writes proxies. Blender reads a frame of 41 million, a quarter of them smoke, in
-1.2 s (`benchmarks/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
+1.2 s (measured by `benchmarks/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
 
 SETTINGS = "smokelift_settings"
 """Name of the grid metadata that holds the settings as JSON."""

@@ -21,7 +21,7 @@ MIN_BLOCK, MAX_BLOCK = 2, 4
 too dark (docs/experiments/scattering.md)."""
 
 FIELDS = 4
-"""Fields of what is linear across a block: the mean, and the slopes along x, y and z."""
+"""Fields of what is linear across a block: the mean, and the slopes along x, y and z (by definition)."""
 
 
 class DiffuseLight:

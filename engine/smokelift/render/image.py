@@ -35,8 +35,9 @@ MIN_LIGHTS, MAX_LIGHTS = 4, 256
 """Numbers of lights that `environment_count` chooses between (docs/experiments/renderer-agreement.md)."""
 
 TOLERANCE = 0.01
-"""Relative L2 change of the picture. Single scattering at a voxel a step is itself good to a few tenths of a percent,
-and one code value of an 8-bit picture is half a percent of middle gray (docs/experiments/renderer-agreement.md)."""
+"""Relative L2 change of the picture at which lights are enough. Single scattering at a voxel a step is itself good to a
+few tenths of a percent, and one code value of an 8-bit picture is half a percent of middle gray
+(docs/experiments/renderer-agreement.md)."""
 
 REFERENCE_VOXELS = 28
 """Voxels along the longest edge of the smoke that the number is chosen with: enough for its lumps, and quick."""

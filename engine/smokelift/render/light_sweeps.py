@@ -20,10 +20,10 @@ Voxel = tuple[int, int, int]
 Shape = tuple[int, int, int]
 
 DARKEST = 1e-18
-"""Energy of a light, at least: squares of less vanish in 32 bits."""
+"""Energy of a light (W/m^2 or W/sr) that smoke scatters, at least: squares of less vanish in 32 bits."""
 
 CLOSEST = 1e-3
-"""Voxels. Planes nearer to a point light than this are skipped: no voxel there belongs to their axis."""
+"""Voxels between a point light and a plane, below which the plane is skipped: no voxel there belongs to its axis."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,8 @@
 It follows the voxels of the box, and more so those that may hold smoke. The time of frames is counted in Poisson solves
 by cosine transforms, which are timed on this machine. The set-up is not modelled: a forecast prepares the shot as the
 run does, so the run takes that time and memory again. What other programs take meanwhile is left out: how busy the
-machine is now does not say how busy it will be. All constants: docs/experiments/memory-and-time.md.
+machine is now does not say how busy it will be. Constants that say no other source:
+docs/experiments/memory-and-time.md.
 """
 
 import math
@@ -78,21 +79,21 @@ TIMED_GRID, TIMED_SOLVES = (64, 64, 64), 40
 """Voxels of the grid whose solve is timed, and how often: the processor's clock of some systems counts in 16 ms."""
 
 WORKERS = 2
-"""Threads of a run, which share the processor time of a solve."""
+"""Threads of a run, which share the processor time of a solve (by hand)."""
 
 BYTES_PER_SIMULATED_VOXEL = 170
-"""Bytes at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a ball, less
-without an obstacle."""
+"""Bytes at the peak for each voxel of a box in which smoke is simulated (measured: 161 in one of 2.4 million with a
+ball, less without an obstacle)."""
 
 MIN_VOXELS = 8
-"""Smallest number of voxels along the shortest side of a suggested grid."""
+"""Smallest number of voxels along the shortest side of a suggested grid (by hand)."""
 
 MAX_SIDE_VOXELS = 96
 """Largest number of voxels along a side of the grid that smoke is measured on. A rim of one voxel counts with it, which
 makes fractions up to two fifths too large."""
 
 MEASURED_FRAMES = 4
-"""Largest number of frames with smoke that are measured, from the one with the most on."""
+"""Largest number of frames with smoke that are measured, from the one with the most on (by hand)."""
 
 
 class NotEnoughMemoryError(MemoryError):

@@ -21,10 +21,10 @@ from smokelift.setup.shot import Shot
 Tile = NDArray[np.uint8]
 
 BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40), (230, 60, 200), (120, 255, 120)
-"""Colors (sRGB) of the box, light, smoke, unknown background and camera's path."""
+"""Colors (sRGB codes) of the box, light, smoke, unknown background and camera's path."""
 
 MASK = (255, 60, 60)
-"""Color (sRGB) of the mask's outline."""
+"""Color (sRGB code) of the mask's outline."""
 
 ARROW_LENGTH = 0.35
 """Length of a light's arrow over the diagonal of the box."""

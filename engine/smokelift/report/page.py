@@ -29,6 +29,7 @@ _GAP, _TEXT, _TITLE, _LINE = 16, 14, 22, 20
 """Pixels between parts, of two fonts, and from line to line."""
 
 _WIDTH = COLUMNS * TILE[0] + (COLUMNS + 1) * _GAP
+"""Width of the page, in pixels (by definition)."""
 _STARTS = (_GAP, 170, 520, 670)
 """Left edges of the columns of the table, in pixels."""
 
@@ -36,7 +37,7 @@ PNG_COMPRESSION = 2
 """Compression level of PNG files: half of the time of the usual 6, and a seventh more bytes."""
 
 _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165), (255, 170, 70)
-"""Colors, sRGB."""
+"""Colors (sRGB codes) of the page, of its text, of faint text and of what is unknown."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,8 @@ leaves, a head or the light for smoke leave more (docs/clips.md)."""
 
 MAX_COARSE_ERROR = 0.25
 """Fraction that a coarse fit leaves of the pixels that it leaves out, above which a run is likely to leave more than
-`MAX_SMOKE_ERROR`. The example as it is, with leaves and with light that flickers leaves .04 to .07 (a run .05 to .12),
-with a person in it .12, .16, .29 and .35 (.14, .23, .37 and .39), with labels .10 (.27)."""
+`MAX_SMOKE_ERROR` (measured: the example as it is, with leaves and with light that flickers leaves .04 to .07, a run .05
+to .12; with a person in it .12, .16, .29 and .35, a run .14, .23, .37 and .39; with labels .10, a run .27)."""
 
 
 def provenance(shot: Shot) -> list[Finding]:

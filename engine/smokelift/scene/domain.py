@@ -15,7 +15,7 @@ Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
 
 LATERAL = ((1, 2), (0, 2), (0, 1))
-"""The two other axes of each axis."""
+"""The two other axes of each axis (by definition)."""
 
 MAX_SIDE_VOXELS = 4096
 """Voxels along a side of a box, at most: 32 bits know a place along a longer side too roughly."""

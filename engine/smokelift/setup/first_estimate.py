@@ -26,8 +26,7 @@ UNKNOWN = 0.5
 
 MAX_CLEAR_FRACTION = 0.5
 """Area of smoke before a known background in a frame, over the median of all examined ones, below which the frame has
-much less smoke than most: set by hand. Before an unknown background a frame without smoke differs from the plate, too.
-"""
+much less smoke than most. Before an unknown background a frame without smoke differs from the plate."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ PICTURE_HEIGHT = 2.0
 """Height in meters of an uncalibrated picture where the smoke is, unless its distance is given: a person's size."""
 
 FILM_SIZE = 36.0, 24.0
-"""Width and height (mm) of 35 mm film."""
+"""Width and height (mm) of 35 mm film (by definition)."""
 
 LENS_FOCAL_LENGTH = 50.0
 """Focal length (mm) where the clip's file says none: Blender's default lens."""

@@ -45,7 +45,7 @@ MAX_COLOR_SPREAD = 0.1
 """Largest spread of a background of one color, as a fraction of its brightness."""
 
 MAX_QUIET_NOISE = 2 / 255
-"""Largest noise that does not explain the error itself (docs/experiments/unknown-light.md)."""
+"""Largest noise, in sRGB values, that does not explain the error itself (docs/experiments/unknown-light.md)."""
 
 
 def first_light(

@@ -38,7 +38,7 @@ MIN_COLOR_PIXELS = 50
 """Smallest number of smoke pixels that show a color: their thickest tenth are five."""
 
 WHITE: Vector = (1.0, 1.0, 1.0)
-"""Color of gray smoke."""
+"""Color of gray smoke (by definition)."""
 
 
 def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain) -> tuple[Medium, list[Finding]]:

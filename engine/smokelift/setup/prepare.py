@@ -24,8 +24,8 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 
 SHADOWED_SOURCE = 0.5
-"""Usual source radiance of smoke over that without shadows: .52 and .55 of two baked scenes, within the factor of two
-that an extraction needs."""
+"""Usual source radiance of smoke over that without shadows, within the factor of two that an extraction needs (measured
+on two baked scenes: .52 and .55)."""
 
 MAX_VELOCITY_SIDE = 30
 """Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer

@@ -27,7 +27,7 @@ RINGS = 256
 finer than the step of four voxels from one grid to the next."""
 
 NORMAL_MEDIAN = 1.4826
-"""Standard deviation of normal noise over the median of its size."""
+"""Standard deviation of normal noise over the median of its size (by definition)."""
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,9 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "fine": GridLimit(1 / 2, 144, 256),
     "final": GridLimit(1, 0, MAX_SIDE_VOXELS),
 }
-"""Limits of each quality. A fraction loses much the same whatever the clip's size; the bounds keep the time of a frame
-from growing with that size (docs/experiments/clip-pixels.md)."""
+"""Voxels along the longest side that each quality allows: a fraction of the clip's pixels loses much the same whatever
+the clip's size, and the bounds keep the time of a frame from growing with that size
+(docs/experiments/clip-pixels.md)."""
 
 LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005, "final": 0.0025}
 """Fraction of the smoke's contrast that a grid may lose beside the finest of its quality, halved from each to the next

@@ -32,7 +32,7 @@ SMOOTH = 0.045
 (docs/experiments/velocity-solver.md)."""
 
 MAD = 0.6745
-"""Median magnitude of a normal variable, in standard deviations."""
+"""Median magnitude of a normal variable, in standard deviations (by definition)."""
 
 
 @dataclass(frozen=True, eq=False)

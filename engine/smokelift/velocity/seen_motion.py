@@ -39,7 +39,8 @@ OUTSIDE_WEIGHT = 1e-3
 """Fraction of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
 
 SPREAD = 1 / 8
-"""Standard deviation of the average, in shortest sides of the box, which is cut out around the smoke."""
+"""Standard deviation of the average, in shortest sides of the box, which is cut out around the smoke
+(docs/experiments/velocity-one-view.md)."""
 
 REACH = 2.5
 """Reach of the average, in standard deviations."""
