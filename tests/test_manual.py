@@ -191,7 +191,7 @@ def test_the_notebook_lists_every_experiment_with_its_question() -> None:
 
 def test_pages_name_scripts_that_make_something() -> None:
     made = {script for page in DOCS.glob("*.md") for script in MADE.findall(page.read_text(encoding="utf-8"))}
-    assert made == {"command_reference", "messages", "notebook", "scene_reference"}
+    assert made == {"command_reference", "constants", "messages", "notebook", "scene_reference"}
 
 
 def test_the_command_reference_has_every_option() -> None:

@@ -14,12 +14,13 @@ import latex2mathml.converter
 from mkdocs.structure.files import File
 
 import command_reference
+import constants
 import messages
 import notebook
 import scene_reference
 
 ROOT = Path(__file__).resolve().parents[1]
-MAKERS = {module.__name__: module for module in (command_reference, messages, notebook, scene_reference)}
+MAKERS = {module.__name__: module for module in (command_reference, constants, messages, notebook, scene_reference)}
 
 MADE = re.compile(r"<!-- made by tools/(\w+)\.py -->")
 EQUATION = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
