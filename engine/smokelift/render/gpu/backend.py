@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.render import taichi_runtime as taichi
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
