@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from av.video.reformatter import Interpolation
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, StoredPicture
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear

@@ -337,14 +337,9 @@ void register_extraction(py::module_ &module) {
             const int rows = int(moments.n[0]), columns = int(moments.n[1]);
             require_fit(moments.size > 0 && moments.n[2] * sizeof(float) == sizeof(Moments) &&
                         int(deviations.size()) == pyramid_levels(rows, columns));
-            const ExtractionProblem problem{reinterpret_cast<const Moments *>(moments.data),
-                                            rows,
-                                            columns,
-                                            source,
-                                            errors,
-                                            deviations,
-                                            outlier_freedom,
-                                            pixels};
+            const auto *const cells = reinterpret_cast<const Moments *>(moments.data);
+            const ExtractionProblem problem{cells,  rows,       columns,         source,
+                                            errors, deviations, outlier_freedom, pixels};
             Made<float, 3> fields({rows, columns, 4});
             Made<float, 2> deviation({rows, columns}), weight(deviation.n);
             extract(problem, rounds, iterations, fields.data(), deviation.data(), weight.data());

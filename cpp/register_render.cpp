@@ -10,7 +10,11 @@
 // Lights are those of light_sweeps.py, read by their attributes.
 namespace pybind11::detail {
 
-template <class T> void read(handle from, const char *name, T &value) { value = from.attr(name).cast<T>(); }
+template <class T, class... Rest> void read(handle from, const char *name, T &value, Rest &&...rest) {
+    value = from.attr(name).cast<T>();
+    if constexpr (sizeof...(rest) > 0)
+        read(from, rest...);
+}
 
 inline void read_energy(handle from, std::array<float, 3> &energy) {
     const auto channels = from.attr("energy").cast<std::vector<float>>();
@@ -24,12 +28,8 @@ template <> struct type_caster<smokelift::ParallelLight> {
         if (!hasattr(from, "slope"))
             return false;
         read_energy(from, value.energy);
-        read(from, "direction", value.direction);
-        read(from, "axis", value.axis);
-        read(from, "travel", value.travel);
-        read(from, "first", value.first);
-        read(from, "slope", value.slope);
-        read(from, "step", value.step);
+        read(from, "direction", value.direction, "axis", value.axis, "travel", value.travel, "first",
+             value.first, "slope", value.slope, "step", value.step);
         return true;
     }
 };
@@ -41,17 +41,11 @@ template <> struct type_caster<smokelift::PointLight> {
         if (!hasattr(from, "faces"))
             return false;
         read_energy(from, value.energy);
-        read(from, "position", value.position);
-        read(from, "voxel_size", value.voxel_size);
+        read(from, "position", value.position, "voxel_size", value.voxel_size);
         for (const handle side : from.attr("faces")) {
             smokelift::PointLight::Face &face = value.faces.emplace_back();
-            read(side, "axis", face.axis);
-            read(side, "travel", face.travel);
-            read(side, "first", face.first);
-            read(side, "planes", face.planes);
-            read(side, "far", face.far);
-            read(side, "columns_b", face.columns_b);
-            read(side, "columns_c", face.columns_c);
+            read(side, "axis", face.axis, "travel", face.travel, "first", face.first, "planes", face.planes,
+                 "far", face.far, "columns_b", face.columns_b, "columns_c", face.columns_c);
         }
         return true;
     }
@@ -149,9 +143,7 @@ void require_around(const Blocks &blocks, const Support &support) {
 
 // Zeros that get memory where they are touched.
 py::array_t<float> zeros(const std::vector<Index> &shape) {
-    std::size_t size = 1;
-    for (const Index n : shape)
-        size *= std::size_t(n);
+    const auto size = std::accumulate(shape.begin(), shape.end(), std::size_t(1), std::multiplies<>());
     Values values(size);
     if (!LazyPages<float>::starts_as_zero(size))
         std::fill(values.begin(), values.end(), 0.0f);
@@ -201,12 +193,11 @@ void register_lights(py::module_ &module) {
                unlocked([](Workers &workers, VoxelArray medium, const Support &support, const Phase &phase,
                            const std::vector<Light> &lights) {
                    const Voxels voxels = voxels_of(medium, support);
-                   bool add = false;
                    for (const Light &light : lights) {
+                       const bool add = &light != &lights.front();
                        std::visit(
                            [&](const auto &l) { shade(voxels, support.spans, phase, l, add, workers); },
                            light);
-                       add = true;
                    }
                    extend_into_border(voxels);
                }),

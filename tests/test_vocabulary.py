@@ -101,4 +101,4 @@ def test_there_is_one_spelling() -> None:
 def test_types_of_arrays_have_one_module() -> None:
     aliases = re.compile(r"^(?:Array|Doubles|Floats|Mask|Values) = (?:npt\.)?NDArray\[np\.\w+\]$", re.MULTILINE)
     found = {name(path) for path in FILES if aliases.search(path.read_text(encoding="utf-8"))}
-    assert {path for path in found if path.endswith(".py")} == {"engine/smokelift/checks/array_types.py"}
+    assert {path for path in found if path.endswith(".py")} == {"engine/smokelift/checks/__init__.py"}

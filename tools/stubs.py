@@ -29,7 +29,7 @@ from typing import Any, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks.array_types import Array, Mask
+from smokelift.checks import Array, Mask
 from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 
 Reals = npt.NDArray[np.floating[Any]]

@@ -11,7 +11,7 @@ from benchmarks.baked import WHITE, Baked, Seen
 from benchmarks.filming import compressed, drift, exposed, filmed, flash, noisy, steps
 from benchmarks.plates import PAINTED
 from smokelift import Clip
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.footage.images import Picture
 from smokelift.scene import completed
 

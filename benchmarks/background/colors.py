@@ -13,8 +13,7 @@ from benchmarks.baked import Baked, Seen
 from benchmarks.filming import exposed, filmed
 from benchmarks.plates import PAINTED, backdrop
 from benchmarks.tables import line, markdown
-from smokelift.checks import UNDETERMINED
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import UNDETERMINED, Doubles
 from smokelift.extraction.plate import known_plate
 from smokelift.footage.images import Picture
 from smokelift.setup.first_estimate import sample_smoke

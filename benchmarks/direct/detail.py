@@ -16,7 +16,7 @@ import numpy as np
 from scipy import ndimage
 
 from benchmarks.tables import markdown
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.evaluation.metrics import PatchStatistics, mean_gradient
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array

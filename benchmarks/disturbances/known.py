@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.baked import Baked
 from smokelift import Medium, Scene
-from smokelift.checks.array_types import Array, Mask
+from smokelift.checks import Array, Mask
 from smokelift.evaluation.truth import Truth, resampled
 from smokelift.footage.images import Picture
 from smokelift.scene import DirectionalLight, Domain

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks import tables
 from benchmarks.disturbances.table import DISTURBANCES
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.setup.settings import METHODS
 
 LOSS = 1.0

@@ -10,7 +10,7 @@ from benchmarks.disturbances.known import GRID, Known, Take
 from benchmarks.filming import filmed
 from benchmarks.measure import Figures, reconstructed, view_figures
 from smokelift import Settings
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.evaluation.frame_means import SMOKE_FRACTION, finite_mean
 from smokelift.evaluation.metrics import velocity_error, volume_error
 from smokelift.evaluation.truth import resampled

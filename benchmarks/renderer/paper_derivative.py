@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from benchmarks.tables import markdown
 from smokelift.baselines.paper_renderer import PaperRenderer
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.evaluation.metrics import volume_error
 from smokelift.render import Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium

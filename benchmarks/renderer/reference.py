@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.scene.projection import ray_through_pixels
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.render.camera_rays import camera_rays
 from smokelift.scene.domain import LATERAL
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift import Background, Camera, Clip, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.output.images import write_image, write_video
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import render

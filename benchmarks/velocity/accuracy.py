@@ -20,7 +20,7 @@ from benchmarks.machine import poisson_seconds
 from benchmarks.tables import markdown
 from benchmarks.velocity.pairs import away_from, near_smoke
 from smokelift.baselines.velocity import PaperVelocity
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.evaluation.metrics import volume_error
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import Side

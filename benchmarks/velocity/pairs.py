@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array
 

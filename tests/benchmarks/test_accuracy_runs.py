@@ -46,7 +46,7 @@ def test_a_method_without_a_part_is_a_composition():
     assert both.velocity_estimator == UnprojectedPrediction(settings.velocity)
     assert not both.follows_picture
     for run in ("draft:without=luck", "paper:without=projection"):
-        with pytest.raises(ValueError, match="expected transport, hull"):
+        with pytest.raises(ValueError, match="transport, hull"):
             run_method(run, run_settings(run))
 
 

@@ -71,7 +71,7 @@ def test_taichi_for_another_python_is_not_enabled(tmp_path) -> None:
     (tmp_path / "__init__.py").write_text(GPU_ADD_ON)
     found: dict[str, Any] = {"__file__": str(tmp_path / "__init__.py")}
     exec(GPU_ADD_ON, found)
-    with pytest.raises(RuntimeError, match="not for Python 3"):
+    with pytest.raises(RuntimeError, match="Python 3"):
         found["register"]()
     (tmp_path / f"python{found['PYTHON']}").mkdir()
     found["register"]()

@@ -38,7 +38,7 @@ def test_zips_have_to_be_there_whole_and_small(tmp_path, monkeypatch) -> None:
     with pytest.raises(release.NotReadyError, match="make extension"):
         release.zips_are_small_and_whole(tmp_path)
     zipped(tmp_path, names=("__init__.py",))
-    with pytest.raises(release.NotReadyError, match="has no manual"):
+    with pytest.raises(release.NotReadyError, match="manual"):
         release.zips_are_small_and_whole(tmp_path)
     zipped(tmp_path)
     assert release.zips_are_small_and_whole(tmp_path).startswith("1 zips")
@@ -51,10 +51,10 @@ def test_a_zip_carries_the_license_of_all_that_is_in_it(tmp_path) -> None:
     inside = "python3.13/mdurl-0.1.2.dist-info"
     own, about = ("LICENSE", f"{inside}/METADATA"), f"{inside}/licenses/COPYING"
     zipped(tmp_path, own[1:])
-    with pytest.raises(release.NotReadyError, match="has no LICENSE"):
+    with pytest.raises(release.NotReadyError, match="LICENSE"):
         release.licenses_are_carried(tmp_path)
     zipped(tmp_path, own)
-    with pytest.raises(release.NotReadyError, match=r"mdurl-0.1.2 without its license"):
+    with pytest.raises(release.NotReadyError, match="mdurl"):
         release.licenses_are_carried(tmp_path)
     zipped(tmp_path, (*own, about))
     assert release.licenses_are_carried(tmp_path) == "licenses of 1 packages: mdurl"

@@ -1,11 +1,15 @@
 """What every package says of a value that it is given, and the kind and figures of what it finds of a shot or a result.
 
-`arguments` has the words for a value, and refuses it; those for findings are in `smokelift.report`.
+`arguments` has the words for a value, and refuses it; those for findings are in `smokelift.report`. Types of arrays say
+what these hold; shapes and units stand where they are used.
 """
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from smokelift.checks.arguments import (
     counted,
@@ -21,9 +25,13 @@ from smokelift.checks.arguments import (
 
 __all__ = [
     "UNDETERMINED",
+    "Array",
+    "Doubles",
     "Figure",
     "Figures",
     "Finding",
+    "Indices",
+    "Mask",
     "Source",
     "counted",
     "described",
@@ -35,6 +43,18 @@ __all__ = [
     "require_kind",
     "shown",
 ]
+
+Array = NDArray[np.float32]
+"""Single precision: densities, velocities, radiance."""
+
+Doubles = NDArray[np.float64]
+"""Double precision: places, directions, sums."""
+
+Mask = NDArray[np.bool_]
+"""Whether something holds of a pixel or a voxel."""
+
+Indices = NDArray[np.intp]
+"""Places in other arrays."""
 
 Figure = float | str | tuple[float, ...]
 """What a sentence fills in."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.density.observation import ObservedClip, ObservedView
 from smokelift.density.upright_plane import (
     AxisEstimate,

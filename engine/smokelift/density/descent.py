@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg.blas import saxpy
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 
 LARGEST_BLUR = 0.82
 """Blur of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large. That of the next ones

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 

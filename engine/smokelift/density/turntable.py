@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.density.upright_plane import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points, ray_through_pixels
 

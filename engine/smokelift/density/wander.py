@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.density.lattice_noise import lattices
 from smokelift.density.upright_plane import PlaneRays, view_frame
 from smokelift.scene import Camera, Domain

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.direct.state import SmokeState
 from smokelift.transport import Array, advect
 

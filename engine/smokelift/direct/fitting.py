@@ -21,7 +21,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.direct.burning import fit_fire
 from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.simulation import Physics, Simulation

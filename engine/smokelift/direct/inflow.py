@@ -17,7 +17,7 @@ import numpy as np
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.direct.state import SmokeState
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, advect, faces_in

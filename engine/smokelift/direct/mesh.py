@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks.array_types import Doubles, Mask
+from smokelift.checks import Doubles, Mask
 from smokelift.footage.image_sequence import is_pattern, numbered_files
 from smokelift.scene import Domain
 from smokelift.scene.checks import LARGEST, Vector

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.checks import counted
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask, counted
 from smokelift.direct.state import SmokeState
 from smokelift.output.files import INDEX, checksum
 from smokelift.output.sequence import Sequence

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.direct.new_sequence import Written, directed_writer, write_simulated
 from smokelift.direct.state import SmokeState, interpolate, read_state
 from smokelift.output.sequence import Sequence

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.state import SmokeState

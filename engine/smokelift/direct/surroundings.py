@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import Box, Domain

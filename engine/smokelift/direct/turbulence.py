@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.direct.state import SmokeState
 from smokelift.transport import Array, Faces, Velocity, at_centres, on_faces
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.footage.images import area_average
 from smokelift.output.archive import VELOCITY, Shape, read_arrays
 from smokelift.scene import SIDES, CompleteScene, Side

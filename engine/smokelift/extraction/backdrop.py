@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.background_kind import MAX_DEVIATION, color_around, likeliest, within
 from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate

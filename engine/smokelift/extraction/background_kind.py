@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.clear_picture import spread_out
 from smokelift.extraction.proxy import Proxy
 from smokelift.footage.images import (

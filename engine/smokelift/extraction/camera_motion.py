@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
-from smokelift.checks.array_types import Doubles, Indices, Mask
+from smokelift.checks import Doubles, Indices, Mask
 from smokelift.extraction.proxy import Proxy
 from smokelift.footage.images import Picture, blurred, brightest_channel, channel_mean, linear_to_srgb
 from smokelift.footage.noise import median_of_seen

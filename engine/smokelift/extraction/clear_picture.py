@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.matte import smoothing
 from smokelift.extraction.proxy import Proxy
 from smokelift.footage.clip import Clip

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, reduced_size

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip

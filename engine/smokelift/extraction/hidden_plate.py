@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.extraction.plate import Plate, shown_behind
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError

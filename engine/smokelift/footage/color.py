@@ -17,8 +17,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import Finding
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array, Finding
 
 Encoding = Literal["srgb", "linear", "hlg", "pq"]
 Association = Literal["straight", "premultiplied in linear light", "premultiplied in code values"]

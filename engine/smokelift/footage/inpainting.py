@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import ndimage
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 
 DETAIL = 4.0

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME
 from smokelift.output.host import BLENDER, Host

@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Array, Doubles
+from smokelift.checks import Array, Doubles
 from smokelift.scene import Camera, Domain
 from smokelift.scene.domain import LATERAL
 from smokelift.scene.projection import world_to_pixel

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.light_sweeps import ParallelSweep
 from smokelift.render.plan import RenderPlan

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.render.plan import RenderPlan
 
 BLOCKS = 24

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.render.camera_rays import camera_rays
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera

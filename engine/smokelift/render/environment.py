@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Doubles, Indices
+from smokelift.checks import Doubles, Indices
 from smokelift.footage.images import LUMINANCE, ImageError, read_image
 from smokelift.scene import DirectionalLight, EnvironmentLight
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 from smokelift.scene.checks import Vector
 from smokelift.scene.domain import LATERAL

@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.render.camera_rays import Rays, camera_rays
 from smokelift.render.light_sweeps import Shape, Sweep, Voxel, light_sweeps
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Scattering

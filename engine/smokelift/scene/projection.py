@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.scene.camera import Camera
 from smokelift.scene.domain import Box, Domain
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.density import DensitySettings, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
 from smokelift.extraction.matte import matte

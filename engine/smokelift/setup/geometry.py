@@ -8,8 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from smokelift.checks import Figures, Finding
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles, Figures, Finding
 from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.checks import UNDETERMINED, Figure, Figures, Finding
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import UNDETERMINED, Doubles, Figure, Figures, Finding
 from smokelift.extraction import brightest_smoke, tells_source
 from smokelift.extraction.fire import MIN_COLORED_VALUE
 from smokelift.footage.images import Picture

@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.checks import UNDETERMINED, Finding
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import UNDETERMINED, Doubles, Finding
 from smokelift.extraction.fire import CLIPPED_VALUE, MIN_COLORED_VALUE
 from smokelift.footage.images import brightest_channel
 from smokelift.render import scene_optics

@@ -1,6 +1,6 @@
 """Staggered grids and what is carried on them: advection and pressure projection."""
 
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.transport.advection import advect
 from smokelift.transport.grid import (
     Faces,

@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
-from smokelift.checks import numbers, require_kind
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array, numbers, require_kind
 from smokelift.scene.domain import box_around
 from smokelift.transport.grid import StaggeredGrid, Velocity, at_centres, faces_in, finite, require_same_shape
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.transport import Array, Faces, StaggeredGrid, without_divergence
 
 FaceMasks = tuple[Mask, Mask, Mask]

@@ -11,8 +11,7 @@ from typing import Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import numbers, shown
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array, numbers, shown
 from smokelift.scene import SIDES, Side
 from smokelift.scene.checks import LARGEST, SMALLEST
 from smokelift.scene.domain import checked_sides

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks import require_kind
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array, require_kind
 from smokelift.scene import Side
 from smokelift.transport.grid import StaggeredGrid, Velocity
 

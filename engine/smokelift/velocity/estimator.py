@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks import numbers, require_kind
+from smokelift.checks import Mask, numbers, require_kind
 from smokelift.checks.arguments import MAX_MAGNITUDE
-from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
 from smokelift.scene.checks import set_fields
 from smokelift.scene.domain import checked_sides

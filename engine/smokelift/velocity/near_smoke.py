@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from smokelift.checks.array_types import Mask
+from smokelift.checks import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
 from smokelift.velocity.estimator import refine_in_box

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 from smokelift.transport import Velocity, on_faces, without_divergence

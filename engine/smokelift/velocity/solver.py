@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg.blas import saxpy
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.transport import Faces, StaggeredGrid
 
 

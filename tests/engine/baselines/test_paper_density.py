@@ -20,7 +20,7 @@ def fitted(
 
 def test_without_taichi_the_fit_is_refused(monkeypatch) -> None:
     monkeypatch.setattr(device, "has_taichi", lambda: False)
-    with pytest.raises(DeviceError, match=r"The paper's method cannot run, as Taichi is not installed: "):
+    with pytest.raises(DeviceError, match="Taichi"):
         FixedRateDescent()
 
 

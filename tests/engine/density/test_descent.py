@@ -3,7 +3,7 @@
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.density.descent import with_neighbors
 
 

@@ -307,7 +307,7 @@ def test_a_view_of_another_size_or_that_moves_is_refused(plume, small) -> None:
     with pytest.raises(ValueError, match=r"\(42, 30, 3\)"):
         reconstruct_density(target, small, views=[replace(side, image=side.image[1:])])
     moving = replace(side.camera, matrices=(side.camera.matrix, side.camera.matrix))
-    with pytest.raises(ValueError, match="camera moves"):
+    with pytest.raises(ValueError, match="camera"):
         reconstruct_density(target, small, views=[replace(side, camera=moving)])
 
 

@@ -169,7 +169,7 @@ def test_one_color_behind_a_moving_camera_is_found(tmp_path: Path, color: tuple[
 
 @pytest.mark.parametrize("smoke", [0.0, 1.0])
 def test_more_than_one_color_behind_a_moving_camera_is_refused(tmp_path: Path, smoke: float) -> None:
-    with pytest.raises(ValueError, match="The camera moves"):
+    with pytest.raises(ValueError, match="camera"):
         moving(pan(tmp_path, passing_wall(), smoke))
 
 

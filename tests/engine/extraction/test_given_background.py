@@ -45,7 +45,7 @@ def test_frames_of_the_clip_are_its_plate_as_they_were_filmed(tmp_path: Path) ->
     for mask in (None, tmp_path / "mask.png"):
         with Clip.open(tmp_path / "frame_###.exr", frames=(1, 2), mask=mask) as clip:
             np.testing.assert_allclose(mean_of_frames((0, 3), clip), filmed[[0, 3]].mean(0), atol=1e-3)
-            with pytest.raises(ClipError, match="has no frame 4"):
+            with pytest.raises(ClipError, match="frame 4"):
                 mean_of_frames((4,), clip)
 
 

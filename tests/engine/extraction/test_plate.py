@@ -37,7 +37,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="finite"):
         matte(clip.frame(0) * np.nan, plate)
     for background in ((1.0, 2.0), np.full((4, 4, 3), np.nan), np.ones((4, 4))):
-        with pytest.raises(ValueError, match="finite color or RGB picture"):
+        with pytest.raises(ValueError, match="finite"):
             known_plate(background, clip)
 
 
@@ -59,7 +59,7 @@ def test_a_plate_for_every_frame_of_the_clips_file(tmp_path: Path) -> None:
             assert mask[puff(n) > 0.3].mean() > 0.95
             assert mask[puff(n) == 0.0].mean() < 0.08
     few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
-    with pytest.raises(ValueError, match="has 13 of the frames 0 to 20 that are needed"):
+    with pytest.raises(ValueError, match="13 of the frames 0 to 20"):
         known_plate(few, clip)
 
 

@@ -89,7 +89,7 @@ def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path: Path) 
         painted(tmp_path / f"mask_{n}.png", np.full((HEIGHT, WIDTH), 255))
     with Clip.open(clip, frames=(2, 7), mask=tmp_path / "mask_#.png") as part:
         assert len(part.whole()) == 8
-    with pytest.raises(ClipError, match=r"mask_#\.png: .* 8 of the frames 0 to 23"):
+    with pytest.raises(ClipError, match=r"mask_#\.png: .* 8 of .* 0 to 23"):
         Clip.open(clip, mask=tmp_path / "mask_#.png")
 
 

@@ -217,7 +217,7 @@ def test_frames_that_are_the_background_are_kept_as_its_picture(plume, draft, tm
     assert sequence.scene.background == Background(image=tmp_path / "out" / "background.exr")
     with Clip.open(scene.clip) as opened:
         np.testing.assert_allclose(read_image(sequence.scene.background.image), opened.frame(0), atol=1e-3)
-    with pytest.raises(SequenceError, match=r"sources\.background\.frame\[0\] was 0 and is now 1"):
+    with pytest.raises(SequenceError, match=r"sources\.background\.frame\[0\]"):
         frames_written(replace(scene, background=Background(frame=1)), draft, tmp_path / "out", resume=True)
 
 
@@ -279,7 +279,7 @@ def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, along_the_
     assert Sequence.open(out).scene == completed(tracked)
     poses = tracked.camera.matrices
     other = replace(tracked.camera, matrices=(*poses[:-1], poses[0]))
-    with pytest.raises(SequenceError, match=r"scene\.camera\.matrices\[4\]\[0\]\[0\] was 0\.\d+ and is now 0\.\d+;"):
+    with pytest.raises(SequenceError, match=r"scene\.camera\.matrices\[4\]\[0\]\[0\]"):
         frames_written(replace(tracked, camera=other), draft, out, resume=True)
 
 

@@ -190,7 +190,7 @@ def test_a_backlit_silhouette_needs_no_light(plume, draft, tmp_path) -> None:
     assert choice.figures["error_absorption"] <= choice.figures["error_unshadowed"] + choice.figures["tolerance"]
     assert (choice.kind, choice.figures["other"]) == ("compared scattering", "unshadowed")
     for model in ("single", "multiple"):
-        with pytest.raises(ValueError, match=rf'"{model}" needs a light'):
+        with pytest.raises(ValueError, match=model):
             shot_of(silhouette, replace(draft, scattering=model))
 
 

@@ -126,7 +126,7 @@ def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) ->
         ({"camera": STEEP, "domain": None}, "camera but no box"),
         ({"camera": WIDE, "domain": None}, "camera but no box"),
         ({"camera": None}, "a box but no camera"),
-        ({"camera": None, "domain": None, "inlets": (Inlet((0, 0, 0), 0.1),)}, "marks an inlet but gives no box"),
+        ({"camera": None, "domain": None, "inlets": (Inlet((0, 0, 0), 0.1),)}, "inlet"),
         ({"camera": Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(64, 48))}, "64 x 48, the clip's"),
         ({"domain": Domain((-0.6, -12, 0), (0.6, -10.8, 1.6), (24, 24, 32))}, "see the domain"),
     ],
@@ -154,7 +154,7 @@ def test_one_color_behind_a_moving_camera_is_found(tracked, draft) -> None:
     shot = shot_of(replace(tracked, background=None), draft)
     assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
     assert shot.found_background is None
-    with pytest.raises(ValueError, match="matrices are given for 5 frames"):
+    with pytest.raises(ValueError, match=r"matrices .* 5 frames"):
         shot_of(tracked.with_frames(1, 4), draft)
 
 
@@ -182,9 +182,9 @@ def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None
     write_image(tmp_path / "plate.png", stripes)
     clip = ClipSource(tmp_path / "wall_#.png", fps=24)
     for background, said in (
-        (None, "clean plate with a picture for every frame"),
-        (Background(frame=0), "clean plate with a picture for every frame"),
-        (Background(image=tmp_path / "plate.png"), "has 1 of the frames 0 to 4"),
+        (None, "clean plate"),
+        (Background(frame=0), "clean plate"),
+        (Background(image=tmp_path / "plate.png"), "1 of the frames 0 to 4"),
     ):
         with pytest.raises(ValueError, match=said):
             shot_of(replace(tracked, clip=clip, background=background), draft)
@@ -231,7 +231,7 @@ def test_a_shot_knows_where_its_smoke_stands(given, plume, draft: Settings) -> N
     blank = shot_of(plume.scene, Settings.preset(draft.quality, method="paper"))
     assert blank.place is None
     assert "axis depth" not in [choice.about for choice in blank.findings]
-    with pytest.raises(ValueError, match="leave the distance out"):
+    with pytest.raises(ValueError, match="distance"):
         shot_of(inlet, measured)
 
 

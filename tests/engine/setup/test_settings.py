@@ -33,7 +33,7 @@ def test_qualities_are_shares_of_the_clips_pixels(pixels, allowed) -> None:
 def test_detail_is_made_up_unless_somebody_measures() -> None:
     assert (Settings.preset().detail, Settings.preset().seed) == (1.0, 0)
     assert Settings.preset(method="paper").detail == 0
-    with pytest.raises(ValueError, match="detail must be 0 with it"):
+    with pytest.raises(ValueError, match="detail"):
         replace(Settings.preset(method="paper"), detail=0.5)
 
 
@@ -50,18 +50,18 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"method": "best"}, "method must be one of default, paper"),
-        ({"quality": "ultra"}, "quality must be one of draft, balanced, fine"),
-        ({"transport": 1.5}, "transport must be a number from 0 to 1"),
-        ({"transport": float("nan")}, "transport must be a number from 0 to 1"),
-        ({"distance": float("inf")}, "distance must be a number of meters above 0"),
-        ({"detail": -0.1}, "detail must be a number from 0 to 1, not -0.1"),
-        ({"seed": -1}, "seed must be a whole number from 0, not -1"),
-        ({"resolution": (7, 64, 64)}, "at least 8 voxels"),
-        ({"resolution": (64, 64)}, "three whole numbers"),
-        ({"resolution": 64}, "resolution must be three whole numbers of at least 8 voxels, not 64"),
-        ({"detail": "1"}, 'detail must be a number from 0 to 1, not "1"'),
-        ({"distance": "0.1"}, 'distance must be a number of meters above 0, not "0.1"'),
+        ({"method": "best"}, "method"),
+        ({"quality": "ultra"}, "quality"),
+        ({"transport": 1.5}, "transport"),
+        ({"transport": float("nan")}, "transport"),
+        ({"distance": float("inf")}, "distance"),
+        ({"detail": -0.1}, "detail .* -0.1"),
+        ({"seed": -1}, "seed .* -1"),
+        ({"resolution": (7, 64, 64)}, "resolution"),
+        ({"resolution": (64, 64)}, "resolution"),
+        ({"resolution": 64}, "resolution .* 64"),
+        ({"detail": "1"}, 'detail .* "1"'),
+        ({"distance": "0.1"}, 'distance .* "0.1"'),
     ],
 )
 def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:

@@ -63,5 +63,5 @@ def test_coarse_footage_is_not_enlarged(camera: Camera) -> None:
 @both
 def test_a_domain_outside_the_view_is_refused(camera: Camera) -> None:
     beside = Domain((9.4, -0.6, 0), (10.6, 0.6, 1.6), (24, 24, 32))
-    with pytest.raises(CameraError, match="does not see the domain"):
+    with pytest.raises(CameraError, match="domain"):
         working_picture(camera, beside)

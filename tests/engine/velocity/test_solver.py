@@ -120,7 +120,7 @@ def test_a_uniform_flow_and_a_solid_turn_cost_no_second_order_smoothness():
 def test_steps_that_do_not_converge_are_refused(steps):
     before, after, _ = translation(np.array([0.1, 0.0, 0.0]))
     estimator = PaperVelocity(solver=PrimalDual(**steps))
-    with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = .*do not converge"):
+    with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = "):
         estimator.estimate(DensityPair(before, after, DT, VOXEL))
 
 

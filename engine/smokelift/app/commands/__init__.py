@@ -4,7 +4,6 @@ from smokelift.app.commands import (
     batch,
     directed,
     doctor,
-    evaluate,
     export,
     extract,
     inspect,
@@ -15,6 +14,6 @@ from smokelift.app.commands import (
 
 COMMANDS = {
     name: command
-    for module in (reconstruct, extract, batch, inspect, render, sequences, evaluate, directed, export, doctor)
+    for module in (reconstruct, extract, batch, inspect, render, sequences, directed, export, doctor)
     for name, command in module.COMMANDS.items()
 }

@@ -1,11 +1,16 @@
-"""``smokelift check``, ``preview`` and ``proxy``: is a sequence whole, what does it look like, and coarse copies."""
+"""``smokelift check``, ``preview``, ``proxy`` and ``evaluate``: is a sequence whole, what does it look like, coarse
+copies, and how good it is.
+"""
 
 import argparse
+import json
 from dataclasses import replace
 
-from smokelift.app.options import Command, named_path
+from smokelift.app.options import Command, named_path, require_file
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import Finding, counted
+from smokelift.checks.whole_files import write_text
+from smokelift.evaluation.evaluate import evaluate
 from smokelift.footage.clip import Clip
 from smokelift.output.export import write_proxies
 from smokelift.output.files import PICTURES
@@ -71,8 +76,52 @@ def proxy(options: argparse.Namespace, say: Reporter) -> None:
     say.finish(Finding("proxy", {"frames": frames, "directory": str(sequence.directory)}), {"frames": frames})
 
 
+def add_evaluate_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``evaluate``."""
+    add_sequence(parser)
+    parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
+    parser.add_argument(
+        "--view",
+        type=named_path,
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("camera.toml", "clip.mp4"),
+        help="another camera and its clip; may be given again",
+    )
+    parser.add_argument(
+        "--json", type=named_path, metavar="FILE", help="write the figures into this file, not on standard output"
+    )
+    parser.add_argument(
+        "--picture", type=named_path, metavar="FILE.png", help="draw the smoke from all around; below --truth if given"
+    )
+
+
+def compare(options: argparse.Namespace, say: Reporter) -> None:
+    """Compare a sequence with its front and with what is known, and write the figures and a picture."""
+    require_file(options.json)
+    require_file(options.picture, (".png",))
+    if options.truth is not None and options.truth.suffix.lower() != ".npz":
+        raise ValueError(
+            f"{options.truth}: --truth takes known volumes (truth.npz); the clip of another camera goes with --view."
+        )
+    sequence = Sequence.open(options.directory)
+    device.start(options.device)
+    found = evaluate(sequence, options.truth, tuple((camera, clip) for camera, clip in options.view))
+    text = json.dumps(found.figures, indent=1, allow_nan=False)
+    if options.picture is not None:
+        found.write_picture(options.picture)
+    if options.json is not None:
+        write_text(options.json, text + "\n")
+        text = f"{options.json} written."
+    say.finish(text, found.figures)
+
+
 COMMANDS = {
     "check": Command("check that a sequence is complete and undamaged", add_sequence, check),
     "preview": Command("make pictures and a video that show the smoke from all sides", add_preview_options, preview),
     "proxy": Command(f"write copies for viewports, with voxels {PROXY_TIMES} times as large", add_sequence, proxy),
+    "evaluate": Command(
+        "compare the smoke with its front, known volumes and other cameras", add_evaluate_options, compare
+    ),
 }

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.evaluation.metrics.volumes import finite_array, relative
 from smokelift.transport import block_means
 

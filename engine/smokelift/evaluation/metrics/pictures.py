@@ -5,7 +5,7 @@ import math
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.evaluation.metrics.volumes import checked_mask, pair
 from smokelift.transport import require_positive
 

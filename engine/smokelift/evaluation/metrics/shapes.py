@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks.array_types import Doubles
+from smokelift.checks import Doubles
 from smokelift.evaluation.metrics.volumes import finite_array
 
 PART_FRACTION = 0.2

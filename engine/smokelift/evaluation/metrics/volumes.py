@@ -5,8 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import numbers
-from smokelift.checks.array_types import Doubles, Mask
+from smokelift.checks import Doubles, Mask, numbers
 from smokelift.transport import StaggeredGrid, require_positive
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.checks.array_types import Array
+from smokelift.checks import Array
 from smokelift.render import taichi_runtime as taichi
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
@@ -103,24 +103,39 @@ class GpuBackend:
                 self._sweeps.scatter_parallel(sweep, self._medium, self._gradient, self._scratch, adjoint=True)
                 # the adjoint of the sweep is that of the light that travels the other way
                 columns = self._sweeps.columns(sweep, self._scratch, -sweep.travel)
-                light.add_parallel_shadow(columns, self._near, self._gradient, *_slopes(sweep), sweep.step)
+                light.add_parallel_shadow(
+                    columns, self._near, self._gradient, sweep.axis, self._sweeps.slopes[sweep], sweep.step
+                )
                 continue
             for face in sweep.faces:
                 columns = self._sweeps.scatter_face(
                     sweep, face, self._medium, self._gradient, self._scratch, adjoint=True
                 )
-                rays = _face_rays(sweep, face)
-                light.gather_rays(self._scratch, columns, *rays, sweep.voxel_size)
-                light.add_point_shadow(columns, self._near, self._gradient, *rays)
+                rays = self._sweeps.rays[sweep, face]
+                light.accumulate_rays(self._scratch, columns, face.axis, rays, sweep.voxel_size, True)
+                light.add_point_shadow(columns, self._near, self._gradient, face.axis, rays)
 
 
 class LightSweeps:
-    """Lights swept through the voxels of a plan that are marked in ``near``; columns of one shape share memory."""
+    """Lights swept through the voxels of a plan that are marked in ``near``; columns of one shape share memory.
+
+    What kernels take of a light is made once, as Taichi needs a fifth of a millisecond for it.
+    """
 
     def __init__(self, plan: RenderPlan, near: Any) -> None:
         self._shape, self._near = plan.shape, near
-        self._phase = taichi.matrix(plan.to_eye), plan.medium.anisotropy, plan.medium.albedo
         self._columns: dict[tuple[int, ...], Any] = {}
+        phase = taichi.matrix(plan.to_eye), plan.medium.anisotropy, plan.medium.albedo
+        self._shadings, self.slopes, self.rays = dict[Sweep, Any](), dict[Sweep, Any](), dict[tuple[Sweep, Face], Any]()
+        for sweep in plan.lights:
+            self._shadings[sweep] = light.Shading(taichi.vector(np.resize(sweep.energy, 3)), *phase)
+            if isinstance(sweep, ParallelSweep):
+                self.slopes[sweep] = light.Slopes(*sweep.slope, sweep.first)
+                continue
+            for face in sweep.faces:
+                begin = taichi.vector(np.array([face.columns_b[0], face.columns_c[0]]))
+                position = taichi.vector(sweep.position)
+                self.rays[sweep, face] = light.Rays(face.travel, face.first, face.far, begin, position)
 
     def scatter(self, sweep: Sweep, medium: Any, result: Any, add: int) -> None:
         """Write, or ``add``, the radiance of a light that a medium scatters, in the channels after its first one."""
@@ -135,8 +150,8 @@ class LightSweeps:
     ) -> None:
         """Do `light_kernels.scatter_parallel` with the columns of a parallel light."""
         light.scatter_parallel(
-            self.columns(sweep, medium, sweep.travel), self._near, source, result, *_slopes(sweep), sweep.step,
-            taichi.vector(sweep.direction), _energy(sweep), *self._phase, add, adjoint,
+            self.columns(sweep, medium, sweep.travel), self._near, source, result, sweep.axis, self.slopes[sweep],
+            sweep.step, taichi.vector(sweep.direction), self._shadings[sweep], add, adjoint,
         )  # fmt: skip
 
     def scatter_face(
@@ -144,36 +159,19 @@ class LightSweeps:
         adjoint: bool = False,
     ) -> Any:  # fmt: skip
         """Do `light_kernels.scatter_point` through one face of a point light, and return its columns."""
-        columns, rays = self._of_shape(face.planes, face.columns_b[1], face.columns_c[1]), _face_rays(sweep, face)
-        light.accumulate_rays(medium, columns, *rays, sweep.voxel_size)
-        light.scatter_point(
-            columns, self._near, source, result, *rays, _energy(sweep), *self._phase, add, adjoint,
-        )  # fmt: skip
+        columns, rays = self._of_shape(face.planes, face.columns_b[1], face.columns_c[1]), self.rays[sweep, face]
+        light.accumulate_rays(medium, columns, face.axis, rays, sweep.voxel_size, False)
+        shading = self._shadings[sweep]
+        light.scatter_point(columns, self._near, source, result, face.axis, rays, shading, add, adjoint)
         return columns
 
     def columns(self, sweep: ParallelSweep, voxels: Any, travel: int) -> Any:
         """Sums over voxels along the columns of a parallel light, one way or the other along its axis."""
         columns = self._of_shape(*(n + (axis != sweep.axis) for axis, n in enumerate(self._shape)))
-        light.accumulate_columns(voxels, columns, sweep.axis, travel, *sweep.slope, sweep.first)
+        light.accumulate_columns(voxels, columns, sweep.axis, travel, self.slopes[sweep])
         return columns
 
     def _of_shape(self, *shape: int) -> Any:
         if shape not in self._columns:
             self._columns[shape] = taichi.zeros(shape)
         return self._columns[shape]
-
-
-def _energy(sweep: Sweep) -> Any:
-    """The energy of a light in three channels, as kernels take it."""
-    return taichi.vector(np.resize(sweep.energy, 3))
-
-
-def _slopes(sweep: ParallelSweep) -> tuple[int, float, float, int]:
-    """The columns of a parallel light, as kernels take them."""
-    return sweep.axis, *sweep.slope, sweep.first
-
-
-def _face_rays(sweep: PointSweep, face: Face) -> tuple[Any, ...]:
-    """The columns through a face of a point light, as kernels take them."""
-    begin = np.array([face.columns_b[0], face.columns_c[0]])
-    return face.axis, face.travel, face.first, face.far, taichi.vector(begin), taichi.vector(sweep.position)
