@@ -22,7 +22,7 @@ from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
-from smokelift.extraction import extract_element, usual_source
+from smokelift.extraction import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import backdrop_color, background_picture
 from smokelift.extraction.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
@@ -232,7 +232,7 @@ def reconstruct_density(
 def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     """The observation, before the scene's background unless it has a plate; a picture's mean for other cameras.
 
-    Before a picture its smoke is extracted.
+    Before a picture that shows how much of it smoke lets through, its smoke is extracted.
     """
     camera = observation.camera
     if observation.plate is BLACK:
@@ -242,6 +242,8 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     if observation.element is not None or backdrop_color(plate.image) is not None:
         return observation
     source = usual_source([(picture, plate)], camera.size)
+    if not shows_transmittance(plate.image, source):
+        return observation
     return replace(observation, element=extract_element(picture, plate, source, camera.size))
 
 

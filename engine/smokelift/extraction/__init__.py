@@ -12,7 +12,6 @@ from smokelift.extraction.element import (
     brightest_smoke,
     extract_element,
     shows_transmittance,
-    tells_source,
     usual_source,
 )
 from smokelift.extraction.hidden_plate import plate_and_source
@@ -23,6 +22,5 @@ __all__ = [
     "extract_element",
     "plate_and_source",
     "shows_transmittance",
-    "tells_source",
     "usual_source",
 ]

@@ -8,9 +8,9 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
 - Smoke moves every background towards its own brightness. So of several such values, the one farthest from the smoke's
   is the background.
 
-A pixel that only drifts is clear as well if it is like its surroundings, or so unlike them that smoke would change it
-more. All else is continued smoothly from around it; its detail is that of the frames' mean, and the contrast that smoke
-takes from that is restored. The error is measured where the background is known.
+A pixel that only drifts is clear as well if it is so unlike its surroundings that smoke would change it more. All else
+is continued smoothly from around it; its detail is that of the frames' mean, and the contrast that smoke takes from
+that is restored. The error is measured where the background is known.
 
 Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
 whole frames.
@@ -27,8 +27,15 @@ from smokelift.extraction.matte import smoothing
 from smokelift.extraction.proxy import Proxy
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Edges
-from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
-from smokelift.footage.inpainting import ISLAND, in_one_piece, mostly_beside, push_pull
+from smokelift.footage.images import (
+    Picture,
+    area_average,
+    blurred,
+    channel_mean,
+    linear_to_srgb,
+    srgb_to_linear,
+)
+from smokelift.footage.inpainting import ISLAND, in_one_piece, push_pull
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
@@ -61,9 +68,6 @@ PRIOR_PAIRS = 4.0
 
 DRIFT = 8 / 255
 """Largest change by a codec or by the light, in sRGB values."""
-
-LIKE_SURROUNDINGS = 3 * DRIFT
-"""Largest difference of a background from its surroundings, in sRGB values (docs/experiments/background.md)."""
 
 MIN_CHANGE_FRACTION = 1 / 4
 """Smallest range of smoke over time, over its difference from the background: a chair or a jacket is steadier."""
@@ -126,10 +130,8 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         )
     known = in_one_piece(known)
     if not known.all():
-        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
+        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more
         known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * _unlike(image, known) >= window + DRIFT)))
-        # or if it is like them: smoke hardly changes a background of its own color
-        known = mostly_beside(in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
     never = ~seen.any(0)

@@ -88,8 +88,12 @@ LIT_PERCENTILE = 90
 .02 to .04 more, with 75 the picture of a real one loses 2 dB (measured)."""
 
 HUE = 2 * MODEL_ERROR
-"""Smallest difference of two colors of mean 1, root mean square, from which on they differ: both may be off by the
-model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
+"""Smallest difference of two colors over their brightness, root mean square, from which on they differ: both may be
+off by the model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
+
+SOURCE_FACTOR = 2.0
+"""Standard deviation of a source radiance that is found before a smooth plate, as a factor: an element takes it within
+that."""
 
 CHROMA_BASIS = np.array([[1.5**0.5, 0.5**0.5], [0, -(2**0.5)], [-(1.5**0.5), 0.5**0.5]], np.float32)
 """Two components of chroma by channel, as in `cpp/extraction.cpp` (by definition)."""
@@ -174,7 +178,7 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
         first = np.full(3, np.mean(brightest))
     source = np.asarray(np.maximum(first, MIN_SOURCE), np.float32)
     for _ in range(SOURCE_ROUNDS):
-        total, squares = np.zeros(3), 0.0
+        total, behind, squares = np.zeros(3), np.zeros(3), 0.0
         for cells in seen:
             fields, _, weight = extracted(cells, source)
             opacity = fields[..., 0].astype(np.float64)
@@ -183,11 +187,29 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
             noise, errors = cells.noise.mean(-1), cells.unknown * (np.trace(cells.errors) / 3)
             weight = weight * noise / (noise + (1 - opacity) ** 2 * errors)
             total += np.sum((weight * opacity)[..., None] * sent, axis=(0, 1))
+            behind += np.sum((weight * opacity**2)[..., None] * cells.behind, axis=(0, 1))
             squares += float(np.sum(weight * opacity**2))
         found = np.maximum(total / max(squares, 1e-12), 0)
         brightness = max(float(found.mean()), MIN_SOURCE)
         source = np.asarray(np.maximum(found, MIN_CHROMA * brightness), np.float32)
-    return source
+    if any(_has_detail(plate.image) for _, plate in pictures):
+        return source
+    return _palest(source, behind / max(squares, 1e-12))
+
+
+def _palest(source: Picture, behind: Picture) -> Picture:
+    """The likeliest source radiance (3,) on the line of colors from what is ``behind`` (3,) through one that was found.
+
+    Before a smooth plate thinner smoke of a color farther along that line looks the same. Light is white, within `HUE`,
+    and the source within `SOURCE_FACTOR` of the one that was found.
+    """
+    times = np.geomspace(1 / SOURCE_FACTOR, SOURCE_FACTOR, 65)
+    line = behind + times[:, None] * (source - behind)
+    brightness = line.mean(-1)
+    hue = np.sqrt(np.square(line - brightness[:, None]).mean(-1)) / np.maximum(brightness, MIN_SOURCE)
+    cost = np.square(hue / HUE) + np.square(np.log(times) / np.log(SOURCE_FACTOR))
+    cost[(line < MIN_CHROMA * brightness[:, None]).any(-1)] = np.inf
+    return np.asarray(line[cost.argmin()], np.float32)
 
 
 def clip_source(clip: Clip, plate: Plate, frames: Sequence[int]) -> Picture:
@@ -214,23 +236,27 @@ def brightest_smoke(clip: Clip, plate: Plate, frame: int, source: Picture) -> fl
 def shows_transmittance(plate: Picture, source: Picture) -> bool:
     """Whether a plate (rows, columns, 3) shows how much of it smoke of a source radiance (3,) lets through.
 
-    It has to have detail (`tells_source`), or another hue than the smoke: before a smooth gray wall white smoke that is
-    thick and white smoke that is thin look alike, and the picture itself is the best that can be fitted.
+    It has to have detail, or another hue than the smoke: before a smooth gray wall white smoke that is thick and white
+    smoke that is thin look alike, and the picture itself is the best that can be fitted.
     """
-    own, other = (color / max(float(color.mean()), 1e-12) for color in (plate.mean((0, 1)), source))
-    return tells_source(plate) or float(np.sqrt(np.square(own - other).mean())) > HUE
+    brightness = channel_mean(plate)
+    own_hue = plate - brightness[..., None] * (source / max(float(source.mean()), 1e-12))
+    return _has_detail(plate) or _strength(own_hue) > HUE * _strength(brightness)
 
 
-def tells_source(plate: Picture) -> bool:
-    """Whether smoke before a plate (rows, columns, 3) shows its source radiance: detail of it has to show through.
+def _has_detail(plate: Picture) -> bool:
+    """Whether neighboring cells of a plate (rows, columns, 3) differ by more than the model's errors do.
 
-    Its neighboring cells have to differ by more than the model's errors do: six walls and photographs by .10 to .35 of
-    their mean, smooth skies by .001 and .03. Before these thin smoke in strong light looks like thick smoke.
+    Those of six walls and photographs differ by .10 to .35 of their mean, of smooth skies by .001 and .03.
     """
     rows, columns = plate.shape[:2]
     small = area_average(plate, *reduced_size(columns, rows, SOURCE_SIDE))
-    detail = np.sqrt(np.square(small - blurred(small, 1.0)).mean())
-    return bool(detail > MODEL_ERROR * small.mean())
+    return _strength(small - blurred(small, 1.0)) > MODEL_ERROR * float(small.mean())
+
+
+def _strength(values: Picture) -> float:
+    """The root mean square."""
+    return float(np.sqrt(np.square(values).mean()))
 
 
 def extracted(cells: Cells, source: Picture) -> tuple[Picture, Picture, Picture]:

@@ -215,8 +215,8 @@ SENTENCES: Mapping[str, str] = {
         "light is as strong as that asks for."
     ),
     "undetermined source radiance": (
-        "Source radiance: undetermined, because nothing behind the smoke has the detail that shows how much it hides. "
-        "Thinner smoke in stronger light looks the same. Give the lights if you know them."
+        "Source radiance: undetermined, because nothing behind the smoke has detail or another hue, which would show "
+        "how much it hides. Thinner smoke in stronger light looks the same. Give the lights if you know them."
     ),
     "sun's direction": "Suns from many sides look the same. Give the lights.",
     "scattering": "Scattering: {value}.",

@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from smokelift.checks import UNDETERMINED, Doubles, Figure, Figures, Finding
-from smokelift.extraction import brightest_smoke, tells_source
+from smokelift.extraction import brightest_smoke
 from smokelift.extraction.fire import MIN_COLORED_VALUE
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.image import environment_count
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
-from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples, visible_plate
+from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.medium import source_radiance
 from smokelift.setup.settings import Settings
@@ -67,7 +67,7 @@ def first_light(
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
         return tuple(_with_directions(each, geometry, medium) for each in lights), richest, []
-    found = _measured_source(estimate)
+    found = estimate.source
     if found is None:
         source = source_radiance(estimate.samples)
     else:
@@ -79,15 +79,6 @@ def first_light(
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
     assumed = Finding("assumed light", {"irradiance": light.irradiance}, source="assumed")
     return (light,), richest, [assumed, _source_finding(found, source)]
-
-
-def _measured_source(estimate: FirstEstimate) -> Picture | None:
-    """The source radiance (3,) of the smoke; None where what is behind it hardly shows it."""
-    if estimate.source is None:
-        return None
-    if not tells_source(visible_plate(estimate.plate, estimate.clip, estimate.samples.smoky[0])):
-        return None
-    return estimate.source
 
 
 def _source_finding(shown: Picture | None, taken: Doubles) -> Finding:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.extraction import tells_source, usual_source
+from smokelift.extraction import shows_transmittance, usual_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import lasting_noise
@@ -78,10 +78,14 @@ def test_without_smoke_the_source_can_be_divided_by(light) -> None:
     assert np.isfinite(source).all() and (source > 0).all()
 
 
-def test_a_smooth_plate_does_not_tell_the_source() -> None:
-    sky = np.linspace((0.2, 0.3, 0.6), (0.4, 0.5, 0.7), SIZE[1]).astype("f4")
-    assert not tells_source(np.repeat(sky[:, None], SIZE[0], axis=1))
-    assert tells_source(plate(0.04).image)
+def test_a_plate_shows_transmittance_by_its_detail_or_by_its_hue() -> None:
+    """A dusk is gray on the mean, but of a hue everywhere; before it smoke of a gray wall's color shows."""
+    gray = np.full(3, 0.6, np.float32)
+    dusk = np.repeat(np.linspace((0.1, 0.2, 0.3), (0.3, 0.2, 0.1), SIZE[1]).astype("f4")[:, None], SIZE[0], axis=1)
+    smooth = np.broadcast_to(dusk.mean(-1, keepdims=True), dusk.shape)
+    assert shows_transmittance(dusk, gray)
+    assert not shows_transmittance(smooth, gray)
+    assert shows_transmittance(plate(0.04).image.mean(-1, keepdims=True) * gray, gray)
 
 
 @pytest.mark.parametrize("brightness", [0.3, 1.0, 4.0])
