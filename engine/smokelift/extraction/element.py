@@ -200,14 +200,15 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
 def _palest(source: Picture, behind: Picture) -> Picture:
     """The likeliest source radiance (3,) on the line of colors from what is ``behind`` (3,) through one that was found.
 
-    Before a smooth plate thinner smoke of a color farther along that line looks the same. Light is white, within `HUE`,
-    and the source within `SOURCE_FACTOR` of the one that was found.
+    Before a smooth plate thinner smoke of a color farther along that line looks the same. Light is mostly white,
+    within `HUE` (a Cauchy distribution, which lets colored smoke be), and the source within `SOURCE_FACTOR` of the one
+    that was found.
     """
     times = np.geomspace(1 / SOURCE_FACTOR, SOURCE_FACTOR, 65)
     line = behind + times[:, None] * (source - behind)
     brightness = line.mean(-1)
     hue = np.sqrt(np.square(line - brightness[:, None]).mean(-1)) / np.maximum(brightness, MIN_SOURCE)
-    cost = np.square(hue / HUE) + np.square(np.log(times) / np.log(SOURCE_FACTOR))
+    cost = np.log1p(np.square(hue / HUE)) + np.square(np.log(times) / np.log(SOURCE_FACTOR))
     cost[(line < MIN_CHROMA * brightness[:, None]).any(-1)] = np.inf
     return np.asarray(line[cost.argmin()], np.float32)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from smokelift.extraction import shows_transmittance, usual_source
 from smokelift.extraction.plate import Plate
@@ -30,7 +31,7 @@ def plate(texture: float) -> Plate:
     return Plate((0.2 + detail).astype("f4"), np.ones(shape, np.float32), lasting_noise(0.004))
 
 
-def before(behind: Plate, source: tuple[float, ...], depth: float, height: float) -> np.ndarray:
+def before(behind: Plate, source: tuple[float, ...], depth: float | np.ndarray, height: float) -> np.ndarray:
     """A blob of smoke of an optical depth before a plate, with noise."""
     x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
     clear = np.exp(-depth * np.exp(-((x - 48) ** 2 + (y - height) ** 2) / 300))[..., None]
@@ -46,6 +47,19 @@ def test_texture_tells_the_light_of_thin_and_of_thick_smoke(source, depth) -> No
     wall = plate(0.04)
     pictures = [(before(wall, source, depth, height), wall) for height in (35, 45)]
     assert usual_source(pictures, (48, 40)) == pytest.approx(np.array(source), rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("source", "within"), [((0.3, 0.3, 0.3), 0.05), ((0.6, 0.35, 0.15), 0.15)], ids=["gray", "orange"]
+)
+def test_before_a_smooth_wall_smoke_is_gray_unless_no_thickness_makes_it_gray(source, within) -> None:
+    """Its hue trades for its opacity there, and ragged smoke alone shows a tenth of the wall's hue as its own."""
+    beige = np.linspace((0.46, 0.36, 0.23), (0.3, 0.22, 0.14), SIZE[1], dtype=np.float32)
+    wall = replace(plate(0.0), image=np.repeat(beige[:, None], SIZE[0], axis=1))
+    ragged = ndimage.gaussian_filter(np.random.default_rng(4).standard_normal(SIZE[::-1]), 1.2)
+    depth = 2 * np.exp(ragged / ragged.std())
+    found = usual_source([(before(wall, source, depth, height), wall) for height in (35, 45)], (48, 40))
+    np.testing.assert_allclose(found / found.mean(), np.array(source) / np.mean(source), rtol=within)
 
 
 @pytest.mark.parametrize("depth", [0.5, 1.0, 2.0])

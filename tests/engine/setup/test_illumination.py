@@ -60,6 +60,18 @@ def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft
     assert shot.optics.unshadowed_source() == pytest.approx(shot.views[0].source, rel=1e-4)
 
 
+def test_before_a_smooth_wall_of_another_hue_the_light_is_as_strong_as_the_smoke_hides(plume, draft, tmp_path) -> None:
+    """Its brightest pixels are the wall's, through thin smoke."""
+    green = np.linspace((0.5, 0.7, 0.3), (0.4, 0.55, 0.22), 56, dtype=np.float32)
+    write_image(tmp_path / "wall.png", np.repeat(green[:, None], 40, axis=1))
+    behind = Background(image=tmp_path / "wall.png")
+    lights = (DirectionalLight((0.3, 0.5, -0.8), (4.0, 4.0, 4.0)),)
+    haze = replace(plume.scene, medium=Medium(1.5, 0.9), lights=lights, background=behind)
+    scene = plume.write(tmp_path / "clip", plume.densities, haze)
+    shot = shot_of(replace(scene, lights=()), draft)
+    assert shot.optics.unshadowed_source() == pytest.approx(0.9 / (4 * np.pi) * np.full(3, 4.0), rel=0.3)
+
+
 def test_a_given_light_has_the_white_balance_of_a_clip_in_which_that_changes(plume, draft, tmp_path) -> None:
     """Before a plate that was found in it: that is as red as the clip's middle, and so is the smoke before it."""
     detail = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None]
