@@ -21,9 +21,9 @@ from smokelift.density.levels import TINY
 from smokelift.density.observation import ViewSet
 from smokelift.render import Volume
 
-LARGEST_GAIN = 3.0
-"""Bound of the factor that makes carried smoke denser. Where that is too little the prior's smoke is added: there smoke
-has entered, or has moved otherwise than was predicted."""
+LARGEST_GAIN = 1.5
+"""Bound of the factor that makes a carried smooth answer denser. Where that is too little the prior's smoke is added:
+there smoke has entered, or has moved otherwise than was predicted (docs/experiments/every-view.md)."""
 
 RETENTION = 0.97
 """Fraction of the detail that a frame takes over: the rest is renewed (docs/experiments/every-view.md)."""
@@ -40,7 +40,7 @@ class Start:
 class TemporalPrior(Protocol):
     """What is taken over from the frame before."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """Where the fit starts.
 
         Parameters
@@ -51,6 +51,8 @@ class TemporalPrior(Protocol):
             What the depth prior says of them.
         carried : (nx, ny, nz)
             The density of the frame before, carried along by the predicted velocity.
+        smooth : (nx, ny, nz)
+            Its smooth answer, carried alike; the same as ``carried`` if nothing was made up.
         """
 
 
@@ -58,7 +60,7 @@ class TemporalPrior(Protocol):
 class NothingCarried:
     """Every frame starts from its own pictures."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """The depth prior's density; see `TemporalPrior`."""
         return Start(depth.density, {})
 
@@ -67,18 +69,20 @@ class NothingCarried:
 class GuidedSimulation:
     """The detail of the carried density, with the low pass of the depth prior's smooth answer.
 
-    With B the blur over lobes (`Detail.low_pass`), the smooth answer rho_s, the prior's density rho_p and the carried
-    one rho_c:
+    With B the blur over lobes (`Detail.low_pass`), the smooth answer rho_s, the prior's density rho_p, the carried one
+    rho_c and its smooth answer sigma_c:
 
-        start = r rho_c b / B(rho_c) + (1 - r b / B(rho_s)) rho_p,   b = min(B(rho_s), LARGEST_GAIN B(rho_c))
+        start = r rho_c B(k rho_s) / B(rho_c) + (1 - r k) rho_p,   k = min(1, LARGEST_GAIN sigma_c / rho_s)
 
-    Detail is born where nothing is carried, at inlets above all, and moves on from there; r is `RETENTION`.
+    Detail is born where nothing is carried, at inlets above all, and moves on from there; r is `RETENTION`. How much
+    is, k, the smooth answers say voxel by voxel: what enters in a frame is thinner than a lobe, and blurred it would
+    look carried.
     Where the depth prior makes nothing up, the start is (1 - blend) rho_p + blend rho_c.
     """
 
     blend: float
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume) -> Start:
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """The carried density with the smooth answer's low pass; see `TemporalPrior`.
 
         Its figure ``share`` is the fraction of the smoke that is.
@@ -87,10 +91,12 @@ class GuidedSimulation:
         if detail is None or not where.count:
             blend = self.blend if prior.any() and carried.any() else 0.0
             return Start(np.float32(1 - blend) * prior + np.float32(blend) * carried, {"share": blend})
-        wanted, have = (detail.low_pass(values) for values in (detail.smooth, carried))
-        reached = np.float32(RETENTION) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
-        taken_over = where.take(carried) * reached / np.maximum(have, TINY)
-        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * where.take(prior)
+        wanted, came = where.take(detail.smooth), where.take(smooth)
+        came *= np.float32(LARGEST_GAIN)
+        np.minimum(came, wanted, out=came)
+        reached = np.float32(RETENTION) * detail.low_pass(views.volume(came))
+        taken_over = where.take(carried) * reached / np.maximum(detail.low_pass(carried), TINY)
+        started = taken_over + (1 - np.float32(RETENTION) * came / np.maximum(wanted, TINY)) * where.take(prior)
         total = float(started.sum(dtype=np.float64))
         fraction = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
         return Start(views.volume(started), {"share": fraction})

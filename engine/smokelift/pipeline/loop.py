@@ -162,34 +162,39 @@ def _density(
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     if views is None:
-        return _unseen(shot.optics.domain, _carried(before, predicted, shot)), {}
+        return _unseen(shot.optics.domain, _carried(before, predicted, shot)[0]), {}
     depth = method.depth_prior.estimate(views)
-    carried = _carried(before, predicted, shot)
+    carried, smooth = _carried(before, predicted, shot)
     initial: Volume | None = None
-    unseen: Volume | None = None
+    unseen: tuple[Volume, Volume] | None = None
     figures: Mapping[str, float] = {}
-    if carried is not None:
-        start = method.temporal_prior.start(depth.views, depth, carried)
+    if carried is not None and smooth is not None:
+        start = method.temporal_prior.start(depth.views, depth, carried, smooth)
         initial, figures = start.density, start.figures
         # what a moving camera does not see now it may have seen before
-        unseen = carried if shot.moves else None
+        unseen = (carried, smooth) if shot.moves else None
         del start
     priors, starts = [depth], [initial]
-    del carried, depth, initial  # the fit needs the memory, and frees what it has read unless others hold it
+    del carried, smooth, depth, initial  # the fit needs the memory, and frees what it has read unless others hold it
     fitted = method.density_fit.fit(views, priors.pop(), starts.pop())
     if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
-        fitted = replace(fitted, density=np.where(visible, fitted.density, unseen), steady=None)
+        density, kept = np.where(visible, fitted.density, unseen[0]), fitted.smooth
+        if kept is not None:
+            kept = np.where(visible, kept, unseen[1])
+        fitted = replace(fitted, density=density, smooth=kept, steady=None)
     return fitted, figures
 
 
-def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> Volume | None:
-    """The density of the frame before, carried along; None where there is none or no prediction."""
+def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> tuple[Volume, Volume] | tuple[None, None]:
+    """The density of the frame before and its smooth answer, carried along; None where there is no prediction."""
     if before is None or predicted is None:
-        return None
+        return None, None
     density = before.density if before.steady is None else before.steady
     # what a moving camera does not see no picture corrects, so that its mass has to be kept
-    return carry(density, predicted, 1.0 / shot.clip.fps, shot.optics.domain.voxel_size, conserve=shot.moves)
+    dt, h = 1.0 / shot.clip.fps, shot.optics.domain.voxel_size
+    carried = carry(density, predicted, dt, h, conserve=shot.moves)
+    return carried, carried if before.smooth is None else carry(before.smooth, predicted, dt, h, conserve=shot.moves)
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:

@@ -332,7 +332,7 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     always, threads = np.full_like(plume.densities[0], 0.5), []
 
     class Stubborn:
-        def start(self, views: Any, depth: Any, carried: np.ndarray) -> Start:
+        def start(self, views: Any, depth: Any, carried: np.ndarray, smooth: np.ndarray) -> Start:
             return Start(always, {"stubborn": 1.0})
 
     class Idle:
