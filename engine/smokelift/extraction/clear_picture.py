@@ -8,9 +8,9 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
 - Smoke moves every background towards its own brightness. So of several such values, the one farthest from the smoke's
   is the background.
 
-A pixel that only drifts is clear as well if it is so unlike its surroundings that smoke would change it more. All else
-is continued smoothly from around it; its detail is that of the frames' mean, and the contrast that smoke takes from
-that is restored. The error is measured where the background is known.
+A pixel that only drifts is clear as well if it is like its surroundings but for as much, or so unlike them that smoke
+would change it more. All else is continued smoothly from around it; its detail is that of the frames' mean, and the
+contrast that smoke takes from that is restored. The error is measured where the background is known.
 
 Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
 whole frames.
@@ -31,11 +31,12 @@ from smokelift.footage.images import (
     Picture,
     area_average,
     blurred,
+    brightest_channel,
     channel_mean,
     linear_to_srgb,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import ISLAND, in_one_piece, push_pull
+from smokelift.footage.inpainting import ISLAND, in_one_piece, mostly_beside, push_pull
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
@@ -130,8 +131,12 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         )
     known = in_one_piece(known)
     if not known.all():
-        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more
-        known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * _unlike(image, known) >= window + DRIFT)))
+        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
+        unlike = np.abs(_unlike(image, known).mean(-1))
+        known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * unlike >= window + DRIFT)))
+        # or if no channel differs from them by more: smoke hardly changes a background of its own color
+        unlike = brightest_channel(np.abs(_unlike(image, known)))
+        known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
     never = ~seen.any(0)
@@ -144,9 +149,9 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:
-    """Difference (rows, columns) of a linear picture from its known part, continued, in gray sRGB values."""
+    """Difference (rows, columns, 3) of a linear picture from its known part, continued, in sRGB values."""
     encoded = linear_to_srgb(image)
-    return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
+    return encoded - push_pull(encoded, known.astype(np.float32))
 
 
 def _smoke_of(gray: Picture, window: float) -> tuple[float, float, Mask]:

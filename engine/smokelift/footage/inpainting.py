@@ -70,6 +70,18 @@ def in_one_piece(known: Mask) -> Mask:
     return np.asarray(large[islands])
 
 
+def mostly_beside(grown: Mask, known: Mask) -> Mask:
+    """Remove the patches that ``grown`` adds to what is known if more of their border is unknown than known."""
+    patches, count = ndimage.label(grown & ~known, structure=np.ones((3, 3)))
+    beside = np.zeros(count + 1)
+    for along, across in ((patches, grown), (patches.T, grown.T)):
+        for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[1:], np.s_[:-1])):
+            border = (along[one] > 0) & (along[other] == 0)
+            sides = np.where(across[other][border], 1, -1)
+            beside += np.bincount(along[one][border], sides, count + 1)
+    return np.asarray(grown & (beside >= 0)[patches])
+
+
 def _moved(mask: Mask, right: int) -> Mask:
     """A mask (rows, columns) shifted to the right, False where nothing was."""
     moved = np.zeros_like(mask)

@@ -94,7 +94,7 @@ def test_a_plume_that_hardly_changes_is_no_part_of_a_smooth_wall(tmp_path: Path)
         return plume * np.random.default_rng(n).uniform(0.3, 0.6, (HEIGHT // 8, 1)).repeat(8, 0)
 
     plate = plate_of(film(tmp_path, truth, opacity, 0.42, 0.5))
-    assert plate.confidence[plume > 0.7].mean() < 0.1
+    assert plate.confidence[plume > 0.7].mean() < 0.3
     assert plate.confidence[plume < 0.01].min() == 1.0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.footage.inpainting import continuation_errors, in_one_piece, push_pull
+from smokelift.footage.inpainting import continuation_errors, in_one_piece, mostly_beside, push_pull
 
 HEIGHT, WIDTH = 40, 60
 COLOR = np.array([0.3, 0.2, 0.1], np.float32)
@@ -61,3 +61,14 @@ def test_errors_are_along_the_walls_color_and_as_large_as_behind_the_smoke() -> 
     # what is hidden has no part in it
     wall[~known] = 0.9
     np.testing.assert_array_equal(continuation_errors(wall, known), continuation_errors(wall * known[..., None], known))
+
+
+def test_a_patch_counts_if_it_borders_on_more_that_is_known() -> None:
+    known = hole()
+    grown = known.copy()
+    grown[12:15, 20:40] = True  # along the upper rim
+    grown[20:23, 28:31] = True  # amid the unknown
+    kept = mostly_beside(grown, known)
+    assert kept[12:15, 20:40].all()
+    assert not kept[20:23, 28:31].any()
+    assert kept[known].all()
