@@ -7,6 +7,7 @@ everything, the shots that are not finished are given to it again.
 
 import logging
 import threading
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -47,28 +48,28 @@ def run_on_cluster(
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":  # it tells of every lost connection; so do we, once
             logging.getLogger(name).setLevel(logging.CRITICAL)
-    left, seconds = dict(shots), CONNECT_SECONDS
+    left, batch, seconds = dict(shots), f"smokelift-{uuid.uuid4().hex}", CONNECT_SECONDS
     while left:
+        connected = False
         try:
-            client = distributed.Client(address, timeout=seconds, set_as_default=False)
-        except OSError as error:
-            raise ValueError(
-                f"{address}: no Dask scheduler answers ({error}); start it, or check its address. Not finished: "
-                f"{', '.join(shot.name for shot in left)}. Give the same command again to go on with them."
-            ) from error
-        try:
-            with client:
-                for shot, record in _submitted(client, left, task):
+            with distributed.Client(address, timeout=seconds, set_as_default=False) as client:
+                connected = True
+                for shot, record in _submitted(client, left, task, batch):
                     yield shot, record
                     del left[shot]
-        except OSError:
+        except OSError as error:
+            if not connected:
+                raise ValueError(
+                    f"{address}: no Dask scheduler answers ({error}); start it, or check its address. Not finished: "
+                    f"{', '.join(shot.name for shot in left)}. Give the same command again to go on with them."
+                ) from error
             say(f"The scheduler at {address} went away; waiting for it to return.")
             seconds = RETURN_SECONDS
 
 
-def _submitted(client: Any, shots: dict[BatchShot, int], task: Task) -> Iterator[tuple[BatchShot, Record]]:
+def _submitted(client: Any, shots: dict[BatchShot, int], task: Task, batch: str) -> Iterator[tuple[BatchShot, Record]]:
     """Give shots to a scheduler and yield each when it has ended; ConnectionError if it forgets them."""
-    client.register_plugin(Stop(), name=client.id)
+    client.register_plugin(Stop(), name=batch)
     by_memory = client.run_on_scheduler(
         lambda dask_scheduler: any(MEMORY in each.resources for each in dask_scheduler.workers.values())
     )
@@ -77,7 +78,7 @@ def _submitted(client: Any, shots: dict[BatchShot, int], task: Task) -> Iterator
         for place, (shot, memory) in enumerate(shots.items()):
             needed = {MEMORY: memory} if by_memory else None
             # without a priority a worker that comes later begins with either of those given within a tenth of a second
-            of[client.submit(work, shot, task, client.id, priority=-place, pure=False, resources=needed)] = shot
+            of[client.submit(work, shot, task, batch, priority=-place, pure=False, resources=needed)] = shot
         for future in distributed.as_completed(list(of), loop=client.loop):
             if future.status in ("cancelled", "lost"):
                 raise ConnectionError("the scheduler forgot the shots")
@@ -91,7 +92,7 @@ def _submitted(client: Any, shots: dict[BatchShot, int], task: Task) -> Iterator
         if client.status == "running":  # else there is nobody to tell; the workers end their tasks then
             with suppress(Exception):
                 client.cancel(list(of))
-                client.unregister_worker_plugin(client.id)
+                client.unregister_worker_plugin(batch)
 
 
 def work(shot: BatchShot, task: Task, batch: str) -> Record:

@@ -25,12 +25,14 @@ img { height: 12em; max-width: 24em; object-fit: contain }
 .done { color: #8fd18f }
 """
 
+_HEADINGS = ("clip and smoke", "shot", "state", "frames", "fit (dB)", "time (s)", "memory (GiB)", "what was said")
+
 
 class Remaining(NamedTuple):
-    """What is left of a shot: how many frames, their seconds, and bytes at the peak.
+    """What is left of a shot: how many frames, their seconds, and bytes at the peak, as measured or foretold.
 
-    The basis is ``"measured"``: from the shot's own frames; ``"scaled"``: as foretold, times what other shots of the
-    batch took over what was foretold of them; or ``"foretold"``, where nothing was measured yet.
+    The basis is ``"measured"``: from the seconds of the shot's own frames; ``"scaled"``: as foretold, times what other
+    shots of the batch took over what was foretold of them; or ``"foretold"``, where nothing was measured yet.
     """
 
     shot: BatchShot
@@ -46,12 +48,13 @@ def remaining_work(records: Mapping[BatchShot, Record]) -> tuple[Remaining, ...]
     foretold = {shot: forecast["seconds"] / max(1, forecast["frames"]) for shot, (forecast, _) in known.items()}
     measured = {shot: fmean(map(work_seconds, frames.values())) for shot, (_, frames) in known.items() if frames}
     ratios = [seconds / foretold[shot] for shot, seconds in measured.items() if foretold[shot] > 0]
+    scale = median(ratios) if ratios else 1.0
     left = []
     for shot, (forecast, frames) in known.items():
         if not is_finished(shot, records[shot]):
             missing = max(0, forecast["frames"] - len(frames))
             basis = "measured" if shot in measured else "scaled" if ratios else "foretold"
-            seconds = missing * measured.get(shot, median(ratios or [1.0]) * foretold[shot])
+            seconds = missing * measured.get(shot, scale * foretold[shot])
             left.append(Remaining(shot, missing, seconds, max(forecast["memory"], records[shot].memory), basis))
     return tuple(sorted(left, key=lambda each: -each.seconds))
 
@@ -69,33 +72,31 @@ def duration(left: Sequence[Remaining], workers: int) -> float:
 
 def write_report(path: Path, title: str, records: Mapping[BatchShot, Record]) -> None:
     """Write the page; OSError if that fails."""
-    cells = [_cells(shot, record) for shot, record in records.items()]
-    heading = "".join(f"<th>{each}</th>" for each in cells[0])
-    rows = "".join(f"<tr>{''.join(f'<td>{each}</td>' for each in row.values())}</tr>\n" for row in cells)
+    rows = "".join(f"<tr>{_cells(shot, record)}</tr>\n" for shot, record in records.items())
     counts = Counter(record.status for record in records.values()).most_common()
-    write_text(
-        path,
+    text = (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         f"<style>{_STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
         f"<p>{counted(len(records), 'shot')}: {', '.join(f'{count} {status}' for status, count in counts)}.</p>\n"
-        f"<table>\n<tr>{heading}</tr>\n{rows}</table>\n</body></html>\n",
+        f"<table>\n<tr>{''.join(f'<th>{each}</th>' for each in _HEADINGS)}</tr>\n{rows}</table>\n</body></html>\n"
     )
+    write_text(path, text)
 
 
-def _cells(shot: BatchShot, record: Record) -> dict[str, str]:
+def _cells(shot: BatchShot, record: Record) -> str:
     index, notes = read_index(shot), "".join(f"<p>{escape(note)}</p>" for note in record.notes)
-    picture, psnr = shot.file("png"), median_psnr(index.frames.values())
+    picture = shot.file("png")
     total = f" of {record.forecast['frames']}" if record.forecast is not None and not index.complete else ""
+    psnr = median_psnr(index.frames.values())
     details = f"<details><summary>{counted(len(record.notes), 'note')}</summary>{notes}</details>" if notes else ""
-    return {
-        "clip and smoke": f'<img alt="clip and reconstruction" src="{quote(picture.name)}">'
-        if picture.exists()
-        else "",
-        "shot": f"<b>{escape(shot.name)}</b><br>{escape(shot.input.name)}<br>{escape(' '.join(shot.options))}",
-        "state": f'<span class="{record.status}">{record.status}</span>',
-        "frames": f"{len(index.frames)}{total}",
-        "fit (dB)": "" if psnr is None else f"{psnr:.1f}",
-        "time (s)": f"{record.seconds:.0f}" if record.seconds else "",
-        "memory (GiB)": f"{record.memory / 2**30:.1f}" if record.memory else "",
-        "what was said": escape(record.sentence) + details,
-    }
+    cells = (
+        f'<img alt="clip and reconstruction" src="{quote(picture.name)}">' if picture.exists() else "",
+        f"<b>{escape(shot.name)}</b><br>{escape(shot.input.name)}<br>{escape(' '.join(shot.options))}",
+        f'<span class="{record.status}">{record.status}</span>',
+        f"{len(index.frames)}{total}",
+        "" if psnr is None else f"{psnr:.1f}",
+        f"{record.seconds:.0f}" if record.seconds else "",
+        f"{record.memory / 2**30:.1f}" if record.memory else "",
+        escape(record.sentence) + details,
+    )
+    return "".join(f"<td>{cell}</td>" for cell in cells)

@@ -77,8 +77,8 @@ ShotMemory = Sequence[tuple[BatchShot, int]]
 def read_record(shot: BatchShot) -> Record:
     """Return the record of a shot as it is now listed; a new one if its options, input or mask have changed."""
     of: dict[str, Any] = {"options": list(shot.options), "files": []}
-    masks = [Path(word.removeprefix("--mask=")) for word in shot.options if word.startswith("--mask=")]
-    for path in (shot.input, *masks):
+    masks = [word.removeprefix("--mask=") for word in shot.options if word.startswith("--mask=")]
+    for path in (shot.input, *map(Path, masks)):
         with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
             of["files"].append([path.stat().st_size, path.stat().st_mtime_ns])
     with suppress(OSError, ValueError, TypeError):  # a damaged record is none
@@ -90,9 +90,10 @@ def read_record(shot: BatchShot) -> Record:
 
 def read_index(shot: BatchShot) -> Index:
     """Return what the sequence of a shot says of its finished frames; of none if there is no sequence."""
-    with suppress(SequenceError):
+    try:
         return Index.read(shot.directory)
-    return Index({}, {})
+    except SequenceError:
+        return Index({}, {})
 
 
 def is_finished(shot: BatchShot, record: Record) -> bool:
@@ -110,12 +111,13 @@ def inspect_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] =
     try:
         shot.folder.mkdir(parents=True, exist_ok=True)
         ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine)
-        if ended.status == "done":
-            ended = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
-            ended.write(shot)
-        return ended
+        if ended.status != "done":
+            return ended
+        record = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
+        record.write(shot)
     except OSError as error:  # the storage itself
-        return replace(record, status="stuck", sentence=str(error))
+        return replace(record, status="stuck", sentence=str(error), forecast=None)
+    return record
 
 
 def finish_shot(
@@ -134,7 +136,7 @@ def finish_shot(
     while True:
         try:
             record = _reconstruct(shot, stop, engine)
-        except OSError as error:
+        except OSError as error:  # the storage itself
             record = replace(read_record(shot), status="stuck", sentence=str(error))
         if stop.is_set() and record.status != "done":
             return replace(record, status="cancelled", sentence="Cancelled; finished frames stay.")
@@ -173,11 +175,12 @@ def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterat
 
 
 def _reconstruct(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> Record:
-    """Run the engine once; OSError if another batch does, or the storage fails."""
+    """Run the engine once, if nobody else does."""
     shot.folder.mkdir(parents=True, exist_ok=True)
     lock = Lock(shot.folder / f".{shot.name}.lock")
     if not lock.acquire():
-        raise OSError(f"{shot.directory}: another batch is at work on this shot.")
+        sentence = f"{shot.directory}: another batch is at work on this shot."
+        return replace(read_record(shot), status="stuck", sentence=sentence)
     try:
         record = read_record(shot)
         if not (is_finished(shot, record) or stop.is_set()):
@@ -198,46 +201,55 @@ def _run(
 
     All that the engine says is appended to the shot's log; what does not fit on the disk is left out.
     """
-    began, peak, notes = time.monotonic(), record.memory, list[str]()
-    message, last_words = dict[str, Any](), "it said nothing"
+    began, peak = time.monotonic(), [record.memory]
+    notes: list[str] = []
+    message, last_words = {"text": ""}, "it said nothing"
     command, pipe = [*engine, *words, "--progress", "json"], subprocess.PIPE
     with (
         shot.file("log").open("ab", buffering=0) as log,
         subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT) as process,
     ):
-
-        def watch() -> None:
-            nonlocal peak
-            while process.poll() is None:
-                with suppress(psutil.Error):  # it has ended already
-                    peak = max(peak, psutil.Process(process.pid).memory_info().rss)
-                if stop.wait(POLL_SECONDS) and process.stdin:
-                    with suppress(OSError, subprocess.TimeoutExpired):
-                        process.stdin.close()
-                        process.wait(GRACE_SECONDS)
-                    process.kill()
-
-        threading.Thread(target=watch, daemon=True).start()
-        for line in process.stdout or ():
-            with suppress(OSError):
-                log.write(line)
-            text = line.decode("utf-8", "replace").strip()
-            try:
-                said = json.loads(text)
-                if said["event"] == "note":
+        threading.Thread(target=_watch, args=(process, stop, peak), daemon=True).start()
+        try:
+            for line in process.stdout or ():
+                with suppress(OSError):
+                    log.write(line)
+                text = line.decode("utf-8", "replace").strip()
+                try:
+                    said = json.loads(text)
+                    event = said["event"]
+                except (ValueError, LookupError, TypeError):
+                    last_words = text or last_words
+                    continue
+                if event == "note":
                     notes.append(said["text"])
-                elif said["event"] in ("done", "error"):
+                elif event in ("done", "error"):
                     message = said
-            except (ValueError, LookupError, TypeError):
-                last_words = text or last_words
-        code = process.wait()
+            code = process.wait()
+        finally:
+            process.kill()  # nothing, unless we are interrupted ourselves
+    status = _STATUS.get(code, "crashed")
+    if message.get("later") and status not in ("done", "cancelled"):
+        status = "stuck"
     how = f"signal {-code}" if code < 0 else f"status {code}"
     ended = replace(
         record,
-        status="stuck" if message.get("later") else _STATUS.get(code, "crashed"),
-        sentence=message.get("text") or f"The engine ended by itself ({how}): {last_words}",
+        status=status,
+        sentence=message["text"] or f"The engine ended by itself ({how}): {last_words}",
         notes=notes or record.notes,
         seconds=record.seconds + time.monotonic() - began,
-        memory=peak,
+        memory=peak[0],
     )
     return ended, message
+
+
+def _watch(process: subprocess.Popen[bytes], stop: threading.Event, peak: list[int]) -> None:
+    """Measure the memory of a process, and end it when that is asked."""
+    while process.poll() is None:
+        with suppress(psutil.Error):  # it has ended already
+            peak[0] = max(peak[0], psutil.Process(process.pid).memory_info().rss)
+        if stop.wait(POLL_SECONDS) and process.stdin is not None:
+            with suppress(OSError, subprocess.TimeoutExpired):
+                process.stdin.close()
+                process.wait(GRACE_SECONDS)
+            process.kill()
