@@ -8,9 +8,9 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
 - Smoke moves every background towards its own brightness. So of several such values, the one farthest from the smoke's
   is the background.
 
-A pixel that only drifts is clear as well if it is like its surroundings but for as much, or so unlike them that smoke
-would change it more. All else is continued smoothly from around it; its detail is that of the frames' mean, and the
-contrast that smoke takes from that is restored. The error is measured where the background is known.
+A pixel that only drifts is clear as well if it differs from its surroundings by no more than a codec's drift, or by so
+much that smoke would change it more. All else is continued smoothly from around it; its detail is that of the frames'
+mean, and the contrast that smoke takes from that is restored. The error is measured where the background is known.
 
 Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
 whole frames.
@@ -134,7 +134,7 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
         unlike = np.abs(_unlike(image, known).mean(-1))
         known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * unlike >= window + DRIFT)))
-        # or if no channel differs from them by more: smoke hardly changes a background of its own color
+        # or if no channel differs from them by more than a drift: smoke hardly changes a background of its own color
         unlike = brightest_channel(np.abs(_unlike(image, known)))
         known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))

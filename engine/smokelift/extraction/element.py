@@ -92,8 +92,8 @@ HUE = 2 * MODEL_ERROR
 off by the model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
 
 SOURCE_FACTOR = 2.0
-"""Standard deviation of a source radiance that is found before a smooth plate, as a factor: an element takes it within
-that."""
+"""Standard deviation, as a factor, of a source radiance that is found before a smooth plate: `extract_element` asks for
+no better one."""
 
 CHROMA_BASIS = np.array([[1.5**0.5, 0.5**0.5], [0, -(2**0.5)], [-(1.5**0.5), 0.5**0.5]], np.float32)
 """Two components of chroma by channel, as in `cpp/extraction.cpp` (by definition)."""
@@ -192,17 +192,17 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
         found = np.maximum(total / max(squares, 1e-12), 0)
         brightness = max(float(found.mean()), MIN_SOURCE)
         source = np.asarray(np.maximum(found, MIN_CHROMA * brightness), np.float32)
-    if any(_has_detail(plate.image) for _, plate in pictures):
+    if any(_has_detail(cells.behind) for cells in seen):
         return source
-    return _palest(source, behind / max(squares, 1e-12))
+    return _nearest_to_white(source, behind / max(squares, 1e-12))
 
 
-def _palest(source: Picture, behind: Picture) -> Picture:
+def _nearest_to_white(source: Picture, behind: Picture) -> Picture:
     """The likeliest source radiance (3,) on the line of colors from what is ``behind`` (3,) through one that was found.
 
-    Before a smooth plate thinner smoke of a color farther along that line looks the same. Light is mostly white,
-    within `HUE` (a Cauchy distribution, which lets colored smoke be), and the source within `SOURCE_FACTOR` of the one
-    that was found.
+    Before a smooth plate thinner smoke of a color farther along that line looks the same. Light is mostly white: its
+    hue has a Cauchy distribution of width `HUE`, whose tails leave colored smoke as it is. The distance along the line
+    has a log-normal one of width `SOURCE_FACTOR`.
     """
     times = np.geomspace(1 / SOURCE_FACTOR, SOURCE_FACTOR, 65)
     line = behind + times[:, None] * (source - behind)

@@ -162,20 +162,21 @@ def _density(
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     if views is None:
-        return _unseen(shot.optics.domain, _carried(before, predicted, shot)[0]), {}
+        carried = _carried(before, predicted, shot)
+        return _unseen(shot.optics.domain, None if carried is None else carried[0]), {}
     depth = method.depth_prior.estimate(views)
-    carried, smooth = _carried(before, predicted, shot)
+    carried = _carried(before, predicted, shot)
     initial: Volume | None = None
     unseen: tuple[Volume, Volume] | None = None
     figures: Mapping[str, float] = {}
-    if carried is not None and smooth is not None:
-        start = method.temporal_prior.start(depth.views, depth, carried, smooth)
+    if carried is not None:
+        start = method.temporal_prior.start(depth.views, depth, *carried)
         initial, figures = start.density, start.figures
         # what a moving camera does not see now it may have seen before
-        unseen = (carried, smooth) if shot.moves else None
+        unseen = carried if shot.moves else None
         del start
     priors, starts = [depth], [initial]
-    del carried, smooth, depth, initial  # the fit needs the memory, and frees what it has read unless others hold it
+    del carried, depth, initial  # the fit needs the memory, and frees what it has read unless others hold it
     fitted = method.density_fit.fit(views, priors.pop(), starts.pop())
     if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
@@ -186,10 +187,10 @@ def _density(
     return fitted, figures
 
 
-def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> tuple[Volume, Volume] | tuple[None, None]:
+def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> tuple[Volume, Volume] | None:
     """The density of the frame before and its smooth answer, carried along; None where there is no prediction."""
     if before is None or predicted is None:
-        return None, None
+        return None
     density = before.density if before.steady is None else before.steady
     # what a moving camera does not see no picture corrects, so that its mass has to be kept
     dt, h = 1.0 / shot.clip.fps, shot.optics.domain.voxel_size

@@ -7,6 +7,7 @@ import pytest
 
 from smokelift.extraction.matte import matte
 from smokelift.footage.images import linear_to_srgb
+from smokelift.setup.first_estimate import first_estimate
 from tests.engine.films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
 
@@ -22,17 +23,19 @@ def test_plate_and_matte(tmp_path: Path, low: float, high: float, color: float) 
     assert plate.image.shape == truth.shape
     assert plate.confidence.shape == truth.shape[:2]
     assert plate.confidence.mean() > 0.85
+    assert np.percentile(codes_apart(plate.image, truth)[plate.confidence == 1], 95) < 5.0
+    # what smoke of the wall's own brightness leaves unknown is found in turn with it
+    plate = first_estimate(clip, None, None).plate
     apart = codes_apart(plate.image, truth)
     assert np.median(apart) < 0.7
-    assert np.percentile(apart[plate.confidence == 1], 95) < 5.0
+    assert np.percentile(apart, 95) < 5.0
     for n in (4, 12, 20):
         result = matte(clip.frame(n), plate)
         contrast = puff(n) * np.abs(linear_to_srgb(truth) - linear_to_srgb(color)).mean(axis=2) * 255
         assert result.deviation.dtype == np.float32
         assert result.mask[contrast > 12].mean() > 0.95
-        empty = (puff(n) == 0.0) & (plate.confidence == 1)
-        assert result.mask[empty].mean() < 0.08
-        assert np.median(result.deviation[empty]) < 1.5
+        assert result.mask[puff(n) == 0.0].mean() < 0.08
+        assert np.median(result.deviation[puff(n) == 0.0]) < 1.5
 
 
 def test_noise_is_measured(tmp_path: Path) -> None:
