@@ -242,6 +242,8 @@ def _of_one_color(clip: Clip, proxy: Proxy, color: Picture, objects: Mask, white
         limit = MAX_DEVIATION * noise.averaged(proxy.scale**2).total
         clear[:, objects] = within(proxy.encoded[:, objects] - linear_to_srgb(own), limit)
         known = np.ones(objects.shape, np.bool_)
-        picture = whole_plate(clip, proxy, ClearPicture(image, known, clear, known.astype(np.float32)))
+        picture = whole_plate(
+            clip, proxy, ClearPicture(image, known, clear, known.astype(np.float32), np.zeros_like(image))
+        )
         whole = np.where(spread_out(objects, clip.size)[..., None], picture, whole)
     return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)

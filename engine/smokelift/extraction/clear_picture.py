@@ -5,12 +5,15 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
 - A clear pixel stays; smoke goes on. How often two successive frames of smoke are alike by chance is measured on the
   pixel. If smoke would keep a value for so many pairs of frames with a probability below `FALSE_ALARM` only, that value
   is the pixel's background, or smoke as steady as one.
-- Smoke moves every background towards its own brightness. So of several such values, the one farthest from the smoke's
-  is the background.
+- Smoke moves every background towards its own color. So of several such values, the one farthest from the smoke's is
+  the background. The value is that of the channels' mean, with the weights that smoke changes most: gray smoke before a
+  wall of its own brightness changes the wall's hue alone.
 
 A pixel that only drifts is clear as well if it differs from its surroundings by no more than a codec's drift, or by so
-much that smoke would change it more. All else is continued smoothly from around it; its detail is that of the frames'
-mean, and the contrast that smoke takes from that is restored. The error is measured where the background is known.
+much that smoke would change it more. Its clearest moment may still hold some smoke, so before a smooth wall it counts
+less than what is continued from pixels that never change. All else is continued smoothly from around it; its detail is
+that of the frames' mean, and the contrast that smoke takes from that is restored. The error is measured where the
+background is known.
 
 Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
 whole frames.
@@ -32,11 +35,10 @@ from smokelift.footage.images import (
     area_average,
     blurred,
     brightest_channel,
-    channel_mean,
     linear_to_srgb,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import ISLAND, in_one_piece, mostly_beside, push_pull
+from smokelift.footage.inpainting import ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
 from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
@@ -83,6 +85,9 @@ MIN_CONTRAST = 0.02
 """Smallest difference of the background from the smoke's brightness, in sRGB values, at which a mean tells how much of
 it passes: noise and codecs change a mean by a code or two."""
 
+MAX_CORRECTION = 3.0
+"""Standard deviations of that, and of what is continued, beyond which a difference between them is an object's."""
+
 STEP = 2
 """One in so many examined frames is read at full size."""
 
@@ -96,13 +101,14 @@ class ClearPicture:
 
     ``known`` (rows, columns) are the pixels that some pictures show without smoke, ``clear`` (frames, rows, columns)
     says where each picture does. ``contrast`` (rows, columns) is the factor that makes the detail of the pictures' mean
-    the background's, 0 where smoke hides it.
+    the background's, 0 where smoke hides it. ``correction`` (rows, columns, 3) is what was added to what they show.
     """
 
     image: Picture
     known: Mask
     clear: Mask
     contrast: Picture
+    correction: Picture
 
 
 def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
@@ -112,24 +118,25 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
     """
     width = smoothing(noise)
     pictures, seen = proxy.pictures, proxy.seen
-    gray = np.stack([blurred(channel_mean(encoded), width) for encoded in proxy.encoded])
-    gray[~seen] = np.nan
-    some = np.ascontiguousarray(gray[:, ::STRIDE, ::STRIDE])
+    weights = _most_changed(proxy.encoded[:, ::STRIDE, ::STRIDE], seen[:, ::STRIDE, ::STRIDE])
+    values = np.stack([blurred(encoded @ weights, width) for encoded in proxy.encoded])
+    values[~seen] = np.nan
+    some = np.ascontiguousarray(values[:, ::STRIDE, ::STRIDE])
     window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
     similarity, brightness, brightens = _smoke_of(some, window)
-    height, across = gray.shape[1:]
+    height, across = values.shape[1:]
     brightens = np.repeat(np.repeat(brightens, STRIDE, 0), STRIDE, 1)[:height, :across]
-    gray *= np.where(brightens, np.float32(1), np.float32(-1))
-    image = np.empty((height, across, 3), np.float32)
-    known, calm = np.empty((2, height, across), np.bool_)
-    clear = np.empty(gray.shape, np.bool_)
+    values *= np.where(brightens, np.float32(1), np.float32(-1))
+    image, change = np.empty((height, across, 3), np.float32), np.empty((height, across), np.float32)
+    known = np.empty((height, across), np.bool_)
+    clear = np.empty(values.shape, np.bool_)
     rows = max(1, BAND // across)
     for row in range(0, height, rows):
         band = slice(row, row + rows)
-        image[band], known[band], calm[band], clear[:, band] = _clear_values(
-            pictures[:, band], gray[:, band], window, similarity
+        image[band], known[band], change[band], clear[:, band] = _clear_values(
+            pictures[:, band], values[:, band], window, similarity
         )
-    known = in_one_piece(known)
+    known, calm = in_one_piece(known), change <= window + DRIFT
     if not known.all():
         # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
         unlike = np.abs(_unlike(image, known).mean(-1))
@@ -144,8 +151,39 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         known &= ~never
         mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
-    whole, contrast = _completed(image, known, mean, brightness, brightens, detail)
-    return ClearPicture(whole, known, clear, contrast)
+    smoke = window * (1 - (clear & seen).sum(0) / np.maximum(seen.sum(0), 1))
+    correction = _correction(image, known, in_one_piece(known & (change <= window)), weights, smoke)
+    whole, contrast = _completed(image + correction, known, mean, brightness, brightens, detail, weights)
+    return ClearPicture(whole, known, clear, contrast, correction)
+
+
+def _most_changed(encoded: Picture, seen: Mask) -> Picture:
+    """The weights (3,) of the channels, of a sum of 1 but for signs, whose mean changes most over time.
+
+    ``encoded`` are pictures (frames, rows, columns, 3) in sRGB values. A change counts the same from a codec's drift
+    on, since faint smoke is what is hard to see.
+    """
+    away = (encoded - np.median(encoded, axis=0))[seen].astype(np.float64)
+    away /= np.hypot(np.linalg.norm(away, axis=-1, keepdims=True), DRIFT)
+    first = np.linalg.eigh(1 + away.T @ away)[1][:, -1]  # gray if nothing changes
+    return np.asarray(np.copysign(1, first.sum()) * first / np.abs(first).sum(), np.float32)
+
+
+def _correction(image: Picture, known: Mask, steady: Mask, weights: Picture, smoke: Picture) -> Picture:
+    """What takes the last smoke from a linear background where it is ``known`` but not ``steady``.
+
+    Its clear moments and what is continued from the steady pixels are two measurements of it: the first is off by as
+    much ``smoke`` (rows, columns) as may be in it, the second by as much as where parts of the steady ones are left
+    out.
+    """
+    encoded = linear_to_srgb(image)
+    errors = [((continued - encoded) @ weights)[part] for continued, part in left_out_parts(encoded, steady)]
+    if not errors:
+        return np.zeros_like(image)
+    away = push_pull(encoded, steady.astype(np.float32)) - encoded
+    total = np.square(smoke) + np.square(np.concatenate(errors)).mean()
+    likely = known & ~steady & (np.square(away @ weights) < MAX_CORRECTION**2 * total)
+    return srgb_to_linear(encoded + np.where(likely, np.square(smoke) / total, 0)[..., None] * away) - image
 
 
 def _unlike(image: Picture, known: Mask) -> Picture:
@@ -154,14 +192,14 @@ def _unlike(image: Picture, known: Mask) -> Picture:
     return encoded - push_pull(encoded, known.astype(np.float32))
 
 
-def _smoke_of(gray: Picture, window: float) -> tuple[float, float, Mask]:
-    """Return the similarity of smoke in gray pictures (frames, rows, columns), its brightness, and where it brightens.
+def _smoke_of(pictures: Picture, window: float) -> tuple[float, float, Mask]:
+    """Return the similarity of smoke in values (frames, rows, columns) over time, its own, and where it raises them.
 
-    Its similarity is the fraction of pairs of successive frames of smoke that are alike within a window. Its brightness
-    is the value that it moves every background towards; it brightens pixels of a darker background.
+    Its similarity is the fraction of pairs of successive frames of smoke that are alike within a window. Its own value,
+    its brightness, is that which it moves every background towards; it brightens pixels of a darker background.
     """
-    shape = gray.shape[1:]
-    values = gray.reshape(len(gray), -1)
+    shape = pictures.shape[1:]
+    values = pictures.reshape(len(pictures), -1)
     ordered = np.sort(values, axis=0)
     counts = np.ones(ordered.shape, np.int16)  # values from each one up to a window above it
     for lag in range(1, len(ordered)):
@@ -193,7 +231,7 @@ def _smoke_of(gray: Picture, window: float) -> tuple[float, float, Mask]:
 
 
 def _turn(background: Picture, change: Picture) -> float:
-    """The gray value below which changes (frames, n) brighten backgrounds (n,), and above which they darken them."""
+    """The value below which changes (frames, n) brighten backgrounds (n,), and above which they darken them."""
     brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
     one_sided = ONE_SIDED * float((brighter + darker).sum())
     if brighter.sum() >= one_sided:
@@ -208,11 +246,11 @@ def _turn(background: Picture, change: Picture) -> float:
 
 def _clear_values(
     pictures: Picture, away: Picture, window: float, similarity: float
-) -> tuple[Picture, Mask, Mask, Mask]:
-    """The linear background of each pixel; whether it is certain; whether it only drifts; the frames that show it.
+) -> tuple[Picture, Mask, Picture, Mask]:
+    """The linear background of each pixel; whether it is certain; how far it changes; the frames that show it.
 
     An uncertain background is the least smoky value; that of a drifting pixel is the median. ``away`` is the pictures'
-    gray value, negated where smoke darkens: the lower, the clearer.
+    value, negated where smoke darkens: the lower, the clearer.
     """
     unseen, number = np.isnan(away), count_of_seen(away)
     alike = (np.abs(np.diff(away, axis=0)) <= window).sum(0)
@@ -220,7 +258,7 @@ def _clear_values(
     ordered, last = np.sort(away, axis=0), np.maximum(number - 1, 0)
     # one value may be an outlier
     lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
-    calm = highest - lowest <= window + DRIFT
+    change = highest - lowest
     often = number >= MIN_SEEN_FRACTION * len(away)
     best = np.full(away.shape[1:], np.inf, np.float32)
     for value in away:
@@ -234,13 +272,13 @@ def _clear_values(
         np.copyto(best, value, where=certain & (value < best))
     known = np.isfinite(best)
     center = np.where(known, best, lowest) + np.float32(0.5 * window)
-    center = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), center)
+    center = np.where(change <= window + DRIFT, at_rank(ordered, np.minimum(number // 2, last)), center)
     for _ in range(3):  # mean shift settles the window around the mean of its values
         inside = np.abs(away - center) <= 0.5 * window * 1.001
         within = np.maximum(inside.sum(0), 1)
         center = np.where(inside, away, 0).sum(axis=0) / within
     value = np.einsum("tyxc,tyx->yxc", pictures, inside.astype(np.float32)) / within[..., None]
-    return value.astype(np.float32), known, calm, inside
+    return value.astype(np.float32), known, change, inside
 
 
 def _completed(
@@ -250,6 +288,7 @@ def _completed(
     brightness: float,
     brightens: Mask,
     finer_than: float,
+    weights: Picture,
 ) -> tuple[Picture, Picture]:
     """Return a linear plate with the unknown filled in, and the ``contrast`` of `ClearPicture`.
 
@@ -261,17 +300,18 @@ def _completed(
         return image, np.ones(known.shape, np.float32)
     smooth = push_pull(linear_to_srgb(image), known.astype(np.float32))
     coarse = blurred(mean, finer_than)
-    contrast = smooth.mean(-1) - brightness
-    seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > MIN_CONTRAST, contrast, np.inf)
+    contrast = smooth @ weights - brightness
+    seen = (coarse @ weights - brightness) / np.where(np.abs(contrast) > MIN_CONTRAST, contrast, np.inf)
     detail = mean - coarse
     most = _most_detail(detail, known)
     passed = np.clip(seen, MIN_TRANSMITTANCE, 1)
     detail = np.clip(detail / passed[..., None], -most, most)
     filled = smooth + np.where(seen > MIN_TRANSMITTANCE, 1, 0)[..., None] * detail
     # smoke moves a pixel towards its own brightness, never away from it
-    beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
+    beyond = (filled - linear_to_srgb(image)) @ weights
     beyond -= np.clip(beyond, -DRIFT, DRIFT)
-    filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
+    beyond = np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))
+    filled -= beyond[..., None] * weights / (weights @ weights)
     filled = srgb_to_linear(np.maximum(filled, 0))
     contrast = np.where(known, 1, np.where(seen > MIN_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
     return np.where(known[..., None], image, filled), contrast
@@ -289,6 +329,7 @@ def whole_plate(clip: Clip, proxy: Proxy, found: ClearPicture) -> Picture:
     shown = (found.clear & found.known)[::STEP]
     known = shown.any(0)
     whole = _mean(clip, proxy.numbers[::STEP], proxy.gains[::STEP], np.where(known, shown, True))
+    whole += area_average(found.correction, *clip.size)
     if known.all():
         return whole
     rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))

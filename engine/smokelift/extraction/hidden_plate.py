@@ -6,8 +6,9 @@ them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T, and i
 above and below it, or on its sides, unless it is an object there. Its detail is that of one of the frames, and what
 smoke leaves of it in the others has to be T times as strong. Then what an element leaves of a picture,
 (I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to the last shows
-next to nothing, and what is behind it stays as it was. Of the J that is found before the turns and the one found after
-them, that with which the frames are likelier is the smoke's.
+next to nothing, and what is behind it stays as it was. J is first what
+brightens the plate most, or what is found before the plate as it is, whichever makes the frames likelier. It is found
+again from the plate that the turns end with, and the plate with it, as long as the frames become likelier still.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,11 +26,14 @@ from smokelift.extraction.element import (
     MIN_VARIANCE,
     OUTLIER_FREEDOM,
     Cells,
-    clip_source,
     extracted,
+    first_source,
+    source_cells,
+    source_in,
     source_of,
+    source_size,
 )
-from smokelift.extraction.plate import Plate
+from smokelift.extraction.plate import Plate, resized
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, reduced_size
 from smokelift.footage.noise import EIGHT_BIT_STEP
@@ -37,6 +41,10 @@ from smokelift.footage.noise import EIGHT_BIT_STEP
 FRAMES, SIDE, TURNS = 8, 96, 4
 """Frames that are extracted, cells along their longer side, and turns. More frames and turns change T rms by .001,
 twice the cells by .004 and .01, for four times the time (docs/experiments/hidden-plate.md)."""
+
+SOURCES, MAX_LOSS_RATIO = 6, 0.99
+"""Most J that are found in turn, each from the plate of the one before, and the loss of the next over the one before
+at which it is worth its turns (docs/experiments/hidden-plate.md)."""
 
 RANGE = 0.005, 0.995
 """Quantiles of each channel of what is known of a plate, between which the rest of it is."""
@@ -70,66 +78,95 @@ CLEAR_TRANSMITTANCE = 0.02
 def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int]) -> tuple[Plate, Picture]:
     """Return the plate of a clip, better known if it was found in its ``shot``, and its smoke's source radiance.
 
-    Both clips are at the plate's exposure; ``smoky`` are the frames of `clip_source`.
+    Both clips are at the plate's exposure; ``smoky`` are frames of the clip, those with the most smoke first.
     """
-    source = clip_source(clip, plate, smoky)
-    if plate.images is not None:
-        return plate, source
-    better, loss = plate_in_turn(shot, plate, source)
-    if better is plate:
-        return plate, source
-    after = clip_source(clip, better, smoky)
-    # a plate that holds bright smoke makes what it leaves look like dark smoke
-    return better, source if loss <= _likeliest(*_shrunk(shot, plate), after).loss else after
+    seen = source_cells(clip, plate, smoky)
+    if plate.images is not None or is_known(plate):
+        return plate, source_in(seen)
+    frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip))
+    start = min((likeliest(frames, source) for source in (first_source(seen), source_in(seen))), key=lambda of: of.loss)
+    turned = in_turn(frames, start)
+    for _ in range(SOURCES):
+        start = likeliest(frames, source_in(source_cells(clip, frames.with_plate(small, turned), smoky)))
+        if start.loss > MAX_LOSS_RATIO * turned.start.loss:
+            break
+        turned = in_turn(frames, start)
+    return frames.with_plate(plate, turned), turned.start.source
 
 
-def plate_in_turn(clip: Clip, plate: Plate, source: Picture) -> tuple[Plate, float]:
-    """Return a plate that is better known where its confidence is less than 1, and the mean loss of the first turn.
-
-    ``clip`` is at the plate's exposure. ``source`` (3,) is the usual source radiance of its smoke.
-    """
-    if (1 - plate.confidence).mean() < MIN_UNKNOWN or not plate.errors.any():
-        return plate, 0.0
-    pictures, first, size = _shrunk(clip, plate)
-    variance = float(np.trace(plate.errors)) / 3
-    start = _likeliest(pictures, first, size, source)
-    first = _with_detail(first, start.detail, pictures.__getitem__)
-    behind = area_average(first.image, *size)
-    found = replace(first, image=_changed(first, start.image - behind))
-    for _ in range(TURNS):
-        best, clearest = np.zeros_like(behind[..., :1]), start.image
-        for picture in pictures:
-            shown, weight = _shown(Cells.of(picture, found, size), source)
-            # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
-            best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
-        left = 1 / (1 + variance * best)
-        change = start.image + (1 - left) * (clearest - start.image) - behind
-        found = replace(first, image=_changed(first, change))
-    frames = clip.spread(FRAMES)
-    plate = _with_detail(plate, start.detail, lambda each: clip.stored(frames[each]).averaged(*clip.size))
-    confidence = 1 - (1 - plate.confidence) * area_average(left[..., 0], *clip.size)
-    return replace(plate, image=_changed(plate, change), confidence=confidence), start.loss
-
-
-def _shrunk(clip: Clip, plate: Plate) -> tuple[list[Picture], Plate, tuple[int, int]]:
-    """Some frames of a clip and its plate, some pixels to a cell, and the numbers of columns and rows of cells."""
-    size = reduced_size(*clip.size, SIDE)
-    finer = [min(round(FINER * cells), pixels) for cells, pixels in zip(size, clip.size, strict=True)]
-    pixels = clip.size[0] * clip.size[1] / (finer[0] * finer[1])
-    pictures = [clip.stored(frame).averaged(*finer) for frame in clip.spread(FRAMES)]
-    return pictures, plate.through(lambda part: area_average(part, *finer), pixels), size
+def is_known(plate: Plate) -> bool:
+    """Whether a plate is known all over, or nothing is known of its errors: turns do not change it."""
+    return bool((1 - plate.confidence).mean() < MIN_UNKNOWN or not plate.errors.any())
 
 
 @dataclass(frozen=True, eq=False)
-class _Start:
-    """The plate by cell (rows, columns, 3) that turns start from, and its mean loss.
+class Start:
+    """The plate by cell (rows, columns, 3) that turns start from, with a source radiance (3,), and its mean loss.
 
     ``detail`` has a factor (rows, columns) for each frame: 1 / T where the plate has its detail, seen through smoke.
     """
 
     image: Picture
+    source: Picture
     loss: float
     detail: list[Picture]
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """What the turns change of a plate by cell (rows, columns, 3), and how much of it is ``left`` unknown."""
+
+    start: Start
+    change: Picture
+    left: Picture
+
+
+@dataclass(frozen=True, eq=False)
+class SomeFrames:
+    """Some frames of a clip and its plate, of some pixels to a cell.
+
+    ``cells`` are the numbers of columns and rows of cells.
+    """
+
+    clip: Clip
+    numbers: Sequence[int]
+    pictures: Sequence[Picture]
+    plate: Plate
+    cells: tuple[int, int]
+
+    @staticmethod
+    def of(clip: Clip, plate: Plate) -> "SomeFrames":
+        """Read the frames of a clip at its plate's exposure."""
+        cells, numbers = reduced_size(*clip.size, SIDE), clip.spread(FRAMES)
+        columns, rows = (min(round(FINER * count), of) for count, of in zip(cells, clip.size, strict=True))
+        pictures = [clip.stored(frame).averaged(columns, rows) for frame in numbers]
+        return SomeFrames(clip, numbers, pictures, resized(plate, (columns, rows)), cells)
+
+    def with_plate(self, plate: Plate, turned: Turned) -> Plate:
+        """Return a plate of any size as it is after the turns: better known where its confidence is less than 1."""
+        size = plate.image.shape[1], plate.image.shape[0]
+        detail = turned.start.detail
+        plate = _with_detail(plate, detail, lambda each: self.clip.stored(self.numbers[each]).averaged(*size))
+        confidence = 1 - (1 - plate.confidence) * area_average(turned.left[..., 0], *size)
+        return replace(plate, image=_changed(plate, turned.change), confidence=confidence)
+
+
+def in_turn(frames: SomeFrames, start: Start) -> Turned:
+    """Change a plate and extract the smoke before it in turn."""
+    variance = float(np.trace(frames.plate.errors)) / 3
+    first = _with_detail(frames.plate, start.detail, frames.pictures.__getitem__)
+    behind = area_average(first.image, *frames.cells)
+    found = replace(first, image=_changed(first, start.image - behind))
+    for _ in range(TURNS):
+        best, clearest = np.zeros_like(behind[..., :1]), start.image
+        for picture in frames.pictures:
+            shown, weight = _shown(Cells.of(picture, found, frames.cells), start.source)
+            # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
+            best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
+        left = 1 / (1 + variance * best)
+        change = start.image + (1 - left) * (clearest - start.image) - behind
+        found = replace(first, image=_changed(first, change))
+    return Turned(start, change, left)
 
 
 class _Hypothesis(NamedTuple):
@@ -141,20 +178,21 @@ class _Hypothesis(NamedTuple):
     clear: float = 1.0
 
 
-def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int], source: Picture) -> _Start:
-    """The plate that best explains all frames as mixtures, beside its continuations.
+def likeliest(frames: SomeFrames, source: Picture) -> Start:
+    """Return the plate that best explains all frames as mixtures with smoke of a source radiance (3,).
 
     A frame's loss is that of the noise's Student t distribution at the likeliest T. The brightness of J varies by
     `BRIGHTNESS_RANGE`, and so does that of S = (1 - T) J; neither has detail. Where a frame is clear it is clear around
     there as well, so neighbors decide together.
     """
-    frames = [Cells.of(picture, plate, size) for picture in pictures]
-    start = frames[0].behind
-    where = frames[0].unknown > MIN_UNKNOWN
+    pictures, plate, size = frames.pictures, frames.plate, frames.cells
+    shown = [Cells.of(picture, plate, size) for picture in pictures]
+    start = shown[0].behind
+    where = shown[0].unknown > MIN_UNKNOWN
     continued = _continuations(start, ~where)
     expected = continued[:, where]
     low, high = _range_of(plate)
-    seen = [(cells.seen[where].astype(np.float64), cells.noise[where].mean(-1, dtype=np.float64)) for cells in frames]
+    seen = [(cells.seen[where].astype(np.float64), cells.noise[where].mean(-1, dtype=np.float64)) for cells in shown]
     nearby = blurred(where.astype(np.float32), NEIGHBORHOOD)[where]
 
     def around(values: Picture) -> Picture:
@@ -169,7 +207,7 @@ def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int],
     coarse = [area_average(detail, *size)[where] for detail in details]
     hypotheses = _hypotheses([values for values, _ in seen], coarse, continued, where, source, (low, high))
     # no detail is likely that is stronger than that of the known plate
-    known = np.maximum(1 - frames[0].unknown, MIN_VARIANCE)
+    known = np.maximum(1 - shown[0].unknown, MIN_VARIANCE)
     usual = np.average(area_average(np.square(details[-1]).mean(-1), *size), weights=known) + MIN_VARIANCE
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
@@ -192,7 +230,7 @@ def _likeliest(pictures: Sequence[Picture], plate: Plate, size: tuple[int, int],
         image[taken] = hypothesis.color[best == index]
         if hypothesis.frame >= 0:
             factors[hypothesis.frame][taken] = 1 / hypothesis.clear
-    return _Start(image, float(least.mean()), list(factors))
+    return Start(image, source, float(least.mean()), list(factors))
 
 
 def _hypotheses(

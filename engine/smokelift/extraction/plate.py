@@ -91,6 +91,12 @@ class Plate:
         return small(self.image)
 
 
+def resized(plate: Plate, size: tuple[int, int]) -> Plate:
+    """Return a plate reduced to a size (columns, rows)."""
+    columns, rows = plate.image.shape[1::-1]
+    return plate.through(lambda part: area_average(part, *size), columns * rows / (size[0] * size[1]))
+
+
 def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = False) -> tuple[Plate, Clip]:
     """Return the plate, with the clip's noise, of a known background, and the clip at its exposure.
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.extraction.hidden_plate import plate_in_turn
+from smokelift.extraction.hidden_plate import SomeFrames, in_turn, is_known, likeliest
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture, area_average, blurred
 from smokelift.footage.noise import EIGHT_BIT_NOISE
@@ -16,7 +16,7 @@ X, Y = np.meshgrid(np.arange(COLUMNS), np.arange(ROWS))
 
 
 class Pictures:
-    """A clip of linear pictures; what `plate_in_turn` reads of one."""
+    """A clip of linear pictures; what `SomeFrames` reads of one."""
 
     def __init__(self, pictures: list[Picture]) -> None:
         self.pictures, self.size = pictures, (COLUMNS, ROWS)
@@ -55,6 +55,11 @@ def continued(behind: Picture) -> Plate:
     return Plate(image.astype("f4"), 1 - unknown[..., 0], EIGHT_BIT_NOISE, errors)
 
 
+def after_turns(clip: Pictures, plate: Plate, source: Picture) -> Plate:
+    frames = SomeFrames.of(clip, plate)
+    return frames.with_plate(plate, in_turn(frames, likeliest(frames, source)))
+
+
 def off(plate: Plate, behind: Picture) -> float:
     unknown = continued(behind).confidence < 0.5
     return float(np.sqrt(np.square((plate.image - behind)[unknown]).mean()))
@@ -64,7 +69,7 @@ def test_smoke_that_drifts_shows_what_is_behind_it() -> None:
     """What is known stays."""
     behind = wall()
     plate = continued(behind)
-    better, _ = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 1.5), plate, SOURCE)
+    better = after_turns(filmed(behind, list(np.linspace(40, 152, FRAMES)), 1.5), plate, SOURCE)
     assert off(better, behind) < 0.5 * off(plate, behind)
     assert (better.confidence >= plate.confidence - 1e-6).all()
     assert better.confidence[plate.confidence < 0.5].mean() > 0.6
@@ -78,7 +83,7 @@ def test_what_no_mixture_with_the_continuation_explains_is_the_plate() -> None:
     red = np.hypot(X - 96, Y - 80) < 30
     behind[red] *= np.array([1.4, 0.2, 0.1], "f4")
     plate = replace(continued(wall()), errors=0.03 * np.eye(3, dtype="f4"))
-    better, _ = plate_in_turn(filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0), plate, SOURCE)
+    better = after_turns(filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0), plate, SOURCE)
     assert off(better, behind) < 0.5 * off(plate, behind)
 
 
@@ -88,7 +93,7 @@ def test_a_post_goes_on_behind_smoke_from_above_and_below() -> None:
     behind[:, 88:104] = 0.5, 0.4, 0.25
     plate = replace(continued(behind), errors=0.01 * np.eye(3, dtype="f4"))
     plate.image[plate.confidence < 0.5] = 0.03
-    better, _ = plate_in_turn(filmed(behind, list(np.linspace(70, 122, FRAMES)), 3.0), plate, SOURCE)
+    better = after_turns(filmed(behind, list(np.linspace(70, 122, FRAMES)), 3.0), plate, SOURCE)
     assert off(better, behind) < 0.5 * off(plate, behind)
 
 
@@ -99,7 +104,7 @@ def test_detail_is_that_of_frames_that_show_most_of_it() -> None:
     plate = continued(behind)
     plate = replace(plate, image=behind + (1 - plate.confidence)[..., None] * (blurred(behind, 6.0) - behind))
     pictures = filmed(behind, [96.0, 120.0, 144.0, 168.0, 192.0], 3.0, color)
-    better, _ = plate_in_turn(pictures, plate, color)
+    better = after_turns(pictures, plate, color)
     assert off(better, behind) < 0.5 * off(plate, behind)
 
 
@@ -112,7 +117,7 @@ def test_detail_of_smoke_is_not_that_of_a_smooth_wall() -> None:
         billows = np.roll(wall(3.0)[..., :1], 7 * seed, 0)
         clear = np.exp(-4 * billows / billows.mean() * np.exp(-((X - 96) ** 2 + (Y - 80) ** 2) / 1500)[..., None])
         pictures.append((clear * behind + (1 - clear) * SOURCE).astype("f4"))
-    better, _ = plate_in_turn(Pictures(pictures), plate, SOURCE)
+    better = after_turns(Pictures(pictures), plate, SOURCE)
     middle = np.hypot(X - 96, Y - 80) < 25
     assert (better.image - blurred(better.image, 6.0))[middle].std() < 0.02
 
@@ -120,13 +125,13 @@ def test_detail_of_smoke_is_not_that_of_a_smooth_wall() -> None:
 def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
     behind = wall()
     plate = continued(behind)
-    same, _ = plate_in_turn(filmed(behind, [96.0] * FRAMES, 6.0), plate, SOURCE)
+    same = after_turns(filmed(behind, [96.0] * FRAMES, 6.0), plate, SOURCE)
     assert off(same, behind) < 1.1 * off(plate, behind)
     middle = np.hypot(X - 96, Y - 80) < 16
     assert same.confidence[middle].max() < 0.5
 
 
 @pytest.mark.parametrize("change", [{"confidence": np.ones((ROWS, COLUMNS), "f4")}, {"errors": np.zeros((3, 3), "f4")}])
-def test_a_plate_without_errors_is_returned_itself(change) -> None:
-    plate = replace(continued(wall()), **change)
-    assert plate_in_turn(filmed(plate.image, [96.0], 1.0), plate, SOURCE)[0] is plate
+def test_a_plate_without_errors_is_known(change) -> None:
+    plate = continued(wall())
+    assert is_known(replace(plate, **change)) and not is_known(plate)
