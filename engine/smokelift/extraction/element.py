@@ -63,7 +63,7 @@ MIN_CHROMA = 0.01
 START_PERCENTILE = 90
 """Percentile, of what brightens its plate, that the search for J starts from: what is brighter may be no smoke."""
 
-START_HUE = 0.3
+START_HUE = 0.4
 """Smallest hue, as of `HUE`, of what the search starts from that is not taken for gray: in 52 composed clips of gray
 smoke before leaves, walls and skies it is .27 at most, at night in the light of lamps .55 (measured)."""
 

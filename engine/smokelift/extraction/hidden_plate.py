@@ -210,17 +210,27 @@ def likeliest(frames: SomeFrames, source: Picture) -> Start:
     known = np.maximum(1 - shown[0].unknown, MIN_VARIANCE)
     usual = np.average(area_average(np.square(details[-1]).mean(-1), *size), weights=known) + MIN_VARIANCE
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
+    away = [values - source for values, _ in seen]
+    spread = np.square(BRIGHTNESS_RANGE)
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
         loss = _prior_loss(smooth, expected, plate.errors, high - low)
         loss += 1.5 * DETAIL_WEIGHT * products[number][number] / (clear**2 * usual)
-        for frame, (values, noise) in enumerate(seen):
-            misfits = []
+        behind = color - source
+        for frame, (_, noise) in enumerate(seen):
+            squares = np.full(len(nearby), np.inf)
+            # I - (1 - T) J - T B = (I - J) - T (B - J), whose square and whose part along S are polynomials of T
+            terms = [_dot(one, other) for one, other in ((away[frame],) * 2, (away[frame], behind), (behind,) * 2)]
+            along = away[frame] @ source, behind @ source
             for t in MIXTURES:
+                sent = (1 - t) * (along[0] - t * along[1])
+                misfit = terms[0] - 2 * t * terms[1] + t**2 * terms[2]
+                misfit -= spread * np.square(sent) / (noise + spread * (1 - t) ** 2 * (source @ source))
                 left = t / clear
                 detail = products[frame][frame] - 2 * left * products[number][frame]
                 detail += left**2 * products[number][number]
-                misfits.append(_misfit(values - t * color, (1 - t) * source, noise, detail))
-            loss += INDEPENDENT / FRAMES * np.min(misfits, axis=0)
+                squares = np.minimum(squares, misfit + 3 * DETAIL_WEIGHT * detail)
+            outliers = np.log1p(squares / noise / OUTLIER_FREEDOM)
+            loss += INDEPENDENT / FRAMES * 0.5 * (OUTLIER_FREEDOM + 3) * outliers
         loss = around(loss)
         best, least = np.where(loss < least, index, best), np.minimum(loss, least)
     image, factors = start.copy(), np.zeros((len(pictures), *where.shape), np.float32)
@@ -300,15 +310,9 @@ def _prior_loss(plate: Picture, continued: NDArray[np.float64], errors: Picture,
     return np.asarray(-np.logaddexp.reduce(np.concatenate([each, any_color]), axis=0))
 
 
-def _misfit(left: Picture, sent: Picture, noise: Picture, detail: Picture) -> Picture:
-    """The loss (n,) of cells of which T B leaves ``left`` (n, 3) for S, whose mean is ``sent`` (3,).
-
-    ``detail`` (n,) is the mean square of the detail that T B leaves.
-    """
-    apart, spread = left - sent, np.square(BRIGHTNESS_RANGE)
-    along = spread * np.square(apart @ sent) / (noise + spread * (sent @ sent))
-    squares = (np.square(apart).sum(-1) - along + 3 * DETAIL_WEIGHT * detail) / noise
-    return np.asarray(0.5 * (OUTLIER_FREEDOM + 3) * np.log1p(squares / OUTLIER_FREEDOM))
+def _dot(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The products (n,) of colors (n, 3)."""
+    return np.asarray(np.einsum("nc,nc->n", one, other))
 
 
 def _shown(cells: Cells, source: Picture) -> tuple[Picture, Picture]:
