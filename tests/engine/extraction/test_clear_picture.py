@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.extraction.matte import matte
-from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.setup.first_estimate import first_estimate
 from tests.engine.films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
@@ -99,6 +99,34 @@ def test_a_plume_that_hardly_changes_is_no_part_of_a_smooth_wall(tmp_path: Path)
     plate = plate_of(film(tmp_path, truth, opacity, 0.42, 0.5))
     assert plate.confidence[plume > 0.7].mean() < 0.3
     assert plate.confidence[plume < 0.01].min() == 1.0
+
+
+def test_smoke_as_bright_as_a_wall_shows_by_its_hue(tmp_path: Path) -> None:
+    """It changes the mean of the channels by nothing, and never leaves the middle."""
+    beige = np.linspace(0.8, 1.2, HEIGHT, dtype=np.float32)[:, None, None] * np.float32((0.45, 0.3, 0.18))
+    truth = np.repeat(beige, WIDTH, 1)
+    gray = srgb_to_linear(linear_to_srgb(truth).mean(-1, keepdims=True))
+    plume = np.exp(-(((np.arange(WIDTH) - WIDTH / 2) / 8) ** 2)) * np.ones((HEIGHT, 1))
+
+    def opacity(n: int) -> np.ndarray:
+        return plume * np.random.default_rng(n).uniform(0.3, 0.9, (HEIGHT // 8, 1)).repeat(8, 0)
+
+    plate = plate_of(film(tmp_path, truth, opacity, gray, 0.5))
+    assert plate.confidence[plume > 0.7].mean() < 0.3
+    assert plate.confidence[plume < 0.01].min() == 1.0
+
+
+def test_the_last_smoke_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
+    """Half of the frames show its haze alone, as steady as the wall."""
+    tone = np.linspace(0.15, 0.4, HEIGHT, dtype=np.float32)[:, None, None]
+    truth = np.broadcast_to(tone, (HEIGHT, WIDTH, 3))
+    plume = np.exp(-(((np.arange(WIDTH) - WIDTH / 2) / 8) ** 2)) * np.ones((HEIGHT, 1))
+
+    def opacity(n: int) -> np.ndarray:
+        return plume * (0.04 if n % 2 else 0.6)
+
+    plate = plate_of(film(tmp_path, truth, opacity, 0.8, 0.5))
+    assert codes_apart(plate.image, truth)[plume > 0.7].mean() < 5
 
 
 def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_path: Path) -> None:

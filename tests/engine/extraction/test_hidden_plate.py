@@ -122,6 +122,13 @@ def test_detail_of_smoke_is_not_that_of_a_smooth_wall() -> None:
     assert (better.image - blurred(better.image, 6.0))[middle].std() < 0.02
 
 
+def test_frames_are_likeliest_with_the_smokes_own_source() -> None:
+    behind = wall()
+    frames = SomeFrames.of(filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0), continued(behind))
+    own, dim, bright = (likeliest(frames, factor * SOURCE).loss for factor in np.float32((1, 0.4, 2.5)))
+    assert own < min(dim, bright)
+
+
 def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
     behind = wall()
     plate = continued(behind)

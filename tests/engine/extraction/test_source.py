@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 from smokelift.extraction import shows_transmittance, usual_source
+from smokelift.extraction.element import Cells, first_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import lasting_noise
@@ -119,3 +120,14 @@ def test_smoke_counts_by_its_weight_in_the_source() -> None:
     smoky, empty = (filmed(clear_picture(image)), plate_of(image)), (filmed(image), plate_of(image))
     alone = usual_source([smoky], (48, 36))
     np.testing.assert_allclose(usual_source([smoky, empty, empty], (48, 36)), alone, rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("source", "hue"), [((0.5, 0.68, 0.45), 0.0), ((0.2, 0.35, 0.8), 0.57)], ids=["leaves through it", "blue lamps"]
+)
+def test_the_search_starts_from_gray_unless_what_brightens_is_far_from_it(source, hue) -> None:
+    wall = plate(0.04)
+    cells = Cells.of(before(wall, source, 3.0, 40), wall, (48, 40))
+    first = first_source([cells])
+    assert np.std(first) / first.mean() == pytest.approx(hue, abs=0.1)
+    assert first.mean() == pytest.approx(np.mean(source), rel=0.2)
