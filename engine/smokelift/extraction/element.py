@@ -190,7 +190,8 @@ def source_cells(clip: Clip, plate: Plate, frames: Sequence[int]) -> list[Cells]
     ``frames`` (one at least) have those with the most smoke first. The plate may be `resized` to `source_size`.
     """
     size, cells = source_size(clip), reduced_size(*clip.size, SOURCE_SIDE)
-    shown = [(clip.stored(frame).averaged(*size), resized(plate.at(frame), size)) for frame in frames[:SOURCE_FRAMES]]
+    numbers = sorted(frames[:SOURCE_FRAMES])
+    shown = [(clip.stored(frame).averaged(*size), resized(plate.at(frame), size)) for frame in numbers]
     return [Cells.of(picture, behind, cells, FINER * MAX_CELLS / max(cells)) for picture, behind in shown]
 
 
@@ -252,8 +253,8 @@ def _nearest_to_white(source: Picture, behind: Picture) -> Picture:
 def brightest_smoke(clip: Clip, plate: Plate, frame: int, source: Picture) -> float:
     """Return the radiance that the brightest thick smoke of a frame sends, S of its element; 0 without any.
 
-    ``source`` (3,) is the usual one. Smoke sends no more than its source radiance, so a light has to make
-    that at least as bright.
+    ``source`` (3,) is the usual one. Smoke sends no more than its source radiance, so a light has to make that at least
+    as bright.
     """
     picture = clip.stored(frame).linear()
     element = extract_element(picture, plate.at(frame), source, reduced_size(*clip.size, SOURCE_SIDE))

@@ -6,9 +6,9 @@ them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T, and i
 above and below it, or on its sides, unless it is an object there. Its detail is that of one of the frames, and what
 smoke leaves of it in the others has to be T times as strong. Then what an element leaves of a picture,
 (I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to the last shows
-next to nothing, and what is behind it stays as it was. J is first what
-brightens the plate most, or what is found before the plate as it is, whichever makes the frames likelier. It is found
-again from the plate that the turns end with, and the plate with it, as long as the frames become likelier still.
+next to nothing, and what is behind it stays as it was. J is first what brightens the plate most, or what is found
+before the plate as it is, whichever makes the frames likelier. It is found again from the plate that the turns end
+with, and the plate with it, as long as the frames become likelier still.
 """
 
 from collections.abc import Callable, Sequence
@@ -84,8 +84,8 @@ def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int])
     if plate.images is not None or is_known(plate):
         return plate, source_in(seen)
     frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip))
-    start = min((likeliest(frames, source) for source in (first_source(seen), source_in(seen))), key=lambda of: of.loss)
-    turned = in_turn(frames, start)
+    starts = [likeliest(frames, source) for source in (first_source(seen), source_in(seen))]
+    turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):
         start = likeliest(frames, source_in(source_cells(clip, frames.with_plate(small, turned), smoky)))
         if start.loss > MAX_LOSS_RATIO * turned.start.loss:
@@ -114,7 +114,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """What the turns change of a plate by cell (rows, columns, 3), and how much of it is ``left`` unknown."""
+    """What turns change of a plate by cell (rows, columns, 3), and the part (rows, columns, 1) ``left`` unknown."""
 
     start: Start
     change: Picture
