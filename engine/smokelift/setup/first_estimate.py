@@ -139,7 +139,10 @@ def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plat
     There is none before what does not show T: black, one color, or a picture that is as good as one; and without
     ``smoky`` frames, those with the most smoke first.
     """
-    if not smoky or backdrop_color(visible_plate(found.plate, clip, smoky[0])) is not None:
+    if not smoky:
+        return found.plate, None
+    # a wall that was found is no even color, however little its light changes
+    if found.source != "picture" and backdrop_color(visible_plate(found.plate, clip, smoky[0])) is not None:
         return found.plate, None
     plate, source = plate_and_source(clip, found.shot_of(clip), found.plate, smoky)
     shown = visible_plate(plate, clip, smoky[0])

@@ -116,6 +116,15 @@ def test_smoke_as_bright_as_a_wall_shows_by_its_hue(tmp_path: Path) -> None:
     assert plate.confidence[plume < 0.01].min() == 1.0
 
 
+def test_a_wall_that_is_hardly_shaded_tells_its_smoke_by_hue(tmp_path: Path) -> None:
+    """Its pixels differ by fewer codes than an even color's may."""
+    tone = np.linspace(0.88, 1.12, WIDTH, dtype=np.float32)[:, None]
+    truth = np.broadcast_to(tone * np.float32((0.18, 0.32, 0.16)), (HEIGHT, WIDTH, 3))
+    estimate = first_estimate(film(tmp_path, truth, puff, 0.4, 0.5), None, None)
+    assert estimate.found.source == "picture"
+    assert estimate.source == pytest.approx(np.full(3, 0.4), rel=0.25)
+
+
 def test_the_last_smoke_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
     """Half of the frames show its haze alone, as steady as the wall."""
     tone = np.linspace(0.15, 0.4, HEIGHT, dtype=np.float32)[:, None, None]
