@@ -86,7 +86,7 @@ MIN_CONTRAST = 0.02
 it passes: noise and codecs change a mean by a code or two."""
 
 MAX_CORRECTION = 3.0
-"""Standard deviations of that, and of what is continued, beyond which a difference between them is an object's."""
+"""Difference of a clear moment from what is continued there, in standard deviations, beyond which it is an object's."""
 
 STEP = 2
 """One in so many examined frames is read at full size."""
@@ -193,10 +193,10 @@ def _unlike(image: Picture, known: Mask) -> Picture:
 
 
 def _smoke_of(pictures: Picture, window: float) -> tuple[float, float, Mask]:
-    """Return the similarity of smoke in values (frames, rows, columns) over time, its own, and where it raises them.
+    """Return the similarity of smoke in pictures (frames, rows, columns), its brightness, and where it brightens.
 
-    Its similarity is the fraction of pairs of successive frames of smoke that are alike within a window. Its own value,
-    its brightness, is that which it moves every background towards; it brightens pixels of a darker background.
+    Its similarity is the fraction of pairs of successive frames of smoke that are alike within a window. Its brightness
+    is the value that it moves every background towards; it brightens pixels of a darker background.
     """
     shape = pictures.shape[1:]
     values = pictures.reshape(len(pictures), -1)

@@ -64,7 +64,7 @@ START_PERCENTILE = 90
 """Percentile, of what brightens its plate, that the search for J starts from: what is brighter may be no smoke."""
 
 START_HUE = 0.4
-"""Smallest hue, as of `HUE`, of what the search starts from that is not taken for gray: in 52 composed clips of gray
+"""Smallest hue, as of `HUE`, of what the search starts from that is not taken for gray: in 40 composed clips of gray
 smoke before leaves, walls and skies it is .27 at most, at night in the light of lamps .55 (measured)."""
 
 BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
@@ -344,7 +344,7 @@ class Cells:
         whole = picture.shape[1::-1]
         finer = [min(round(pixels * count), most) for count, most in zip(size, whole, strict=True)]
         picture = area_average(picture, *finer)
-        plate = plate.through(lambda part: area_average(part, *finer), whole[0] * whole[1] / (finer[0] * finer[1]))
+        plate = resized(plate, (finer[0], finer[1]))
         change = picture - plate.image
         one, other = np.triu_indices(3)
         pairs = plate.image[..., one] * plate.image[..., other]

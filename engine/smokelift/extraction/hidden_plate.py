@@ -80,10 +80,10 @@ def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int])
 
     Both clips are at the plate's exposure; ``smoky`` are frames of the clip, those with the most smoke first.
     """
-    seen = source_cells(clip, plate, smoky)
     if plate.images is not None or is_known(plate):
-        return plate, source_in(seen)
+        return plate, source_in(source_cells(clip, plate, smoky))
     frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip))
+    seen = source_cells(clip, small, smoky)
     starts = [likeliest(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):

@@ -136,7 +136,7 @@ def first_estimate(
 def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plate, Picture | None]:
     """Return the plate of a clip, found in turn with its smoke, and the usual source radiance (3,) of that.
 
-    There is none before what does not show T: black, one color, or a picture that is as good as one; and without
+    There is none before what does not show T: black, one color, or a given picture as good as one; and without
     ``smoky`` frames, those with the most smoke first.
     """
     if not smoky:
