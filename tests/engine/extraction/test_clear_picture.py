@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smokelift.extraction.clear_picture import _correction
 from smokelift.extraction.matte import matte
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.setup.first_estimate import first_estimate
@@ -154,3 +155,15 @@ def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_p
     assert plate.confidence[inner].min() == 1.0
     assert codes_apart(plate.image, truth)[inner].max() < 12
     assert not matte(clip.frame(12), plate).mask[inner].any()
+
+
+def test_a_clear_moment_is_corrected_by_what_goes_on_beside_it_but_an_object_is_not() -> None:
+    image = np.broadcast_to(np.linspace(0.2, 0.4, 64, dtype=np.float32)[:, None, None], (64, 64, 3)).copy()
+    truth, steady = image.copy(), np.ones((64, 64), np.bool_)
+    steady[20:44, 24:40] = False
+    image[20:32, 24:40] *= 1.03
+    image[32:44, 24:40] *= 2.0
+    weights, smoke = np.full(3, 1 / 3, np.float32), np.full((64, 64), 0.03, np.float32)
+    change = _correction(image, np.ones_like(steady), steady, weights, smoke)
+    assert np.abs((image + change - truth)[22:30, 24:40]).mean() < 0.4 * np.abs((image - truth)[22:30, 24:40]).mean()
+    assert max(np.abs(change[34:44, 24:40]).max(), np.abs(change[steady]).max()) < 1e-6
