@@ -466,7 +466,7 @@ void Pyramid::write(float *fields, float *deviation, float *weight) const {
         for (int k = 0; k < 4; ++k)
             matrix[5 * k] += 1 / (problem_.deviations.back()[k] * problem_.deviations.back()[k]);
         invert(matrix, inverse);
-        variance[at] = inverse[0];
+        variance[at] = std::max(inverse[0], 0.0f); // rounding may make it negative
     }
     for (std::size_t cell = 0; cell < cells; ++cell) {
         const std::size_t row = (cell / problem_.columns) >> index,

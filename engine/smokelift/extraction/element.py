@@ -71,9 +71,9 @@ BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
 """Percentile of a picture's brightness that it starts from where smoke only darkens, and its lower bound, linear: a
 picture darker than that shows no light in eight bits."""
 
-FINER = 1.5
-"""Pixels along a cell whose detail is compared: a codec takes the finest detail of a plate away, and that of thin smoke
-with it (docs/experiments/extraction.md)."""
+FINER, FINEST = 1.5, 2
+"""Pixels along a cell whose detail is compared, and pixels of the clip along one of these at least: a codec takes the
+finest detail of a plate away, and that of thin smoke with it (docs/experiments/extraction.md)."""
 
 WINDOW_BLUR = 2.0
 """Standard deviation, in cells, of the Gaussian that smooths the deviation of T, which is found in windows of four."""
@@ -144,7 +144,7 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     """
     columns, rows = size
     shrink = max(1.0, max(size) / MAX_CELLS)
-    cells = Cells.of(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
+    cells = Cells.compared(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
     fields, deviation, weight = extracted(cells, source)
     deviation = blurred(deviation, WINDOW_BLUR)
     lasting = plate.noise.shared * linear_per_srgb(linear_to_srgb(cells.seen))
@@ -172,16 +172,13 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
     The pictures are reduced to a ``size`` (columns, rows).
     """
     finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
-    return source_in([Cells.of(picture, plate, size, finer) for picture, plate in pictures])
+    return source_in([Cells.compared(picture, plate, size, finer) for picture, plate in pictures])
 
 
 def source_size(clip: Clip) -> tuple[int, int]:
     """Return the numbers of columns and rows of the pixels that `source_cells` are made of."""
     cells = reduced_size(*clip.size, SOURCE_SIDE)
-    columns, rows = (
-        min(round(FINER * MAX_CELLS / max(cells) * count), of) for count, of in zip(cells, clip.size, strict=True)
-    )
-    return columns, rows
+    return compared_size(cells, clip.size, FINER * MAX_CELLS / max(cells))
 
 
 def source_cells(clip: Clip, plate: Plate, frames: Sequence[int]) -> list[Cells]:
@@ -192,7 +189,13 @@ def source_cells(clip: Clip, plate: Plate, frames: Sequence[int]) -> list[Cells]
     size, cells = source_size(clip), reduced_size(*clip.size, SOURCE_SIDE)
     numbers = sorted(frames[:SOURCE_FRAMES])
     shown = [(clip.stored(frame).averaged(*size), resized(plate.at(frame), size)) for frame in numbers]
-    return [Cells.of(picture, behind, cells, FINER * MAX_CELLS / max(cells)) for picture, behind in shown]
+    return [Cells.of(picture, behind, cells) for picture, behind in shown]
+
+
+def compared_size(cells: tuple[int, int], whole: tuple[int, int], finer: float = FINER) -> tuple[int, int]:
+    """Return the numbers of columns and rows of the pixels whose detail cells of a ``whole`` picture compare."""
+    columns, rows = (min(round(finer * count), max(1, of // FINEST)) for count, of in zip(cells, whole, strict=True))
+    return columns, rows
 
 
 def first_source(seen: Sequence[Cells]) -> Picture:
@@ -338,13 +341,16 @@ class Cells:
         return np.asarray(change > 3 * np.sqrt(self.noise.mean(-1) + self.unknown * np.trace(self.errors) / 3))
 
     @staticmethod
-    def of(picture: Picture, plate: Plate, size: tuple[int, int], pixels: float = FINER) -> Cells:
-        """Average a picture and its plate down to a size (columns, rows), by so many pixels along a cell."""
+    def compared(picture: Picture, plate: Plate, size: tuple[int, int], finer: float = FINER) -> Cells:
+        """Average a whole picture and its plate down to what is compared, ``finer`` than a cell, and to cells."""
+        rows, columns = picture.shape[:2]
+        compared = compared_size(size, (columns, rows), finer)
+        return Cells.of(area_average(picture, *compared), resized(plate, compared), size)
+
+    @staticmethod
+    def of(picture: Picture, plate: Plate, size: tuple[int, int]) -> Cells:
+        """Average a picture and its plate, whose pixels are compared, down to a size (columns, rows)."""
         columns, rows = size
-        whole = picture.shape[1::-1]
-        finer = [min(round(pixels * count), most) for count, most in zip(size, whole, strict=True)]
-        picture = area_average(picture, *finer)
-        plate = resized(plate, (finer[0], finer[1]))
         change = picture - plate.image
         one, other = np.triu_indices(3)
         pairs = plate.image[..., one] * plate.image[..., other]
@@ -354,4 +360,4 @@ class Cells:
         model = np.abs(means[..., 9:12]).mean(-1, keepdims=True) + float(plate.image.mean())
         noise = np.maximum(np.square(noise_at(seen, plate)) + np.square(MODEL_ERROR * model), MIN_VARIANCE)
         moments = np.dstack([means[..., :21], noise, means[..., 21:]])
-        return Cells(seen, means[..., :3], moments, plate.errors, finer[0] * finer[1] / (columns * rows))
+        return Cells(seen, means[..., :3], moments, plate.errors, plate.confidence.size / (columns * rows))

@@ -22,10 +22,10 @@ from smokelift.checks import Mask
 from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,
-    FINER,
     MIN_VARIANCE,
     OUTLIER_FREEDOM,
     Cells,
+    compared_size,
     extracted,
     first_source,
     source_cells,
@@ -138,7 +138,7 @@ class SomeFrames:
     def of(clip: Clip, plate: Plate) -> "SomeFrames":
         """Read the frames of a clip at its plate's exposure."""
         cells, numbers = reduced_size(*clip.size, SIDE), clip.spread(FRAMES)
-        columns, rows = (min(round(FINER * count), of) for count, of in zip(cells, clip.size, strict=True))
+        columns, rows = compared_size(cells, clip.size)
         pictures = [clip.stored(frame).averaged(columns, rows) for frame in numbers]
         return SomeFrames(clip, numbers, pictures, resized(plate, (columns, rows)), cells)
 
