@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.extraction.hidden_plate import SomeFrames, in_turn, is_known, likeliest
+from smokelift.extraction.hidden_plate import SomeFrames, in_turn, is_known, likeliest, plate_and_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture, area_average, blurred
 from smokelift.footage.noise import EIGHT_BIT_NOISE
@@ -127,6 +127,18 @@ def test_frames_are_likeliest_with_the_smokes_own_source() -> None:
     frames = SomeFrames.of(filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0), continued(behind))
     own, dim, bright = (likeliest(frames, factor * SOURCE).loss for factor in np.float32((1, 0.4, 2.5)))
     assert own < min(dim, bright)
+
+
+def test_the_source_is_found_again_from_the_plate_after_the_turns() -> None:
+    """Most of the plate is too red at first, and J, found before it, three times as bright as it is."""
+    behind = wall()
+    unknown = np.clip(1.5 - ((X - 96) ** 2 + (Y - 80) ** 2) / 4000, 0, 1).astype("f4")[..., None]
+    red = np.maximum(behind + unknown * (blurred(behind, 4.0) + np.array((0.3, 0, -0.1), "f4") - behind), 0.02)
+    errors = np.full((3, 3), 0.09, "f4") + 0.03 * np.eye(3, dtype="f4")
+    plate = Plate(red.astype("f4"), 1 - unknown[..., 0], EIGHT_BIT_NOISE, errors)
+    clip = filmed(behind, list(np.linspace(70, 122, FRAMES)), 3.0, 0.2 * SOURCE)
+    _, found = plate_and_source(clip, clip, plate, (2, 1, 3, 0, 4))
+    assert found == pytest.approx(0.2 * SOURCE, rel=0.25)
 
 
 def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
