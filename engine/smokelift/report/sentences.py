@@ -194,8 +194,8 @@ SENTENCES: Mapping[str, str] = {
     ),
     "possible fire": (
         "Some of the smoke may be fire: {fraction:.1%} of its pixels have the colors of fire, and {bright:.0%} of "
-        "these are brighter than light explains, too few to be certain. If it is fire, give its color as the flame's, "
-        "for example 1, 0.4, 0.1."
+        "these are brighter than light explains. That is too few to be certain, or something behind the smoke looks "
+        "like it. If it is fire, give its color as the flame's, for example 1, 0.4, 0.1."
     ),
     "assumed light": (
         "Light not given: light from everywhere is assumed, as bright as smoke and background ask for (irradiance "

@@ -1,6 +1,6 @@
 """What a clip shows before camera, box, medium and light are known: its background, its smoke and its fire."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -97,8 +97,9 @@ class FirstEstimate:
     """What a clip shows: its background, its smoke, and its fire if any burns.
 
     ``plate`` is the one that was ``found``, and better known where smoke hides it. ``clip`` is the footage that was
-    ``found``, without fire. ``hot`` are the pixels that may be fire. ``source`` (3,) is the usual source radiance of
-    the smoke before a picture; None before one that does not show its transmittance (`with_source`), and without smoke.
+    ``found``, without fire. ``hot`` are the pixels that are fire, or may be. ``source`` (3,) is the usual source
+    radiance of the smoke before a picture; None before one that does not show its transmittance (`with_source`), and
+    without smoke.
     """
 
     clip: Clip
@@ -119,34 +120,41 @@ def first_estimate(
     """
     flame_color = None if medium is None else medium.flame_color
     found = find_backdrop(clip, camera, background)
-    clip, samples = found.clip, sample_smoke(found.clip, found.plate)
+    clip, plate = found.clip, found.plate
+    samples = sample_smoke(clip, plate)
     fire, hot = None, hot_pixels(samples.colors, samples.behind)
-    if hot.burn or (flame_color is not None and hot.fraction):
-        doused = without_fire(clip, found.plate)
+    given = flame_color is not None and hot.fraction > 0
+    if not given:
+        # what shines through smoke and is part of the plate does not burn
+        plate, source, samples = with_source(found, clip, samples)
+    burning = hot_pixels(samples.colors, samples.behind)
+    if given or burning.burn:
+        doused = without_fire(clip, plate)
         light = firelight(clip, doused)
-        fire, clip = Fire(light, flame_color or fire_color(clip, light)), doused
-        samples = sample_smoke(clip, found.plate)
-    plate, source = with_source(found, clip, samples.smoky)
-    if plate is not found.plate:
-        # what no frame shows clear is unknown, although turns say what is behind it
-        samples = replace(sample_smoke(clip, plate), unknown=samples.unknown, over_known=samples.over_known)
+        fire, hot, clip = Fire(light, flame_color or fire_color(clip, light)), burning, doused
+        plate, source, samples = with_source(found, clip, sample_smoke(clip, found.plate))
     return FirstEstimate(clip, found, plate, samples, fire, hot, source)
 
 
-def with_source(found: Backdrop, clip: Clip, smoky: Sequence[int]) -> tuple[Plate, Picture | None]:
-    """Return the plate of a clip, found in turn with its smoke, and the usual source radiance (3,) of that.
+def with_source(found: Backdrop, clip: Clip, samples: SmokeSamples) -> tuple[Plate, Picture | None, SmokeSamples]:
+    """Return the plate of a clip, found in turn with its smoke, the usual source radiance (3,) of that, and samples.
 
-    There is none before what does not show T: black, one color, or a given picture as good as one; and without
-    ``smoky`` frames, those with the most smoke first.
+    There is none before what does not show T: black, one color, or a given picture as good as one; and without smoke.
+    ``samples`` are those before the plate as it was found.
     """
-    if not smoky:
-        return found.plate, None
+    if not samples.smoky:
+        return found.plate, None, samples
     # a wall that was found is no even color, however little its light changes
-    if found.source != "picture" and backdrop_color(visible_plate(found.plate, clip, smoky[0])) is not None:
-        return found.plate, None
-    plate, source = plate_and_source(clip, found.shot_of(clip), found.plate, smoky)
-    shown = visible_plate(plate, clip, smoky[0])
-    return (plate, source) if shows_transmittance(shown, source) else (found.plate, None)
+    shown = visible_plate(found.plate, clip, samples.smoky[0])
+    if found.source != "picture" and backdrop_color(shown) is not None:
+        return found.plate, None, samples
+    plate, source = plate_and_source(clip, found.shot_of(clip), found.plate, samples.smoky)
+    if not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):
+        return found.plate, None, samples
+    if plate is not found.plate:
+        # what no frame shows clear is unknown, although turns say what is behind it
+        samples = replace(sample_smoke(clip, plate), unknown=samples.unknown, over_known=samples.over_known)
+    return plate, source, samples
 
 
 def visible_plate(plate: Plate, clip: Clip, frame: int) -> Picture:

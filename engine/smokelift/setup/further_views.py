@@ -94,7 +94,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
         background = replace(scene.background, strokes=None)
     found = find_backdrop(view_clip, camera, background)
     try:
-        plate, source = with_source(found, found.clip, sample_smoke(found.clip, found.plate).smoky)
+        plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
         shown = replace(ShotView.before(scene.domain, found.clip, camera, plate), source=source)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
