@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstring>
 
 namespace smokelift {
 
@@ -54,6 +55,12 @@ SMOKELIFT_INLINE Span nonzero(const float *row, int n) {
     while (end > first && end[-1] == 0)
         --end;
     return {int(first - row), int(end - row)};
+}
+
+// Where in a row of voxels the first is marked; its end if none is.
+inline int first_marked(const unsigned char *row, int n) {
+    const void *found = std::memchr(row, 1, std::size_t(n));
+    return found ? int(static_cast<const unsigned char *>(found) - row) : n;
 }
 
 // The element of a line of n whose mirror image is at i.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 namespace smokelift {
 namespace {
@@ -111,23 +113,19 @@ void means_of_two(const Part<const float> &fine, const std::optional<Part<const 
     });
 }
 
-void prolong_values(const Part<const float> &coarse, const Part<const bool> &marked,
-                    const std::vector<std::size_t> &first, float *values, Workers &workers) {
-    const Shape &n = marked.n;
-    workers.run(n[0], [&](int x) {
-        if (first[x] == first[x + 1])
-            return;
-        FinePlane plane(coarse, x);
-        float *at = values + first[x];
-        for (int y = 0; y < n[1]; ++y) {
-            const bool *mark = marked.row(x, y);
-            if (!any(mark, n[2]))
-                continue;
-            const float *row = plane.row(y);
-            for (int k = 0; k < n[2]; ++k)
-                if (mark[k])
-                    *at++ = row[k];
-        }
+void prolong_values(const Part<const float> &coarse, const MarkedVoxels &marked, float *values,
+                    Workers &workers) {
+    workers.run(marked.shape()[0], [&](int x) {
+        std::optional<FinePlane> plane; // made for the first of its voxels
+        int row_y = -1;
+        const float *row = nullptr;
+        marked.in_plane(x, [&](int y, int z, int count, std::size_t at) {
+            if (!plane)
+                plane.emplace(coarse, x);
+            if (y != std::exchange(row_y, y))
+                row = plane->row(y);
+            std::copy_n(row + z, count, values + at);
+        });
     });
 }
 

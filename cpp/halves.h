@@ -3,11 +3,11 @@
 #pragma once
 
 #include "grid.h"
+#include "marked_voxels.h"
 #include "threads.h"
 #include "voxels.h"
 
 #include <optional>
-#include <vector>
 
 namespace smokelift {
 
@@ -22,9 +22,8 @@ template <class T> struct Part {
 void means_of_two(const Part<const float> &fine, const std::optional<Part<const bool>> &marked,
                   const Out &coarse, Workers &workers);
 
-// `first` is where the marked voxels of each plane across x begin.
-void prolong_values(const Part<const float> &coarse, const Part<const bool> &marked,
-                    const std::vector<std::size_t> &first, float *values, Workers &workers);
+void prolong_values(const Part<const float> &coarse, const MarkedVoxels &marked, float *values,
+                    Workers &workers);
 
 void scale_alike(const Part<const float> &fine, const Part<const bool> &marked,
                  const Part<const float> &before, const Part<const float> &after, float least,

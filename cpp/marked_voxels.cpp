@@ -1,7 +1,6 @@
 #include "marked_voxels.h"
 
 #include <algorithm>
-#include <cstring>
 
 namespace smokelift {
 namespace {
@@ -91,12 +90,9 @@ MarkedVoxels::MarkedVoxels(Mask voxels, Workers &workers) : MarkedVoxels(voxels.
     workers.run(n_[0], [&](int x) {
         for (int y = 0; y < n_[1]; ++y) {
             const unsigned char *const row = voxels.row(x, y);
-            const void *const first = std::memchr(row, 1, std::size_t(n_[2]));
-            if (first)
-                find_stretches(
-                    int(static_cast<const unsigned char *>(first) - row), n_[2],
-                    [&](int z) { return row[z] != 0; },
-                    [&](int begin, int end) { planes_[x].stretches.push_back({y, begin, end - begin}); });
+            find_stretches(
+                first_marked(row, n_[2]), n_[2], [&](int z) { return row[z] != 0; },
+                [&](int begin, int end) { planes_[x].stretches.push_back({y, begin, end - begin}); });
         }
     });
     number();

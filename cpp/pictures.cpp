@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace smokelift {
 namespace {
@@ -51,19 +50,15 @@ SMOKELIFT_INLINE int pixel(float place, int count) {
     return static_cast<int>(std::clamp(std::nearbyint(place), 0.0f, float(count - 1)));
 }
 
+// The places of neighbors along z from z on, of which the first is number `at` of the marked voxels.
 SMOKELIFT_CLONES
-void places_of_plane(const PictureMap &map, Mask voxels, int i, std::size_t at, const Places &places) {
-    for (int j = 0; j < voxels.n[1]; ++j) {
-        const unsigned char *row = voxels.row(i, j);
-        const PixelRow line(map, i, j);
-        for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2]; ++k) {
-            if (!row[k])
-                continue;
-            const Place found = place_of(map, line, k);
-            places.rows[at] = found.row;
-            places.columns[at] = found.column;
-            places.visible[at++] = found.visible;
-        }
+void places_of_row(const PictureMap &map, const PixelRow &line, int z, int count, std::size_t at,
+                   const Places &places) {
+    for (int k = z; k < z + count; ++k, ++at) {
+        const Place found = place_of(map, line, k);
+        places.rows[at] = found.row;
+        places.columns[at] = found.column;
+        places.visible[at] = found.visible;
     }
 }
 
@@ -206,25 +201,12 @@ void profile_row(double start, double along, const double *__restrict z, int hal
 
 } // namespace
 
-int first_marked(const unsigned char *row, int n) {
-    const void *found = std::memchr(row, 1, std::size_t(n));
-    return found ? int(static_cast<const unsigned char *>(found) - row) : n;
-}
-
-std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
-    std::vector<std::size_t> first(voxels.n[0] + 1, 0);
-    workers.run(voxels.n[0], [&](int i) {
-        const unsigned char *plane = voxels.row(i, 0);
-        first[i + 1] = std::size_t(std::count(plane, plane + voxels.slab_size(), 1));
+void find_places(const PictureMap &map, const MarkedVoxels &voxels, const Places &places, Workers &workers) {
+    workers.run(voxels.shape()[0], [&](int x) {
+        voxels.in_plane(x, [&](int y, int z, int count, std::size_t at) {
+            places_of_row(map, PixelRow(map, x, y), z, count, at, places);
+        });
     });
-    for (int i = 0; i < voxels.n[0]; ++i)
-        first[i + 1] += first[i];
-    return first;
-}
-
-void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
-                 const Places &places, Workers &workers) {
-    workers.run(voxels.n[0], [&](int i) { places_of_plane(map, voxels, i, first[i], places); });
 }
 
 void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers) {
@@ -260,32 +242,24 @@ void read_bilinearly(const double *picture, int rows, int columns, const float *
     });
 }
 
-void find_profile(const DepthProfile &profile, Mask voxels, const std::vector<std::size_t> &first,
-                  const SeenAt &seen_at, float *shapes, float *widths, Workers &workers) {
+void find_profile(const DepthProfile &profile, const MarkedVoxels &voxels, const float *at_rows,
+                  const float *at_columns, float *shapes, float *widths, Workers &workers) {
     const auto read = [&](const double *picture, float *values) {
-        read_bilinearly(picture, profile.rows, profile.columns, seen_at.rows, seen_at.columns, first.back(),
-                        values, workers);
+        read_bilinearly(picture, profile.rows, profile.columns, at_rows, at_columns, voxels.count(), values,
+                        workers);
     };
     read(profile.middle, shapes), read(profile.width, widths);
-    const std::vector<double> &x = profile.places[0], &y = profile.places[1], &z = profile.places[2];
+    const std::vector<double> &places_z = profile.places[2];
     const auto &d = profile.depth;
-    workers.run(voxels.n[0], [&](int i) {
-        std::size_t at = first[i];
-        if (at == first[i + 1])
-            return;
-        for (int j = 0; j < voxels.n[1]; ++j) {
-            const unsigned char *const row = voxels.row(i, j);
-            const double start = x[i] * d[0] + y[j] * d[1];
-            for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2];) {
-                const int begin = k;
-                while (k < voxels.n[2] && row[k] && k - begin < TOGETHER)
-                    ++k;
-                profile_row(start, d[2], z.data() + begin, profile.halves, widths + at, shapes + at,
-                            k - begin);
-                at += std::size_t(k - begin);
-                k += k == begin;
+    workers.run(voxels.shape()[0], [&](int x) {
+        voxels.in_plane(x, [&](int y, int z, int length, std::size_t first) {
+            const double start = profile.places[0][x] * d[0] + profile.places[1][y] * d[1];
+            for (int begin = 0; begin < length; begin += TOGETHER) {
+                const std::size_t at = first + std::size_t(begin);
+                profile_row(start, d[2], places_z.data() + z + begin, profile.halves, widths + at,
+                            shapes + at, std::min(length - begin, TOGETHER));
             }
-        }
+        });
     });
 }
 

@@ -27,21 +27,7 @@ struct Places {
     bool *visible;
 };
 
-// The same, to be read.
-struct SeenAt {
-    const float *rows, *columns;
-    const bool *visible;
-};
-
-// Where in a row of voxels the first is marked; its end if none is.
-int first_marked(const unsigned char *row, int n);
-
-// The first of the marked voxels in each plane across x, and how many there are at the end.
-std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
-
-// The places of the marked voxels, in their order in memory; `first` is that of count_marked().
-void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
-                 const Places &places, Workers &workers);
+void find_places(const PictureMap &map, const MarkedVoxels &voxels, const Places &places, Workers &workers);
 
 void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers);
 
@@ -68,9 +54,8 @@ struct DepthProfile {
     int halves;
 };
 
-// Shape and width (m) at the marked voxels in their order in memory, which the picture shows at some places;
-// `first` is that of count_marked().
-void find_profile(const DepthProfile &profile, Mask voxels, const std::vector<std::size_t> &first,
-                  const SeenAt &seen_at, float *shapes, float *widths, Workers &workers);
+// Shape and width (m) at the marked voxels, which the picture shows at some rows and columns.
+void find_profile(const DepthProfile &profile, const MarkedVoxels &voxels, const float *at_rows,
+                  const float *at_columns, float *shapes, float *widths, Workers &workers);
 
 } // namespace smokelift

@@ -71,11 +71,10 @@ void register_places(py::module_ &module) {
                 require_fit(int(places[axis].size()) == voxels.n[axis]);
             const DepthProfile profile{places,           depth, middle.data, width.data, int(middle.n[0]),
                                        int(middle.n[1]), halves};
-            const auto first = count_marked(voxels, workers);
-            require_fit(at[0].size == first.back() && at[1].size == first.back());
-            Made<float, 1> shapes({Index(first.back())}), widths(shapes.n);
-            find_profile(profile, voxels, first, {at[0].data, at[1].data, nullptr}, shapes.data(),
-                         widths.data(), workers);
+            const MarkedVoxels marked(voxels, workers);
+            require_fit(at[0].size == marked.count() && at[1].size == marked.count());
+            Made<float, 1> shapes({Index(marked.count())}), widths(shapes.n);
+            find_profile(profile, marked, at[0].data, at[1].data, shapes.data(), widths.data(), workers);
             return std::pair(std::move(shapes), std::move(widths));
         }),
         "voxels"_a, "places"_a, "depth"_a, "at"_a, "middle"_a, "width"_a, "flatness"_a,
@@ -91,10 +90,10 @@ void register_places(py::module_ &module) {
         .def(py::init(&map_of), "to_pixel"_a, "centers"_a, "size"_a)
         .def("places", unlocked([](Workers &workers, const PictureMap &map, Mask voxels) {
                  require_fit(voxels.n == map.shape());
-                 const auto first = count_marked(voxels, workers);
-                 Made<float, 1> rows({Index(first.back())}), columns(rows.n);
+                 const MarkedVoxels marked(voxels, workers);
+                 Made<float, 1> rows({Index(marked.count())}), columns(rows.n);
                  Made<bool, 1> visible(rows.n);
-                 find_places(map, voxels, first, {rows.data(), columns.data(), visible.data()}, workers);
+                 find_places(map, marked, {rows.data(), columns.data(), visible.data()}, workers);
                  return std::tuple(std::move(rows), std::move(columns), std::move(visible));
              }),
              "voxels"_a,
@@ -145,18 +144,12 @@ void register_halves(py::module_ &module) {
         "voxels.");
 
     module.def(
-        "prolong_values", unlocked([](Workers &workers, Part<const float> values, Part<const bool> voxels) {
-            require_rows(values, voxels);
-            const auto [nx, ny, nz] = voxels.n;
+        "prolong_values", unlocked([](Workers &workers, Part<const float> values, Mask voxels) {
+            require_rows(values);
             require_fit(values.n == halved(voxels.n));
-            std::vector<std::size_t> first(nx + 1, 0);
-            for (int x = 0; x < nx; ++x) {
-                first[x + 1] = first[x];
-                for (int y = 0; y < ny; ++y)
-                    first[x + 1] += std::count(voxels.row(x, y), voxels.row(x, y) + nz, true);
-            }
-            Made<float, 1> prolonged({Index(first.back())});
-            prolong_values(values, voxels, first, prolonged.data(), workers);
+            const MarkedVoxels marked(voxels, workers);
+            Made<float, 1> prolonged({Index(marked.count())});
+            prolong_values(values, marked, prolonged.data(), workers);
             return prolonged;
         }),
         "values"_a, "voxels"_a,
