@@ -1,9 +1,9 @@
 #include "advection.h"
 
+#include "vectors.h"
+
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <vector>
 
 namespace smokelift {
@@ -156,33 +156,12 @@ std::vector<Span> spans_within(In a, int reach, Workers &workers) {
     return result;
 }
 
-// The largest size of some numbers. Those of one sign are in the order of their bits, and compilers turn the
-// largest of integers into vector code.
-SMOKELIFT_CLONES
-float largest_size(const float *values, std::size_t count) {
-    std::int32_t most = 0;
-    for (std::size_t n = 0; n < count; ++n) {
-        std::int32_t bits;
-        std::memcpy(&bits, values + n, 4);
-        most = std::max(most, bits & 0x7fffffff);
-    }
-    float largest;
-    std::memcpy(&largest, &most, 4);
-    return largest;
-}
-
 // Voxels around one that its value after a step can come from.
 int reach_of(const StaggeredIn &displacement, Workers &workers) {
-    float farthest = 0;
-    for (int c = 0; c < 3; ++c) {
-        const In u = displacement[c];
-        std::vector<float> slabs(std::size_t(u.n[0]));
-        workers.run(u.n[0], [&](int i) { slabs[i] = largest_size(u.row(i, 0), u.slab_size()); });
-        farthest = std::max(farthest, *std::max_element(slabs.begin(), slabs.end()));
-    }
     const float longest =
         float(*std::max_element(displacement.box.cells.begin(), displacement.box.cells.end()));
-    return int(std::ceil(std::min(longest, farthest))) + 1; // NaN counts as the longest
+    return int(std::ceil(std::min(longest, largest_size(displacement, workers)))) +
+           1; // NaN counts as the longest
 }
 
 // Calls at(i, j, span, way) for every row, with the part of it where there can be something and the ways

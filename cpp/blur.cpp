@@ -1,5 +1,7 @@
 #include "blur.h"
 
+#include "vectors.h"
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -19,13 +21,6 @@ std::vector<float> gaussian(double width, double truncate) {
     for (double value : values)
         weights.push_back(float(value / sum));
     return weights;
-}
-
-SMOKELIFT_CLONES
-void add(const float *__restrict a, float factor, float *__restrict out, const Span &span) {
-    const int end = span[1];
-    for (int i = span[0]; i < end; ++i)
-        out[i] += factor * a[i];
 }
 
 } // namespace
@@ -50,7 +45,8 @@ void blur(In a, double width, double truncate, Out result, Workers &workers) {
             const int from = mirrored(i + t, nx);
             for (int j = 0; j < ny; ++j) {
                 const Span &span = filled[std::size_t(from) * ny + j];
-                add(a.row(from, j), weights[radius + t], slab.data() + std::size_t(j) * nz, span);
+                axpy(weights[radius + t], a.row(from, j) + span[0],
+                     slab.data() + std::size_t(j) * nz + span[0], span[1] - span[0]);
                 spans[j] = joined(spans[j], span);
             }
         }
@@ -61,7 +57,9 @@ void blur(In a, double width, double truncate, Out result, Workers &workers) {
             Span span{0, 0};
             for (int t = -radius; t <= radius; ++t) {
                 const int from = mirrored(j + t, ny);
-                add(slab.data() + std::size_t(from) * nz, weights[radius + t], inner, spans[from]);
+                const auto [first, end] = spans[from];
+                axpy(weights[radius + t], slab.data() + std::size_t(from) * nz + first, inner + first,
+                     end - first);
                 span = joined(span, spans[from]);
             }
             std::fill_n(out, nz, 0.0f);
@@ -71,9 +69,9 @@ void blur(In a, double width, double truncate, Out result, Workers &workers) {
                 inner[-t] = inner[mirrored(-t, nz)];
                 inner[nz - 1 + t] = inner[mirrored(nz - 1 + t, nz)];
             }
-            const Span reached{std::max(span[0] - radius, 0), std::min(span[1] + radius, nz)};
+            const int first = std::max(span[0] - radius, 0), end = std::min(span[1] + radius, nz);
             for (int t = 0; t <= 2 * radius; ++t)
-                add(row.data() + t, weights[t], out, reached);
+                axpy(weights[t], row.data() + t + first, out + first, end - first);
         }
     });
 }

@@ -14,6 +14,7 @@
 #include "extraction.h"
 
 #include "compiler.h"
+#include "vectors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -387,13 +388,6 @@ double step_along(float step, const Level &level, float *coefficients, float *re
     return total(sum);
 }
 
-// y = x + factor y.
-SMOKELIFT_CLONES
-void add_scaled(const float *x, float factor, float *y, std::size_t count) {
-    for (std::size_t at = 0; at < count; ++at)
-        y[at] = x[at] + factor * y[at];
-}
-
 // result = (prior + collect system expand) of; their scalar product.
 double Pyramid::apply(Values Level::*of, Values Level::*result) {
     expand(of);
@@ -425,7 +419,7 @@ void Pyramid::solve(int iterations) {
     float factor = 0;
     for (int n = 0; n < iterations && now > double(ENOUGH) * ENOUGH * first; ++n) {
         for (Level &level : levels_)
-            add_scaled(level.preconditioned.data(), factor, level.direction.data(), 4 * level.cells());
+            xpay(level.preconditioned.data(), factor, level.direction.data(), 4 * level.cells());
         const double curvature = apply(&Level::direction, &Level::product);
         if (!(curvature > 0))
             break;

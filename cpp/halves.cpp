@@ -1,5 +1,7 @@
 #include "halves.h"
 
+#include "vectors.h"
+
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -8,23 +10,13 @@
 namespace smokelift {
 namespace {
 
+// near x weight + far x (1 - weight)
 SMOKELIFT_CLONES
-void mean(const float *__restrict a, const float *__restrict b, float *__restrict out, int n) {
+void mix(const float *__restrict near, const float *__restrict far, float weight, float *__restrict out,
+         int n) {
+    const float rest = 1 - weight;
     for (int k = 0; k < n; ++k)
-        out[k] = 0.5f * a[k] + 0.5f * b[k];
-}
-
-SMOKELIFT_CLONES
-void half(const float *__restrict a, float *__restrict out, int n) {
-    for (int k = 0; k < n; ++k)
-        out[k] = 0.5f * a[k];
-}
-
-// Three quarters of the one and a quarter of the other.
-SMOKELIFT_CLONES
-void mix(const float *__restrict near, const float *__restrict far, float *__restrict out, int n) {
-    for (int k = 0; k < n; ++k)
-        out[k] = 0.75f * near[k] + 0.25f * far[k];
+        out[k] = weight * near[k] + rest * far[k];
 }
 
 SMOKELIFT_CLONES
@@ -69,8 +61,8 @@ public:
     const float *row(int y) {
         const std::size_t near = std::size_t(y / 2) * length_, far = std::size_t(beside(y, rows_)) * length_;
         for (int p = 0; p < 2; ++p)
-            mix(planes_[p].data() + near, planes_[p].data() + far, row_.data() + p * length_, length_);
-        mix(row_.data(), row_.data() + length_, result_.data(), length_);
+            mix(planes_[p].data() + near, planes_[p].data() + far, 0.75f, row_.data() + p * length_, length_);
+        mix(row_.data(), row_.data() + length_, 0.75f, result_.data(), length_);
         return result_.data();
     }
 
@@ -96,14 +88,14 @@ void means_of_two(const Part<const float> &fine, const std::optional<Part<const 
             for (int y = 0; y < along_y; ++y) {
                 const float *low = row_at(2 * i, 2 * j + y);
                 if (2 * i + 1 < n[0])
-                    mean(low, row_at(2 * i + 1, 2 * j + y), both + y * n[2], n[2]);
+                    mix(low, row_at(2 * i + 1, 2 * j + y), 0.5f, both + y * n[2], n[2]);
                 else
-                    half(low, both + y * n[2], n[2]);
+                    scale(0.5f, low, both + y * n[2], n[2]);
             }
             if (along_y == 2)
-                mean(both, both + n[2], row, n[2]);
+                mix(both, both + n[2], 0.5f, row, n[2]);
             else
-                half(both, row, n[2]);
+                scale(0.5f, both, row, n[2]);
             float *out = coarse.row(i, j);
             for (int k = 0; k < n[2] / 2; ++k)
                 out[k] = 0.5f * row[2 * k] + 0.5f * row[2 * k + 1];

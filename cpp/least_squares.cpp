@@ -22,19 +22,6 @@ void multiply(const float *__restrict a, float *__restrict out, std::size_t n) {
         out[i] *= a[i];
 }
 
-SMOKELIFT_CLONES
-void minus_product(const float *__restrict a, const float *__restrict b, float *__restrict out,
-                   std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
-        out[i] = -(a[i] * b[i]);
-}
-
-SMOKELIFT_CLONES
-void scaled(const float *__restrict a, float factor, float *__restrict out, std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
-        out[i] = factor * a[i];
-}
-
 // Enough blocks of slabs for some threads, each of so many that the slabs computed twice at its ends hardly
 // count.
 constexpr int BLOCKS = 8, MIN_SLABS = 4, MAX_SLABS = 16;
@@ -95,12 +82,11 @@ void LeastSquares::stress(Window &window, bool irrotational, int i) const {
 // weight direction . u in the cells of slab i; with an offset, - weight offset.
 void LeastSquares::along(Window &window, const StaggeredIn &u, In offset, int i) const {
     const Out out = window.along(i);
-    if (offset.data) {
-        minus_product(offset.row(i, 0), weight_.row(i, 0), out.data, out.slab_size());
-    } else {
+    if (offset.data)
+        scale(-1, offset.row(i, 0), out.data, out.slab_size());
+    else
         directional_slab(u, direction_, out, i);
-        multiply(weight_.row(i, 0), out.data, out.slab_size());
-    }
+    multiply(weight_.row(i, 0), out.data, out.slab_size());
 }
 
 // Slab i of the result from what the window holds around it; returns its scalar product with u.
@@ -116,7 +102,7 @@ double LeastSquares::finish(Window &window, const StaggeredIn &u, const Staggere
                                 {0, 0, 0}, u[c].n, r.first_order, {}, out[c]);
                 axpy(r.kinetic, a.data, out[c].data, a.slab_size());
             } else {
-                scaled(a.data, r.kinetic, out[c].data, a.slab_size());
+                scale(r.kinetic, a.data, out[c].data, a.slab_size());
             }
         }
     add_curl_transposed_slab(read(window.stress(i)), read(window.stress(i + 1)), out);

@@ -1,5 +1,7 @@
 #include "marked_voxels.h"
 
+#include "vectors.h"
+
 #include <algorithm>
 
 namespace smokelift {
@@ -18,12 +20,6 @@ void find_stretches(int begin, int end, const Marked &marked, const Found &found
             ++z;
         found(first, z);
     }
-}
-
-SMOKELIFT_CLONES
-void multiply(const float *__restrict values, float factor, float *__restrict to, int count) {
-    for (int k = 0; k < count; ++k)
-        to[k] = factor * values[k];
 }
 
 // Means over the cubes of one lattice: cube number (coordinate + offset) / size along every axis.
@@ -133,7 +129,7 @@ void MarkedVoxels::take(const float *volume, float *values, Workers &workers) co
 void MarkedVoxels::put(const float *values, float factor, float *volume, Workers &workers) const {
     workers.run(n_[0], [&](int x) {
         in_plane(x, [&](int y, int z, int count, std::size_t at) {
-            multiply(values + at, factor, volume + (std::size_t(x) * n_[1] + y) * n_[2] + z, count);
+            scale(factor, values + at, volume + (std::size_t(x) * n_[1] + y) * n_[2] + z, count);
         });
     });
 }

@@ -1,9 +1,9 @@
 #include "projection.h"
 
 #include "operators.h"
+#include "vectors.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace smokelift {
 namespace {
@@ -53,14 +53,6 @@ void subtract_gradient_slab(In p, const StaggeredOut &u, int i) {
     }
 }
 
-SMOKELIFT_CLONES
-float largest(const float *p, std::size_t n) {
-    float value = 0;
-    for (std::size_t i = 0; i < n; ++i)
-        value = std::max(value, std::abs(p[i]));
-    return value;
-}
-
 // Walls let nothing through.
 void stop_at_walls(const StaggeredOut &u) {
     for (int side = 0; side < 6; ++side) {
@@ -88,18 +80,13 @@ void Projection::apply(const StaggeredOut &u, Workers &workers) {
 
 double relative_divergence(const StaggeredIn &u, Workers &workers) {
     const auto [nx, ny, nz] = u.box.cells;
-    std::vector<float> speeds(nx + 1), outflows(nx + 1);
-    workers.run(nx + 1, [&, nx = nx, ny = ny, nz = nz](int i) {
-        for (const In &component : u.faces)
-            if (i < component.n[0])
-                speeds[i] = std::max(speeds[i], largest(component.row(i, 0), component.slab_size()));
-        if (i < nx) {
-            Field cells(Shape{1, ny, nz});
-            divergence_slab(u, cells, i);
-            outflows[i] = largest(cells.data().data(), cells.data().size());
-        }
+    std::vector<float> outflows(nx);
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
+        Field cells(Shape{1, ny, nz});
+        divergence_slab(u, cells, i);
+        outflows[i] = largest_size(cells.data().data(), cells.data().size());
     });
-    const float speed = *std::max_element(speeds.begin(), speeds.end());
+    const float speed = largest_size(u, workers);
     const float outflow = *std::max_element(outflows.begin(), outflows.end());
     return speed > 0 ? double(outflow) / double(speed) : 0;
 }

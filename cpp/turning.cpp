@@ -2,6 +2,7 @@
 
 #include "compiler.h"
 #include "exponential.h"
+#include "vectors.h"
 
 #include <algorithm>
 #include <array>
@@ -47,12 +48,6 @@ Taps taps_of(const Turned &turned, int i, int j) {
 int chunks_of(int nz) { return (nz + chunk - 1) / chunk; }
 
 SMOKELIFT_CLONES
-void add(const float *__restrict a, float factor, float *__restrict out, int n) {
-    for (int k = 0; k < n; ++k)
-        out[k] += factor * a[k];
-}
-
-SMOKELIFT_CLONES
 void multiply_by_exponential(const float *__restrict logarithm, float *__restrict out, int n) {
     for (int k = 0; k < n; ++k) {
         out[k] *= exponential(logarithm[k]);
@@ -94,8 +89,8 @@ void project_turned(In volume, const int *spans, const Turned &turned, float *pi
             const int k = std::max(part * chunk, span[0]), end = std::min((part + 1) * chunk, span[1]);
             for (int t = 0; t < taps && k < end; ++t)
                 if (one.weights[t] != 0)
-                    add(volume.row(i, j) + k, one.weights[t], picture + std::size_t(one.first + t) * nz + k,
-                        end - k);
+                    axpy(one.weights[t], volume.row(i, j) + k, picture + std::size_t(one.first + t) * nz + k,
+                         end - k);
         }
     });
 }
@@ -114,7 +109,7 @@ void scale_turned(Out volume, const int *spans, const Turned &turned, const floa
             std::fill_n(read.begin(), count, 0.0f);
             for (int t = 0; t < taps; ++t)
                 if (one.weights[t] != 0)
-                    add(logarithm + std::size_t(one.first + t) * nz + k, one.weights[t], read.data(), count);
+                    axpy(one.weights[t], logarithm + std::size_t(one.first + t) * nz + k, read.data(), count);
             multiply_by_exponential(read.data(), volume.row(i, j) + k, count);
         }
     });

@@ -1,6 +1,9 @@
 #include "vectors.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <vector>
 
 namespace smokelift {
 
@@ -33,6 +36,27 @@ void xpay(const float *__restrict x, float factor, float *__restrict y, std::siz
         y[i] = x[i] + factor * y[i];
 }
 
+SMOKELIFT_CLONES
+void scale(float factor, const float *x, float *y, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i)
+        y[i] = factor * x[i];
+}
+
+// Numbers of one sign are in the order of their bits, and compilers turn the largest of integers into vector
+// code.
+SMOKELIFT_CLONES
+float largest_size(const float *x, std::size_t n) {
+    std::int32_t most = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        std::int32_t bits;
+        std::memcpy(&bits, x + i, 4);
+        most = std::max(most, bits & 0x7fffffff);
+    }
+    float largest;
+    std::memcpy(&largest, &most, 4);
+    return largest;
+}
+
 void axpy(float factor, const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {
     for (int c = 0; c < 3; ++c)
         workers.run(x[c].n[0],
@@ -42,6 +66,17 @@ void axpy(float factor, const StaggeredIn &x, const StaggeredOut &y, Workers &wo
 void copy(const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {
     for (int c = 0; c < 3; ++c)
         workers.run(x[c].n[0], [&](int i) { std::copy_n(x[c].row(i, 0), x[c].slab_size(), y[c].row(i, 0)); });
+}
+
+float largest_size(const StaggeredIn &x, Workers &workers) {
+    float largest = 0;
+    for (const In &component : x.faces) {
+        std::vector<float> slabs(std::size_t(component.n[0]));
+        workers.run(component.n[0],
+                    [&](int i) { slabs[i] = largest_size(component.row(i, 0), component.slab_size()); });
+        largest = std::max(largest, *std::max_element(slabs.begin(), slabs.end()));
+    }
+    return largest;
 }
 
 } // namespace smokelift
