@@ -90,8 +90,8 @@ void Poisson::solve(Out f, Workers &workers) const {
         subtract_mean(f, workers);
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> scratch;
-        z_.rows_to_modes(f.row(i, 0), ny, f.row(i, 0), scratch);
-        y_.columns_to_modes(f.row(i, 0), nz, nz, f.row(i, 0), nz, scratch);
+        z_.to_modes({f.row(i, 0), 1, nz}, ny, {f.row(i, 0), 1, nz}, scratch);
+        y_.to_modes({f.row(i, 0), nz, 1}, nz, {f.row(i, 0), nz, 1}, scratch);
     });
     workers.run(ny, [&, nx = nx, nz = nz](int j) {
         thread_local std::vector<float> pivots;
@@ -100,8 +100,8 @@ void Poisson::solve(Out f, Workers &workers) const {
     });
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> scratch;
-        y_.columns_from_modes(f.row(i, 0), nz, nz, f.row(i, 0), nz, scratch);
-        z_.rows_from_modes(f.row(i, 0), ny, f.row(i, 0), scratch);
+        y_.from_modes({f.row(i, 0), nz, 1}, nz, {f.row(i, 0), nz, 1}, scratch);
+        z_.from_modes({f.row(i, 0), 1, nz}, ny, {f.row(i, 0), 1, nz}, scratch);
     });
 }
 

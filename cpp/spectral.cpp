@@ -60,8 +60,8 @@ double Spectral::precondition(const StaggeredIn &derivative, Workers &workers) {
         workers.run(from.n[0], [&](int i) {
             thread_local std::vector<float> scratch, rows;
             rows.resize(std::size_t(from.n[1]) * mz);
-            z.rows_to_modes(from.row(i, 0), from.n[1], rows.data(), scratch);
-            y.columns_to_modes(rows.data(), mz, mz, to.row(i, 0), mz, scratch);
+            z.to_modes({from.row(i, 0), 1, from.n[2]}, from.n[1], {rows.data(), 1, mz}, scratch);
+            y.to_modes({rows.data(), mz, 1}, mz, {to.row(i, 0), mz, 1}, scratch);
         });
     }
     return workers.sum(my, [&](int j) {
@@ -71,7 +71,7 @@ double Spectral::precondition(const StaggeredIn &derivative, Workers &workers) {
         products.assign(mz, 0);
         for (int c = 0; c < 3; ++c) {
             const LineTransform &x = c == 0 ? faces_[0] : cells_[0];
-            x.columns_to_modes(expansion_[c].row(0, j), plane, mz, modes.data() + c * size, mz, scratch);
+            x.to_modes({expansion_[c].row(0, j), plane, 1}, mz, {modes.data() + c * size, mz, 1}, scratch);
         }
         for (int i = 0; i < modes_[0]; ++i) {
             float *row = modes.data() + std::size_t(i) * mz;
@@ -80,7 +80,7 @@ double Spectral::precondition(const StaggeredIn &derivative, Workers &workers) {
         }
         for (int c = 0; c < 3; ++c) {
             const LineTransform &x = c == 0 ? faces_[0] : cells_[0];
-            x.columns_from_modes(modes.data() + c * size, mz, mz, expansion_[c].row(0, j), plane, scratch);
+            x.from_modes({modes.data() + c * size, mz, 1}, mz, {expansion_[c].row(0, j), plane, 1}, scratch);
         }
         double sum = 0;
         for (float product : products)
@@ -98,8 +98,8 @@ void Spectral::descend(float factor, const StaggeredOut &search, Workers &worker
             thread_local std::vector<float> scratch, rows, gradient;
             rows.resize(std::size_t(to.n[1]) * mz);
             gradient.resize(to.slab_size());
-            y.columns_from_modes(from.row(i, 0), mz, mz, rows.data(), mz, scratch);
-            z.rows_from_modes(rows.data(), to.n[1], gradient.data(), scratch);
+            y.from_modes({from.row(i, 0), mz, 1}, mz, {rows.data(), mz, 1}, scratch);
+            z.from_modes({rows.data(), 1, mz}, to.n[1], {gradient.data(), 1, to.n[2]}, scratch);
             xpay(gradient.data(), factor, to.row(i, 0), to.slab_size());
         });
     }

@@ -262,103 +262,69 @@ SMOKELIFT_INLINE int at(const int *order, int i) {
     return width * (order ? order[i] : i);
 }
 
-// Lines that are rows, side by side: element i of every line to row order[i] of x, or back.
+// Some lines side by side: element i of each to row order[i] of x, or back.
 SMOKELIFT_CLONES
-void rows_in(const float *rows, int length, int lines, const int *order, float *x) {
+void lines_in(const Lines<const float> &from, int length, int lines, const int *order, float *x) {
     int i = 0;
-    for (; lines == width && i + width <= length; i += width) {
+    for (; from.along == 1 && lines == width && i + width <= length; i += width) {
         Vector block[width];
         for (int l = 0; l < width; ++l)
-            block[l] = *reinterpret_cast<const Vector *>(rows + std::size_t(l) * length + i);
+            block[l] = *reinterpret_cast<const Vector *>(from.at(i, l));
         transpose(block);
         for (int k = 0; k < width; ++k)
             *reinterpret_cast<Vector *>(x + at(order, i + k)) = block[k];
     }
     for (; i < length; ++i)
-        for (int l = 0; l < lines; ++l)
-            x[at(order, i) + l] = rows[std::size_t(l) * length + i];
+        if (from.apart == 1 && lines == width)
+            *reinterpret_cast<Vector *>(x + at(order, i)) = *reinterpret_cast<const Vector *>(from.at(i));
+        else
+            for (int l = 0; l < lines; ++l)
+                x[at(order, i) + l] = *from.at(i, l);
 }
 
 SMOKELIFT_CLONES
-void rows_out(float *rows, int length, int lines, const int *order, const float *x) {
+void lines_out(const Lines<float> &to, int length, int lines, const int *order, const float *x) {
     int i = 0;
-    for (; lines == width && i + width <= length; i += width) {
+    for (; to.along == 1 && lines == width && i + width <= length; i += width) {
         Vector block[width];
         for (int k = 0; k < width; ++k)
             block[k] = *reinterpret_cast<const Vector *>(x + at(order, i + k));
         transpose(block);
         for (int l = 0; l < width; ++l)
-            *reinterpret_cast<Vector *>(rows + std::size_t(l) * length + i) = block[l];
+            *reinterpret_cast<Vector *>(to.at(i, l)) = block[l];
     }
     for (; i < length; ++i)
-        for (int l = 0; l < lines; ++l)
-            rows[std::size_t(l) * length + i] = x[at(order, i) + l];
-}
-
-// The same for lines that are columns.
-SMOKELIFT_CLONES
-void columns_in(const float *rows, int stride, int length, int lines, const int *order, float *x) {
-    for (int i = 0; i < length; ++i, rows += stride)
-        if (lines == width)
-            *reinterpret_cast<Vector *>(x + at(order, i)) = *reinterpret_cast<const Vector *>(rows);
+        if (to.apart == 1 && lines == width)
+            *reinterpret_cast<Vector *>(to.at(i)) = *reinterpret_cast<const Vector *>(x + at(order, i));
         else
-            std::copy_n(rows, lines, x + at(order, i));
-}
-
-SMOKELIFT_CLONES
-void columns_out(float *rows, int stride, int length, int lines, const int *order, const float *x) {
-    for (int i = 0; i < length; ++i, rows += stride)
-        if (lines == width)
-            *reinterpret_cast<Vector *>(rows) = *reinterpret_cast<const Vector *>(x + at(order, i));
-        else
-            std::copy_n(x + at(order, i), lines, rows);
-}
-
-// Calls group(first, lines, x, y) for as many lines at a time as are transformed at once, with room for their
-// points and modes.
-template <class Group>
-void in_groups(int count, int length, int modes, std::vector<float> &scratch, const Group &group) {
-    scratch.resize(std::size_t(length + modes) * width);
-    for (int first = 0; first < count; first += width)
-        group(first, std::min(width, count - first), scratch.data(), scratch.data() + length * width);
+            for (int l = 0; l < lines; ++l)
+                *to.at(i, l) = x[at(order, i) + l];
 }
 
 } // namespace
 
-void LineTransform::rows_to_modes(const float *points, int count, float *modes,
-                                  std::vector<float> &scratch) const {
-    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
-        rows_in(points + std::size_t(first) * length_, length_, lines, nullptr, x);
+void LineTransform::to_modes(const Lines<const float> &points, int count, const Lines<float> &modes,
+                             std::vector<float> &scratch) const {
+    scratch.resize(std::size_t(length_ + modes_) * width);
+    float *const x = scratch.data(), *const y = x + length_ * width;
+    for (int first = 0; first < count; first += width) {
+        const int lines = std::min(width, count - first);
+        lines_in(points.from(first), length_, lines, nullptr, x);
         analyse(x, y);
-        rows_out(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
-    });
+        lines_out(modes.from(first), modes_, lines, rows_.data(), y);
+    }
 }
 
-void LineTransform::rows_from_modes(const float *modes, int count, float *points,
-                                    std::vector<float> &scratch) const {
-    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
-        rows_in(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
+void LineTransform::from_modes(const Lines<const float> &modes, int count, const Lines<float> &points,
+                               std::vector<float> &scratch) const {
+    scratch.resize(std::size_t(length_ + modes_) * width);
+    float *const x = scratch.data(), *const y = x + length_ * width;
+    for (int first = 0; first < count; first += width) {
+        const int lines = std::min(width, count - first);
+        lines_in(modes.from(first), modes_, lines, rows_.data(), y);
         synthesize(y, x);
-        rows_out(points + std::size_t(first) * length_, length_, lines, nullptr, x);
-    });
-}
-
-void LineTransform::columns_to_modes(const float *points, int stride, int count, float *modes,
-                                     int modes_stride, std::vector<float> &scratch) const {
-    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
-        columns_in(points + first, stride, length_, lines, nullptr, x);
-        analyse(x, y);
-        columns_out(modes + first, modes_stride, modes_, lines, rows_.data(), y);
-    });
-}
-
-void LineTransform::columns_from_modes(const float *modes, int modes_stride, int count, float *points,
-                                       int stride, std::vector<float> &scratch) const {
-    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
-        columns_in(modes + first, modes_stride, modes_, lines, rows_.data(), y);
-        synthesize(y, x);
-        columns_out(points + first, stride, length_, lines, nullptr, x);
-    });
+        lines_out(points.from(first), length_, lines, nullptr, x);
+    }
 }
 
 AxisModes::AxisModes(int n, bool closed_low, bool closed_high, int count) : n_(n), count_(count) {

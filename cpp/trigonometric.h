@@ -3,6 +3,7 @@
 // (docs/experiments/velocity-solver.md).
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace smokelift {
@@ -11,6 +12,16 @@ namespace smokelift {
 //     I  k pi i / n            II  k pi (i + 1/2) / n
 //    III (k + 1/2) pi i / n    IV  (k + 1/2) pi (i + 1/2) / n
 enum class Transform { dct1, dst1, dct2, dst2, dct3, dst3, dct4, dst4 };
+
+// Lines whose elements are `along` from one to the next in memory, and those of neighboring lines `apart`:
+// one of the two is 1.
+template <class T> struct Lines {
+    T *first;
+    std::ptrdiff_t along, apart;
+
+    T *at(int i, int line = 0) const { return first + i * along + line * apart; }
+    Lines from(int line) const { return {at(0, line), along, apart}; }
+};
 
 // Each transform is split into two of half the size, with sums and differences of pairs of points before or
 // rotations of pairs of modes after (Wang 1984, IEEE Trans. ASSP 32, 803), until what is left is small or
@@ -23,17 +34,11 @@ public:
     // constant, on lines of n cells (II, IV) or n + 1 faces (I, III).
     LineTransform(Transform transform, int n, int first, int count);
 
-    // Lines are rows: `count` lines of `length` points one after the other, or as many of `modes`
-    // coefficients. Input and output may be the same memory if length = modes.
-    void rows_to_modes(const float *points, int count, float *modes, std::vector<float> &scratch) const;
-    void rows_from_modes(const float *modes, int count, float *points, std::vector<float> &scratch) const;
-
-    // Lines are columns: `count` neighboring ones, their rows `stride` apart. Input and output may be the
-    // same.
-    void columns_to_modes(const float *points, int stride, int count, float *modes, int modes_stride,
-                          std::vector<float> &scratch) const;
-    void columns_from_modes(const float *modes, int modes_stride, int count, float *points, int stride,
-                            std::vector<float> &scratch) const;
+    // `count` lines of points to as many of modes, and back. Both may be the same memory if lines lie alike.
+    void to_modes(const Lines<const float> &points, int count, const Lines<float> &modes,
+                  std::vector<float> &scratch) const;
+    void from_modes(const Lines<const float> &modes, int count, const Lines<float> &points,
+                    std::vector<float> &scratch) const;
 
 private:
     // Rows a and b of a line become aa a + ab b and ba a + bb b.
