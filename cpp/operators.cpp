@@ -17,61 +17,55 @@ void divergence_slab(const In3 &u, Out cells, int i) {
     }
 }
 
+namespace {
+
+// out (+)= (a1 - a0) - (b1 - b0)
+template <bool Add>
+SMOKELIFT_INLINE void rotation(const float *a0, const float *a1, const float *b0, const float *b1, int n,
+                               float *__restrict out) {
+    for (int k = 0; k < n; ++k) {
+        const float value = (a1[k] - a0[k]) - (b1[k] - b0[k]);
+        out[k] = Add ? out[k] + value : value;
+    }
+}
+
+} // namespace
+
 SMOKELIFT_CLONES
 void curl_slab(const In3 &u, const Out3 &w, int i) {
     const int nx = u[1].n[0], ny = u[0].n[1], nz = u[0].n[2];
     if (i < nx)
         for (int j = 1; j < ny; ++j) {
-            const float *__restrict z0 = u[2].row(i, j - 1), *__restrict z1 = u[2].row(i, j);
-            const float *__restrict y = u[1].row(i, j);
-            float *__restrict out = w[0].row(0, j);
-            for (int k = 1; k < nz; ++k)
-                out[k] = (z1[k] - z0[k]) - (y[k] - y[k - 1]);
+            const float *y = u[1].row(i, j);
+            rotation<false>(u[2].row(i, j - 1) + 1, u[2].row(i, j) + 1, y, y + 1, nz - 1, w[0].row(0, j) + 1);
         }
     if (i < 1 || i >= nx)
         return;
     for (int j = 0; j < ny; ++j) {
-        const float *__restrict z0 = u[2].row(i - 1, j), *__restrict z1 = u[2].row(i, j);
-        const float *__restrict x = u[0].row(i, j);
-        float *__restrict out = w[1].row(0, j);
-        for (int k = 1; k < nz; ++k)
-            out[k] = (x[k] - x[k - 1]) - (z1[k] - z0[k]);
+        const float *x = u[0].row(i, j);
+        rotation<false>(x, x + 1, u[2].row(i - 1, j) + 1, u[2].row(i, j) + 1, nz - 1, w[1].row(0, j) + 1);
     }
-    for (int j = 1; j < ny; ++j) {
-        const float *__restrict y0 = u[1].row(i - 1, j), *__restrict y1 = u[1].row(i, j);
-        const float *__restrict x0 = u[0].row(i, j - 1), *__restrict x1 = u[0].row(i, j);
-        float *__restrict out = w[2].row(0, j);
-        for (int k = 0; k < nz; ++k)
-            out[k] = (y1[k] - y0[k]) - (x1[k] - x0[k]);
-    }
+    for (int j = 1; j < ny; ++j)
+        rotation<false>(u[1].row(i - 1, j), u[1].row(i, j), u[0].row(i, j - 1), u[0].row(i, j), nz,
+                        w[2].row(0, j));
 }
 
 SMOKELIFT_CLONES
 void add_curl_transposed_slab(const In3 &w, const In3 &after, const Out3 &u) {
     const int ny = u[0].n[1], nz = u[0].n[2];
     for (int j = 0; j < ny; ++j) {
-        float *__restrict out = u[0].row(0, j);
-        const float *__restrict y = w[1].row(0, j);
-        const float *__restrict z0 = w[2].row(0, j), *__restrict z1 = w[2].row(0, j + 1);
-        for (int k = 0; k < nz; ++k)
-            out[k] += (y[k] - y[k + 1]) - (z0[k] - z1[k]);
+        const float *y = w[1].row(0, j);
+        rotation<true>(y + 1, y, w[2].row(0, j + 1), w[2].row(0, j), nz, u[0].row(0, j));
     }
     if (!u[1].data)
         return;
     for (int j = 0; j <= ny; ++j) {
-        float *__restrict out = u[1].row(0, j);
-        const float *__restrict x = w[0].row(0, j);
-        const float *__restrict z0 = w[2].row(0, j), *__restrict z1 = after[2].row(0, j);
-        for (int k = 0; k < nz; ++k)
-            out[k] += (z0[k] - z1[k]) - (x[k] - x[k + 1]);
+        const float *x = w[0].row(0, j);
+        rotation<true>(after[2].row(0, j), w[2].row(0, j), x + 1, x, nz, u[1].row(0, j));
     }
-    for (int j = 0; j < ny; ++j) {
-        float *__restrict out = u[2].row(0, j);
-        const float *__restrict x0 = w[0].row(0, j), *__restrict x1 = w[0].row(0, j + 1);
-        const float *__restrict y0 = w[1].row(0, j), *__restrict y1 = after[1].row(0, j);
-        for (int k = 0; k <= nz; ++k)
-            out[k] += (x0[k] - x1[k]) - (y0[k] - y1[k]);
-    }
+    for (int j = 0; j < ny; ++j)
+        rotation<true>(w[0].row(0, j + 1), w[0].row(0, j), after[1].row(0, j), w[1].row(0, j), nz + 1,
+                       u[2].row(0, j));
 }
 
 SMOKELIFT_CLONES

@@ -8,48 +8,41 @@
 namespace smokelift {
 namespace {
 
+// Row number i of faces += the change of the pressure from the row of cells before it to that after it. There
+// are n of these, and beyond them two sides. On an open side the pressure is zero on the side itself, half a
+// cell away.
+SMOKELIFT_INLINE void add_change(float *__restrict faces, const float *__restrict before,
+                                 const float *__restrict after, int i, int n, const bool *closed,
+                                 int length) {
+    if (i > 0 && i < n) {
+        for (int k = 0; k < length; ++k)
+            faces[k] += after[k] - before[k];
+    } else if (!closed[i > 0]) {
+        const float *__restrict beside = i > 0 ? before : after;
+        const float sign = i > 0 ? -2.0f : 2.0f;
+        for (int k = 0; k < length; ++k)
+            faces[k] += sign * beside[k];
+    }
+}
+
 SMOKELIFT_CLONES
 void subtract_gradient_slab(In p, const StaggeredOut &u, int i) {
-    const Box::Closed &closed = u.box.closed;
+    const bool *const closed = u.box.closed.data();
     const auto [nx, ny, nz] = p.n;
-    for (int j = 0; j < ny; ++j) {
-        float *__restrict x = u[0].row(i, j);
-        if (i > 0 && i < nx) {
-            const float *__restrict p0 = p.row(i - 1, j), *__restrict p1 = p.row(i, j);
-            for (int k = 0; k < nz; ++k)
-                x[k] += p1[k] - p0[k];
-        } else if (!closed[i > 0]) {
-            // Pressure is zero on the side itself, half a cell away.
-            const float *__restrict p0 = p.row(i > 0 ? nx - 1 : 0, j);
-            const float sign = i > 0 ? -2.0f : 2.0f;
-            for (int k = 0; k < nz; ++k)
-                x[k] += sign * p0[k];
-        }
-    }
+    for (int j = 0; j < ny; ++j)
+        add_change(u[0].row(i, j), p.row(std::max(i - 1, 0), j), p.row(std::min(i, nx - 1), j), i, nx, closed,
+                   nz);
     if (i == nx)
         return;
-    for (int j = 0; j <= ny; ++j) {
-        float *__restrict y = u[1].row(i, j);
-        if (j > 0 && j < ny) {
-            const float *__restrict p0 = p.row(i, j - 1), *__restrict p1 = p.row(i, j);
-            for (int k = 0; k < nz; ++k)
-                y[k] += p1[k] - p0[k];
-        } else if (!closed[2 + (j > 0)]) {
-            const float *__restrict p0 = p.row(i, j > 0 ? ny - 1 : 0);
-            const float sign = j > 0 ? -2.0f : 2.0f;
-            for (int k = 0; k < nz; ++k)
-                y[k] += sign * p0[k];
-        }
-    }
+    for (int j = 0; j <= ny; ++j)
+        add_change(u[1].row(i, j), p.row(i, std::max(j - 1, 0)), p.row(i, std::min(j, ny - 1)), j, ny,
+                   closed + 2, nz);
     for (int j = 0; j < ny; ++j) {
         float *__restrict z = u[2].row(i, j);
         const float *__restrict q = p.row(i, j);
-        for (int k = 1; k < nz; ++k)
-            z[k] += q[k] - q[k - 1];
-        if (!closed[4])
-            z[0] += 2 * q[0];
-        if (!closed[5])
-            z[nz] -= 2 * q[nz - 1];
+        add_change(z, q, q, 0, nz, closed + 4, 1);
+        add_change(z + 1, q, q + 1, 1, nz, closed + 4, nz - 1);
+        add_change(z + nz, q + nz - 1, q + nz - 1, nz, nz, closed + 4, 1);
     }
 }
 
