@@ -1,5 +1,6 @@
 // A grid and one half as fine: each of its voxels stands for two along every axis, the last of an odd number
-// for one. The docstrings in register_pictures.cpp say what each function does.
+// for one. The docstrings in register_pictures.cpp say what each function does. Boxes have consecutive
+// elements along z.
 #pragma once
 
 #include "grid.h"
@@ -10,14 +11,6 @@
 #include <optional>
 
 namespace smokelift {
-
-// A box of somebody's array, with consecutive elements along z.
-template <class T> struct Part {
-    Strided<T> at;
-    Shape n{};
-
-    T *row(int x, int y) const { return at.row(x, y); }
-};
 
 void means_of_two(const Part<const float> &fine, const std::optional<Part<const bool>> &marked,
                   const Out &coarse, Workers &workers);

@@ -167,9 +167,9 @@ template <class T> struct type_caster<smokelift::Part<T>> {
         smokelift::require_fit(given.ndim() == 3 && given.size() > 0);
         for (int axis = 0; axis < 3; ++axis) {
             value.n[axis] = int(given.shape(axis));
-            value.at.stride[axis] = given.strides(axis) / ssize_t(sizeof(T));
+            value.stride[axis] = given.strides(axis) / ssize_t(sizeof(T));
         }
-        value.at.data =
+        value.data =
             static_cast<T *>(std::is_const_v<T> ? const_cast<void *>(given.data()) : given.mutable_data());
         return true;
     }

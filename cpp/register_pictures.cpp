@@ -124,7 +124,7 @@ void register_places(py::module_ &module) {
 Shape halved(const Shape &n) { return {(n[0] + 1) / 2, (n[1] + 1) / 2, (n[2] + 1) / 2}; }
 
 // Neighbors along z have to be neighbors in memory.
-template <class... T> void require_rows(Part<T>... boxes) { require_fit(((boxes.at.stride[2] == 1) && ...)); }
+template <class... T> void require_rows(Part<T>... boxes) { require_fit(((boxes.stride[2] == 1) && ...)); }
 
 void register_halves(py::module_ &module) {
     module.def(

@@ -115,11 +115,6 @@ struct OwnedRays {
     }
 };
 
-template <class T> Strided<T> on_support(Part<T> box, const Support &support) {
-    require_fit(box.n == support.n);
-    return box.at;
-}
-
 Fields over_blocks(int fields, const Shape &n) { return Fields({fields, n[0], n[1], n[2]}); }
 
 Shape blocks_of(OverBlocks a) { return {int(a.n[1]), int(a.n[2]), int(a.n[3])}; }
@@ -162,8 +157,9 @@ void register_voxels(py::module_ &module) {
     module.def("pack",
                unlocked([](Workers &workers, Part<const float> density, const Support &support,
                            float extinction, VoxelArray medium) {
-                   pack(on_support(density, support), support.marked.data(), extinction, support.spans,
-                        voxels_of(medium, support), workers);
+                   require_fit(density.n == support.n);
+                   pack(density, support.marked.data(), extinction, support.spans, voxels_of(medium, support),
+                        workers);
                }),
                "density"_a, "support"_a, "extinction"_a, "medium"_a,
                "Write the extinction of the marked voxels from their density; ``extinction`` is in 1/m at "
@@ -173,8 +169,8 @@ void register_voxels(py::module_ &module) {
         "unpack",
         unlocked([](Workers &workers, VoxelArray gradient, const Support &support, float extinction,
                     Part<float> result) {
-            unpack(voxels_of(gradient, support), support.marked.data(), extinction,
-                   on_support(result, support), workers);
+            require_fit(result.n == support.n);
+            unpack(voxels_of(gradient, support), support.marked.data(), extinction, result, workers);
         }),
         "gradient"_a, "support"_a, "extinction"_a, "result"_a,
         "Write the derivative by density of the marked voxels into ``result``; others are left as they are.");

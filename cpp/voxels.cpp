@@ -44,8 +44,8 @@ Spans spans_around(const unsigned char *marked, const Shape &n) {
     return {around(along_z, n[0], n[1], n[2]), around(along_y, n[0], n[2], n[1]), n};
 }
 
-void pack(const Strided<const float> &density, const unsigned char *marked, float extinction,
-          const Spans &spans, const Voxels &medium, Workers &workers) {
+void pack(const Part<const float> &density, const unsigned char *marked, float extinction, const Spans &spans,
+          const Voxels &medium, Workers &workers) {
     const Shape &n = medium.n;
     workers.run(n[0], [&](int x) {
         for (int y = 0; y < n[1]; ++y) {
@@ -59,8 +59,8 @@ void pack(const Strided<const float> &density, const unsigned char *marked, floa
     });
 }
 
-void unpack(const Voxels &gradient, const unsigned char *marked, float extinction,
-            const Strided<float> &result, Workers &workers) {
+void unpack(const Voxels &gradient, const unsigned char *marked, float extinction, const Part<float> &result,
+            Workers &workers) {
     const Shape &n = gradient.n;
     workers.run(n[0], [&](int x) {
         for (int y = 0; y < n[1]; ++y) {

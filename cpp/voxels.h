@@ -70,20 +70,21 @@ struct Spans {
 Spans spans_around(const unsigned char *marked, const Shape &n);
 
 // A box of somebody's array, with its strides.
-template <class T> struct Strided {
-    T *data;
-    std::array<Stride, 3> stride;
+template <class T> struct Part {
+    T *data = nullptr;
+    std::array<Stride, 3> stride{};
+    Shape n{};
 
     T *row(int x, int y) const { return data + x * stride[0] + y * stride[1]; }
 };
 
 // Extinction of the marked voxels from their density.
-void pack(const Strided<const float> &density, const unsigned char *marked, float extinction,
-          const Spans &spans, const Voxels &medium, Workers &workers);
+void pack(const Part<const float> &density, const unsigned char *marked, float extinction, const Spans &spans,
+          const Voxels &medium, Workers &workers);
 
 // result = extinction x first channel at the marked voxels; the others are left as they are.
-void unpack(const Voxels &gradient, const unsigned char *marked, float extinction,
-            const Strided<float> &result, Workers &workers);
+void unpack(const Voxels &gradient, const unsigned char *marked, float extinction, const Part<float> &result,
+            Workers &workers);
 
 void clear(const Voxels &voxels, Workers &workers);
 
