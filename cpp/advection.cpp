@@ -136,12 +136,11 @@ void correct_row(const In &from, const In &once, const Way &way, bool extend, in
 std::vector<Span> spans_within(In a, int reach, Workers &workers) {
     const auto [nx, ny, nz] = a.n;
     std::vector<Span> own(std::size_t(nx) * ny, Span{0, 0}), along_y = own, result = own;
-    workers.run(nx, [&, ny = ny, nz = nz](int i) {
-        for (int j = 0; j < ny; ++j) {
-            const auto [first, end] = nonzero(a.row(i, j), nz);
-            if (first < end)
-                own[std::size_t(i) * ny + j] = {std::max(first - reach, 0), std::min(end + reach, nz)};
-        }
+    find_filled(a, own.data(), workers);
+    for (Span &span : own)
+        if (span[0] < span[1])
+            span = {std::max(span[0] - reach, 0), std::min(span[1] + reach, nz)};
+    workers.run(nx, [&, ny = ny](int i) {
         for (int j = 0; j < ny; ++j)
             for (int other = std::max(j - reach, 0); other < std::min(j + reach + 1, ny); ++other)
                 along_y[std::size_t(i) * ny + j] =

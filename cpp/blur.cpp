@@ -31,10 +31,7 @@ void blur(In a, double width, double truncate, Out result, Workers &workers) {
     const auto [nx, ny, nz] = a.n;
     // What is zero adds nothing, and most of a box around smoke is: from the first to the last of the others.
     std::vector<Span> filled(std::size_t(nx) * ny);
-    workers.run(nx, [&, ny = ny, nz = nz](int i) {
-        for (int j = 0; j < ny; ++j)
-            filled[std::size_t(i) * ny + j] = nonzero(a.row(i, j), nz);
-    });
+    find_filled(a, filled.data(), workers);
     // Rows along x first, out of the array, then along y and z within a slab.
     workers.run(nx, [&, nx = nx, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> slab, row;

@@ -47,16 +47,6 @@ SMOKELIFT_INLINE Span joined(const Span &a, const Span &b) {
     return {std::min(a[0], b[0]), std::max(a[1], b[1])};
 }
 
-// From the first to the last number of a row that is not zero.
-SMOKELIFT_INLINE Span nonzero(const float *row, int n) {
-    const float *first = row, *end = row + n;
-    while (first < end && *first == 0)
-        ++first;
-    while (end > first && end[-1] == 0)
-        --end;
-    return {int(first - row), int(end - row)};
-}
-
 // Where in a row of voxels the first is marked; its end if none is.
 inline int first_marked(const unsigned char *row, int n) {
     const void *found = std::memchr(row, 1, std::size_t(n));

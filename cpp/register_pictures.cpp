@@ -6,6 +6,7 @@
 #include "pictures.h"
 #include "python.h"
 #include "turning.h"
+#include "vectors.h"
 
 #include <optional>
 
@@ -52,11 +53,11 @@ void require_parts(Integers first, Index parts, Index whole) {
 }
 
 // Ranges of the columns (i, j) of a volume.
-const int *spans_of(Read<3, int> spans, const Shape &n) {
+const Span *spans_of(Read<3, int> spans, const Shape &n) {
     require_fit(spans.n == std::array<Index, 3>{n[0], n[1], 2});
     for (std::size_t at = 0; at < spans.size; ++at)
         require_fit(spans.data[at] >= 0 && spans.data[at] <= n[2]);
-    return spans.data;
+    return reinterpret_cast<const Span *>(spans.data);
 }
 
 void register_places(py::module_ &module) {
@@ -235,7 +236,7 @@ void register_codes(py::module_ &module) {
 void register_turning(py::module_ &module) {
     module.def("filled_spans", unlocked([](Workers &workers, In volume) {
                    Made<int, 3> spans({volume.n[0], volume.n[1], 2});
-                   find_filled(volume, spans.data(), workers);
+                   find_filled(volume, reinterpret_cast<Span *>(spans.data()), workers);
                    return spans;
                }),
                "volume"_a,

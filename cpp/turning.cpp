@@ -56,18 +56,7 @@ void multiply_by_exponential(const float *__restrict logarithm, float *__restric
 
 } // namespace
 
-void find_filled(In volume, int *spans, Workers &workers) {
-    const auto [nx, ny, nz] = volume.n;
-    workers.run(nx, [&, ny = ny, nz = nz](int i) {
-        for (int j = 0; j < ny; ++j) {
-            const auto [first, end] = nonzero(volume.row(i, j), nz);
-            int *const span = spans + 2 * (std::size_t(i) * ny + j);
-            span[0] = first, span[1] = end;
-        }
-    });
-}
-
-void project_turned(In volume, const int *spans, const Turned &turned, float *picture, Workers &workers) {
+void project_turned(In volume, const Span *spans, const Turned &turned, float *picture, Workers &workers) {
     const auto [nx, ny, nz] = volume.n;
     struct Filled {
         int i, j;
@@ -76,7 +65,7 @@ void project_turned(In volume, const int *spans, const Turned &turned, float *pi
     std::vector<Filled> filled;
     for (int i = 0; i < nx; ++i)
         for (int j = 0; j < ny; ++j)
-            if (const int *span = spans + 2 * (std::size_t(i) * ny + j); span[0] < span[1])
+            if (const auto [first, end] = spans[std::size_t(i) * ny + j]; first < end)
                 filled.push_back({i, j, {}});
     workers.run_ranges(filled.size(), columns_a_task, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n)
@@ -85,7 +74,7 @@ void project_turned(In volume, const int *spans, const Turned &turned, float *pi
     std::fill_n(picture, std::size_t(turned.columns) * nz, 0.0f);
     workers.run(chunks_of(nz), [&, ny = ny, nz = nz](int part) {
         for (const auto &[i, j, one] : filled) {
-            const int *const span = spans + 2 * (std::size_t(i) * ny + j);
+            const Span &span = spans[std::size_t(i) * ny + j];
             const int k = std::max(part * chunk, span[0]), end = std::min((part + 1) * chunk, span[1]);
             for (int t = 0; t < taps && k < end; ++t)
                 if (one.weights[t] != 0)
@@ -95,13 +84,13 @@ void project_turned(In volume, const int *spans, const Turned &turned, float *pi
     });
 }
 
-void scale_turned(Out volume, const int *spans, const Turned &turned, const float *logarithm,
+void scale_turned(Out volume, const Span *spans, const Turned &turned, const float *logarithm,
                   Workers &workers) {
     const auto [nx, ny, nz] = volume.n;
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         std::vector<float> read(nz);
         for (int j = 0; j < ny; ++j) {
-            const int *const span = spans + 2 * (std::size_t(i) * ny + j);
+            const Span &span = spans[std::size_t(i) * ny + j];
             const int k = span[0], count = span[1] - k;
             if (count <= 0)
                 continue;

@@ -14,9 +14,8 @@ struct Turned {
     int columns; // of the picture
 };
 
-void find_filled(In volume, int *spans, Workers &workers);
-void project_turned(In volume, const int *spans, const Turned &turned, float *picture, Workers &workers);
-void scale_turned(Out volume, const int *spans, const Turned &turned, const float *logarithm,
+void project_turned(In volume, const Span *spans, const Turned &turned, float *picture, Workers &workers);
+void scale_turned(Out volume, const Span *spans, const Turned &turned, const float *logarithm,
                   Workers &workers);
 
 } // namespace smokelift

@@ -57,6 +57,19 @@ float largest_size(const float *x, std::size_t n) {
     return largest;
 }
 
+void find_filled(In a, Span *spans, Workers &workers) {
+    workers.run(a.n[0], [&](int i) {
+        for (int j = 0; j < a.n[1]; ++j) {
+            const float *const row = a.row(i, j), *first = row, *end = row + a.n[2];
+            while (first < end && *first == 0)
+                ++first;
+            while (end > first && end[-1] == 0)
+                --end;
+            spans[std::size_t(i) * a.n[1] + j] = {int(first - row), int(end - row)};
+        }
+    });
+}
+
 void axpy(float factor, const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {
     for (int c = 0; c < 3; ++c)
         workers.run(x[c].n[0],
