@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.footage.images import Picture, area_average, reduced_size
+from smokelift.footage.images import Picture, area_average, brightest_channel, reduced_size
 from smokelift.footage.noise import median_of_seen
 
 COMPARED_SIDE = 160
@@ -45,7 +45,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     if usable.mean() < MIN_USABLE_FRACTION:
         return gains
     ratios = np.log(picture[usable] / background[usable])
-    if _all_three(np.abs(ratios) < SAME).mean() >= UNCHANGED:
+    if (brightest_channel(np.abs(ratios)) < SAME).mean() >= UNCHANGED:
         return gains
     middle, spread = zip(*(_shorth(ratios[:, channel]) for channel in range(3)), strict=True)
     if max(spread) > SPREAD:
@@ -76,13 +76,7 @@ def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:
 
 
 def _usable(picture: Picture) -> npt.NDArray[np.bool_]:
-    return _all_three((picture > USABLE[0]) & (picture < USABLE[1]))
-
-
-def _all_three(holds: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Whether all three channels (..., 3) hold; NumPy's ``all`` takes much longer along so short an axis."""
-    red, green, blue = np.moveaxis(holds, -1, 0)
-    return np.asarray(red & green & blue)
+    return np.asarray((brightest_channel(-picture) < -USABLE[0]) & (brightest_channel(picture) < USABLE[1]))
 
 
 def _shorth(values: npt.NDArray[np.float32]) -> tuple[float, float]:
