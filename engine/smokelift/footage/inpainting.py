@@ -70,8 +70,11 @@ def continuation_errors(image: Picture, known: Mask) -> Picture:
 
 def left_out_parts(image: Picture, known: Mask) -> Iterator[tuple[Picture, Mask]]:
     """Yield a picture continued where the shifted outline of the unknown lies on the known, and that part of it."""
-    for shift in () if known.all() else SHIFTS:
-        left_out = known & _moved(~known, round(shift * known.shape[1]))
+    width, reach = known.shape[1], (known.shape[1] + 1) // 2
+    unknown = np.pad(~known, ((0, 0), (reach, reach)))
+    for shift in SHIFTS if unknown.any() else ():
+        first = reach - round(shift * width)
+        left_out = known & unknown[:, first : first + width]
         if left_out.mean() >= ISLAND:
             yield push_pull(image, (known & ~left_out).astype(np.float32)), left_out
 
@@ -96,13 +99,3 @@ def mostly_beside(grown: Mask, known: Mask) -> Mask:
             sides = np.where(across[other][border], 1, -1)
             beside += np.bincount(along[one][border], sides, count + 1)
     return np.asarray(grown & (beside >= 0)[patches])
-
-
-def _moved(mask: Mask, right: int) -> Mask:
-    """A mask (rows, columns) shifted to the right, False where nothing was."""
-    moved = np.zeros_like(mask)
-    if right >= 0:
-        moved[:, right:] = mask[:, : mask.shape[1] - right]
-    else:
-        moved[:, :right] = mask[:, -right:]
-    return moved
