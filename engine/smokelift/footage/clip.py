@@ -224,19 +224,15 @@ class Clip:
         ``measure`` takes a frame's number and its small linear picture, in which what is hidden is not a number.
         """
         before, first = self._read, self.numbers[0]
-        gains: dict[int, Picture] = {}
+
+        @cache
+        def gain(number: int) -> Picture:
+            image, n = before(number), number - first
+            return measure(n, self.as_seen(n, image.averaged(*reduced_size(*image.size, COMPARED_SIDE))))
 
         def read(number: int) -> StoredPicture:
-            image, n = before(number), number - first
-            if number not in gains:
-                small = image.averaged(*reduced_size(*image.size, COMPARED_SIDE))
-                gains[number] = measure(n, self.as_seen(n, small))
-            return image if (gains[number] == 1).all() else StoredPicture(image.linear() / gains[number])
-
-        def gain(number: int) -> Picture:
-            if number not in gains:
-                read(number)
-            return gains[number]
+            image, of_frame = before(number), gain(number)
+            return image if (of_frame == 1).all() else StoredPicture(image.linear() / of_frame)
 
         return self._with(_read=read, _gain=gain)
 
