@@ -173,16 +173,13 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
     return read_layer(path, transfer)[0]
 
 
-def read_layer(path: str | Path, transfer: Transfer | None = None, held: Association = "straight") -> Layer:
-    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one.
-
-    ``held`` says how integer pixels hold their colors beside alpha.
-    """
-    return linear_layer(read_stored(Path(path)), transfer, held)
+def read_layer(path: str | Path, transfer: Transfer | None = None) -> Layer:
+    """Read a file as `read_image` does, and its alpha (height, width), from 0 to 1, if it has one."""
+    return linear_layer(read_stored(Path(path)), transfer)
 
 
-def linear_layer(stored: Codes | Layer, transfer: Transfer | None, held: Association) -> Layer:
-    """Return what `read_stored` has read as `read_layer` does."""
+def linear_layer(stored: Codes | Layer, transfer: Transfer | None, held: Association = "straight") -> Layer:
+    """Return what `read_stored` has read as `read_layer` does; ``held`` is how integers hold colors beside alpha."""
     if not isinstance(stored, tuple):
         return decode(stored, transfer, held=held)
     values, alpha = stored

@@ -16,9 +16,11 @@ from smokelift.footage.images import (
     area_average,
     blurred,
     brightest_channel,
+    linear_layer,
     linear_to_srgb,
     read_image,
     read_layer,
+    read_stored,
     srgb_to_linear,
 )
 from smokelift.output.images import write_image
@@ -138,12 +140,14 @@ def test_pictures_keep_their_bits(tmp_path: Path, name: str, codec: str, pixels:
     alpha = "a" in pixels.removeprefix("gbrp").removeprefix("rgb")
     codes = np.random.default_rng(2).integers(0, 65536, (6, 8, 3 + alpha), np.uint16)
     path = encode(tmp_path / name, [codes], codec, pixels)
-    image, opacity = read_layer(path, "linear", "premultiplied in linear light")
+    image, opacity = linear_layer(read_stored(path), "linear", "premultiplied in linear light")
     np.testing.assert_allclose(image, codes[..., :3] / 65535, atol=1.5 / (2**bits - 1))
     assert (opacity is not None) == alpha
     if opacity is not None:
         np.testing.assert_allclose(opacity, codes[..., 3] / 65535, atol=1.5 / (2**bits - 1))
-    np.testing.assert_allclose(read_layer(path, held="premultiplied in linear light")[0], srgb_to_linear(image))
+    np.testing.assert_allclose(
+        linear_layer(read_stored(path), None, "premultiplied in linear light")[0], srgb_to_linear(image)
+    )
 
 
 @pytest.mark.parametrize("mode", ["L", "P", "CMYK", "1", "I;16"])
