@@ -17,7 +17,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import Array, Finding
+from smokelift.checks import Array
 
 Encoding = Literal["srgb", "linear", "hlg", "pq"]
 Association = Literal["straight", "premultiplied in linear light", "premultiplied in code values"]
@@ -25,7 +25,7 @@ Association = Literal["straight", "premultiplied in linear light", "premultiplie
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
 """Encodings by transfer characteristics (ITU-T H.273); all others are read as sRGB, as screens do."""
 
-_PRIMARIES = {
+PRIMARIES = {
     5: ("BT.601 (625 lines)", ((0.640, 0.330), (0.290, 0.600), (0.150, 0.060))),
     6: ("BT.601 (525 lines)", ((0.630, 0.340), (0.310, 0.595), (0.155, 0.070))),
     7: ("SMPTE 240M", ((0.630, 0.340), (0.310, 0.595), (0.155, 0.070))),
@@ -54,17 +54,12 @@ def pq_to_linear(signal: npt.ArrayLike) -> Array:
     return np.asarray(screen / (203 / 10_000), np.float32)  # reference white of 203 cd/m2 (BT.2408)
 
 
-def primaries_name(primaries: int) -> str | None:
-    """Return the name of primaries that are converted, or None of those taken for BT.709."""
-    return _PRIMARIES[primaries][0] if primaries in _PRIMARIES else None
-
-
 def to_bt709(linear: Array, primaries: int) -> Array:
     """Convert linear colors [row, column, rgb] to BT.709; colors outside it are clipped at 0."""
-    if primaries not in _PRIMARIES:
+    if primaries not in PRIMARIES:
         return linear
     bt709 = _to_xyz(((0.640, 0.330), (0.300, 0.600), (0.150, 0.060)))
-    matrix = np.linalg.solve(bt709, _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)
+    matrix = np.linalg.solve(bt709, _to_xyz(PRIMARIES[primaries][1])).astype(np.float32)
     converted: Array = np.maximum(linear @ matrix.T, np.float32(0.0))
     return converted
 
@@ -98,8 +93,3 @@ def association(pictures: Iterable[npt.NDArray[Any]], decode: Callable[[npt.Arra
     kinds: tuple[Association, ...] = get_args(Association)
     # rounding alone makes opaque pictures differ
     return kinds[int(np.argmin(np.nan_to_num(variation, nan=np.inf).round(6)))]
-
-
-def association_notes(held: Association) -> tuple[Finding, ...]:
-    """Return how colors are read, where they are not straight."""
-    return () if held == "straight" else (Finding("premultiplied colors", {"held": held}),)

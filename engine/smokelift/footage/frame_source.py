@@ -12,6 +12,7 @@ import scipy.sparse
 
 import smokelift._core as _core
 from smokelift.checks import Finding
+from smokelift.footage.color import Association
 from smokelift.footage.images import Layer, Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
@@ -135,11 +136,12 @@ class FrameSource:
     files: tuple[Path, ...] = ()
     lens: float | None = None
     backdrop: float | None = None
+    _held: Association = "straight"
 
     @property
     def notes(self) -> tuple[Finding, ...]:
         """How the pictures are read, as far as they have been, where that is unusual."""
-        return ()
+        return () if self._held == "straight" else (Finding("premultiplied colors", {"held": self._held}),)
 
     def read(self, n: int) -> StoredPicture:
         """Return a frame; raise `DamagedFrameError` if it cannot be decoded, ClipError if it differs in size."""

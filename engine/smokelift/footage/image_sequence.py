@@ -6,7 +6,7 @@ from pathlib import Path
 from PIL import Image
 
 from smokelift.checks import Finding
-from smokelift.footage.color import association, association_notes
+from smokelift.footage.color import association
 from smokelift.footage.frame_source import (
     DEFAULT_FPS,
     ClipError,
@@ -58,10 +58,9 @@ class ImageSequence(FrameSource):
 
     @property
     def notes(self) -> tuple[Finding, ...]:
-        held = association_notes(self._held)
         if self._size is None or self._size == (small := readable_size(*self._size)):
-            return held
-        return (*held, Finding("scaled pictures", {"size": self._size, "scaled": small}))
+            return super().notes
+        return (*super().notes, Finding("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
         image = shown_before(self._layer(n), self.backdrop)

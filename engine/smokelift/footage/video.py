@@ -29,11 +29,9 @@ from av.video.stream import VideoStream
 from smokelift.checks import Finding
 from smokelift.footage.color import (
     ENCODINGS,
-    Association,
+    PRIMARIES,
     Encoding,
     association,
-    association_notes,
-    primaries_name,
     to_bt709,
 )
 from smokelift.footage.frame_source import (
@@ -110,7 +108,6 @@ class Video(FrameSource):
             self.close()
             raise ClipError(f"{path}: holds no frame that can be decoded; export it again")
         self._varies, self._interlaced = False, False
-        self._held: Association = "straight"
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
         self.backdrop = self._matted()
@@ -123,7 +120,7 @@ class Video(FrameSource):
 
     def read(self, n: int) -> StoredPicture:
         frame = self._decode(self._shown[n])
-        if _has_alpha(frame) or primaries_name(self._stream.codec_context.color_primaries) is not None:
+        if _has_alpha(frame) or self._stream.codec_context.color_primaries in PRIMARIES:
             return StoredPicture(shown_before(self._layer(frame), self.backdrop))
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
@@ -224,8 +221,11 @@ class Video(FrameSource):
                 seen += 1
                 if packet.size == 0 or packet.is_discard:  # a dropped frame, or one that an edit cuts away
                     continue
-                if packet.pts is None:
-                    return self._counted(), False
+                if packet.pts is None:  # a container without times: its frames' numbers are theirs
+                    self._rewind()
+                    count = sum(1 for _ in self._decoded)
+                    self._rewind()
+                    return list(range(count)), False
                 times.add(packet.pts)
                 if packet.is_keyframe:
                     keys.append(packet.pts)
@@ -244,13 +244,6 @@ class Video(FrameSource):
             return False  # sound may last longer than the pictures
         frame = max(1 / rate, base * max((b - a for a, b in pairwise(times)), default=0))
         return Fraction(length, av.time_base) > times[-1] * base + 3 * frame
-
-    def _counted(self) -> list[int]:
-        """Return the frames' numbers as times for a container without times; decode all to count them."""
-        self._rewind()
-        count = sum(1 for _ in self._decoded)
-        self._rewind()
-        return list(range(count))
 
     def _rewind(self) -> None:
         self._container.close()
@@ -285,13 +278,13 @@ class Video(FrameSource):
     def _described(self) -> tuple[Finding, ...]:
         """How the file's format is read."""
         context, stream = self._stream.codec_context, self._stream
-        encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
+        encoding, primaries = ENCODINGS.get(context.color_trc), PRIMARIES.get(context.color_primaries)
         notes = [Finding("varying frame rate", {"fps": self.fps})] * self._varies
-        notes.extend(association_notes(self._held))
+        notes.extend(super().notes)
         if encoding in ("hlg", "pq") and self._transfer is None:
             notes.append(Finding("high dynamic range", {"transfer": encoding.upper()}))
         if primaries is not None:
-            notes.append(Finding("other primaries", {"primaries": primaries}))
+            notes.append(Finding("other primaries", {"primaries": primaries[0]}))
         if self._size() != (stream.width, stream.height):
             notes.append(Finding("scaled pictures", {"size": (stream.width, stream.height), "scaled": self._size()}))
         return tuple(notes)
