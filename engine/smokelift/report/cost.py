@@ -22,10 +22,9 @@ import scipy.fft
 from smokelift.density import RoundDepth, ViewSet
 from smokelift.density.levels import MIN_COARSENED_VOXELS
 from smokelift.setup.first_estimate import SAMPLE_FRAMES
+from smokelift.setup.resolution import Shape, proportional
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-
-Resolution = tuple[int, int, int]
 
 START_SECONDS = 1.5
 """Processor seconds to start and to measure the clip's texture."""
@@ -162,7 +161,7 @@ def moment() -> tuple[float, float]:
     return time.monotonic(), time.process_time()
 
 
-def estimate_cost(resolution: Resolution, work: Workload) -> Cost:
+def estimate_cost(resolution: Shape, work: Workload) -> Cost:
     """Estimate the cost of a run from its grid, its smoke and what preparing it took, in a part of a second."""
     return Cost(
         seconds=work.prepared + frames_seconds(resolution, work),
@@ -172,12 +171,12 @@ def estimate_cost(resolution: Resolution, work: Workload) -> Cost:
     )
 
 
-def frames_seconds(resolution: Resolution, work: Workload) -> float:
+def frames_seconds(resolution: Shape, work: Workload) -> float:
     """Estimate the seconds of a run's frames, without the set-up, in a part of a second."""
     return START_SECONDS + voxel_solves(resolution, work) * _seconds_per_voxel()
 
 
-def voxel_solves(resolution: Resolution, work: Workload) -> float:
+def voxel_solves(resolution: Shape, work: Workload) -> float:
     """Return the time of a run's frames, in voxels of Poisson solves."""
     voxels = math.prod(resolution)
     if work.settings.method == "paper":
@@ -191,7 +190,7 @@ def voxel_solves(resolution: Resolution, work: Workload) -> float:
     return (work.frames + EXTRA_FRAMES) * per_frame
 
 
-def memory_needed(resolution: Resolution, work: Workload) -> int:
+def memory_needed(resolution: Shape, work: Workload) -> int:
     """Return the bytes that a run takes at its peak."""
     voxels = math.prod(resolution)
     per_voxel, per_smoky_voxel = BYTES_PER_VOXEL_OF_SMALL_GRID if voxels < SMALL_GRID_VOXELS else BYTES_PER_VOXEL
@@ -200,7 +199,7 @@ def memory_needed(resolution: Resolution, work: Workload) -> int:
     return round(BASE_BYTES + BYTES_PER_PIXEL * work.pixels + (per_voxel + work.smoky_max * per_smoky_voxel) * voxels)
 
 
-def affordable_room(resolution: Resolution) -> float:
+def affordable_room(resolution: Shape) -> float:
     """Return how many times as large as a clip's box a simulated one may be to fit into the free memory."""
     return (memory_free() - BASE_BYTES) / (BYTES_PER_SIMULATED_VOXEL * math.prod(resolution))
 
@@ -222,7 +221,7 @@ def peak_memory() -> int | None:
     return next((1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")), None)
 
 
-def require_memory(resolution: Resolution, work: Workload, *, given: bool = True) -> None:
+def require_memory(resolution: Shape, work: Workload, *, given: bool = True) -> None:
     """Check that a run fits into the free memory; NotEnoughMemoryError with the largest resolution that does.
 
     A ``given`` box keeps its proportions, so that voxels stay cubes; one that was found follows its voxels.
@@ -232,8 +231,8 @@ def require_memory(resolution: Resolution, work: Workload, *, given: bool = True
     if needed <= free:
         return
     shape = " x ".join(map(str, resolution))
-    smaller = _same_proportions(resolution) if given else _about_the_same(resolution)
-    fits = next((each for each in smaller if memory_needed(each, work) <= free), None)
+    smaller = reversed(proportional(resolution, 1, max(resolution) - 1)) if given else _about_the_same(resolution)
+    fits = next((each for each in smaller if min(each) >= MIN_VOXELS and memory_needed(each, work) <= free), None)
     advice = (
         f"the largest resolution that fits is {','.join(map(str, fits))}"
         if fits
@@ -244,20 +243,11 @@ def require_memory(resolution: Resolution, work: Workload, *, given: bool = True
     )
 
 
-def _same_proportions(resolution: Resolution) -> Iterator[Resolution]:
-    """Smaller resolutions of the same proportions, the largest first."""
-    common = math.gcd(*resolution)
-    x, y, z = (n // common for n in resolution)
-    candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
-    return (each for each in candidates if min(each) >= MIN_VOXELS)
-
-
-def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
+def _about_the_same(resolution: Shape) -> Iterator[Shape]:
     """Smaller resolutions of about the same proportions in multiples of four, the largest first."""
     for longest in range(max(resolution) - 4, 0, -4):
         x, y, z = (4 * math.ceil(n * longest / max(resolution) / 4) for n in resolution)
-        if min(x, y, z) >= MIN_VOXELS:
-            yield x, y, z
+        yield x, y, z
 
 
 def _smoky_fractions(shot: Shot, settings: Settings) -> list[float]:

@@ -11,10 +11,10 @@ import numpy as np
 from smokelift.checks import Doubles, Figures, Finding
 from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
-from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
+from smokelift.scene import Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
-from smokelift.setup.resolution import DetailSpectrum, Grid, Shape, choose_grid, smoke_detail
+from smokelift.setup.resolution import DetailSpectrum, Grid, Shape, choose_grid, proportional, smoke_detail
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings
 from smokelift.setup.working_picture import CameraError, working_picture
 
@@ -65,27 +65,36 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     clip, samples, box = estimate.clip, estimate.samples, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
     _require_camera_and_box(scene, known)
-    focal = _focal_length(clip.size, clip.lens)
-    camera = known or _level_camera(clip.size, focal, settings.distance)
-    meters, multiple = 0.0, 1
+    if known is not None:
+        focal = known.fy
+    elif clip.lens is not None:
+        focal = clip.lens / math.hypot(*FILM_SIZE) * math.hypot(*clip.size)
+    else:
+        focal = LENS_FOCAL_LENGTH / FILM_SIZE[0] * max(clip.size)
+    # what a pixel shows where the smoke is
+    meters = PICTURE_HEIGHT / clip.size[1] if settings.distance is None else settings.distance / focal
+    camera = known or _level_camera(clip.size, focal, meters)
     if box is None:
         # multiples of four: pyramids halve them evenly
-        (floor, size, meters), multiple = _box_around_smoke(camera, samples, settings.distance), 4
+        (floor, size), multiple = _box_around_smoke(camera, samples, meters), 4
     else:
-        floor, size = np.array([*box.centre[:2], box.min[2]]), np.array(box.size)
+        floor, size, multiple = np.array([*box.centre[:2], box.min[2]]), np.array(box.size), 1
     still = camera.at(next(iter(samples.smoky), 0))
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
         limit = LIMITS[quality]
         if isinstance(box, Domain):
-            return _proportional_grids(box, limit.voxels(_pixels_along(still, box)))
+            least, most = min(MIN_SIDE_VOXELS, max(box.resolution)), limit.voxels(_pixels_along(still, box))
+            allowed = proportional(box.resolution, least, most)
+            allowed = allowed or proportional(box.resolution, least, max(box.resolution))[:1]
+            return tuple(replace(box, resolution=each) for each in allowed)
         pixels = (
             max(size) / meters if box is None else _pixels_along(still, _box_grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
         )
         return _box_grids(floor, size, limit.voxels(pixels), multiple)
 
     qualities: Mapping[Quality, Grid]
-    found: tuple[Finding, ...]
+    found: tuple[Finding, ...] = ()
     asked = box.resolution if isinstance(box, Domain) and settings.resolution is None else settings.resolution
     if isinstance(asked, tuple):
         voxel = float((size / asked).max())
@@ -102,8 +111,8 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         if not samples.smoky:
             around = replace(around, kind="box over the picture", source="assumed")
         found = _scale_finding(known, clip.lens, meters * camera.size[1]), around
-    else:
-        found = _growth_finding(box, domain)
+    elif not np.allclose([domain.min, domain.max], [box.min, box.max], rtol=0, atol=1e-3 * domain.voxel_size):
+        found = (Finding("grown box", {"size": domain.size}, about="box", source="given"),)
     return Geometry(camera, domain, qualities, (*found, resolution))
 
 
@@ -118,15 +127,6 @@ def _require_camera_and_box(scene: Scene, known: Camera | None) -> None:
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
-
-
-def _focal_length(size: tuple[int, int], lens: float | None) -> float:
-    """Focal length in pixels: that of the file's lens (mm), or of `LENS_FOCAL_LENGTH`."""
-    return (
-        LENS_FOCAL_LENGTH / FILM_SIZE[0] * max(size)
-        if lens is None
-        else lens / math.hypot(*FILM_SIZE) * math.hypot(*size)
-    )
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -152,18 +152,15 @@ def _scale_finding(given: Camera | None, lens: float | None, height: float) -> F
     return camera("assumed camera", {"height": height, "lens": LENS_FOCAL_LENGTH, "film": FILM_SIZE[0]})
 
 
-def _level_camera(size: tuple[int, int], focal: float, distance: float | None = None) -> Camera:
-    """A level camera that looks along +Y at the smoke above the world's origin; ``focal`` in pixels."""
+def _level_camera(size: tuple[int, int], focal: float, meters: float) -> Camera:
+    """A level camera that looks along +Y at the smoke above the world's origin, where a pixel shows so many meters.
+
+    ``focal`` is in pixels.
+    """
     width, height = size
-    meters = _pixel_size(distance, height, focal)
     up = meters * height / 2
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * meters], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
     return Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
-
-
-def _pixel_size(distance: float | None, height: int, focal: float) -> float:
-    """Meters that a pixel shows where the smoke is, in a picture ``height`` pixels high; ``distance`` (m) if given."""
-    return PICTURE_HEIGHT / height if distance is None else distance / focal
 
 
 def _sees_ahead(camera: Camera) -> bool:
@@ -183,12 +180,11 @@ def _directions(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
     return np.asarray(np.stack(pixels, -1) @ turn.T)
 
 
-def _box_around_smoke(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Doubles, Doubles, float]:
-    """The upright box around the smoke at a distance (m), or where a level camera's picture is `PICTURE_HEIGHT` high.
+def _box_around_smoke(camera: Camera, samples: SmokeSamples, meters: float) -> tuple[Doubles, Doubles]:
+    """The upright box around the smoke where a pixel shows so many meters.
 
-    Returns the middle of its floor (3,) and its size (3,) in meters, and the meters that a pixel shows there.
+    Returns the middle of its floor (3,) and its size (3,) in meters.
     """
-    meters = _pixel_size(distance, camera.size[1], camera.fy)
     distance = camera.fy * meters
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]
@@ -202,7 +198,7 @@ def _box_around_smoke(camera: Camera, samples: SmokeSamples, distance: float | N
     across *= 1 + across / (2 * distance)
     base = eye + distance * along + (sideways.min() + sideways.max()) / 2 * lateral
     base[2] = eye[2] + height.min()
-    return base, np.array([across, across, up]), meters
+    return base, np.array([across, across, up])
 
 
 def _box_grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
@@ -216,13 +212,6 @@ def _box_grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tu
         x, y, z = (max(8, multiple * math.ceil(side / voxel / multiple - 1e-6)) for side in size)
         grids.append(_domain_above(floor, voxel, (x, y, z)))
     return tuple(grids)
-
-
-def _growth_finding(given: Box, domain: Domain) -> tuple[Finding, ...]:
-    """That a given box had to grow to whole voxels, if it had to."""
-    if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
-        return ()
-    return (Finding("grown box", {"size": domain.size}, about="box", source="given"),)
 
 
 def _domain_above(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
@@ -243,18 +232,6 @@ def _smoke_bounds(samples: SmokeSamples, width: int, height: int) -> tuple[float
     top, bottom = (float(v) * samples.scale for v in np.percentile(rows, [1, 99]) + np.array([0, 1]))
     margin = BOX_MARGIN * max(right - left, bottom - top)
     return max(left - margin, 0), min(right + margin, width), max(top - margin, 0), min(bottom + margin, height)
-
-
-def _proportional_grids(domain: Domain, most: int) -> tuple[Domain, ...]:
-    """The box with every number of cubic voxels that fills it exactly, the fewest first; ``most`` along a side."""
-    common = math.gcd(*domain.resolution)
-    x, y, z = (n // common for n in domain.resolution)
-    longest = max(x, y, z)
-    fewest = -(-min(MIN_SIDE_VOXELS, max(domain.resolution)) // longest)
-    return tuple(
-        replace(domain, resolution=(x * times, y * times, z * times))
-        for times in range(fewest, max(most // longest, fewest) + 1)
-    )
 
 
 def _smoke_detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:

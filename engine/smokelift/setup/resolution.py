@@ -5,6 +5,7 @@ values, in which a clip's noise is even. A grid shows what is coarser than two o
 contrast that is finer. Figures: docs/experiments/clip-pixels.md.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -65,6 +66,14 @@ class DetailSpectrum:
     def _ring(self, longest: float) -> int:
         """The first ring that a grid of so many voxels does not show."""
         return min(round(RINGS * longest / self.pixels), RINGS)
+
+
+def proportional(resolution: Shape, least: int, most: int) -> list[Shape]:
+    """Return the resolutions of the same proportions, ``least`` to ``most`` voxels long, the coarsest first."""
+    common = math.gcd(*resolution)
+    x, y, z = (n // common for n in resolution)
+    longest = max(x, y, z)
+    return [(x * times, y * times, z * times) for times in range(-(-least // longest), most // longest + 1)]
 
 
 def choose_grid(
@@ -130,5 +139,4 @@ def _beyond_noise(change: NDArray[np.float64], noise: float) -> NDArray[np.float
     ring = (RINGS * frequency[inside]).astype(int)
     total = np.bincount(ring, power[inside], RINGS)
     count = np.bincount(ring, minlength=RINGS)
-    beyond: NDArray[np.float64] = np.maximum(total - count * noise**2, 0)
-    return beyond
+    return np.asarray(np.maximum(total - count * noise**2, 0))
