@@ -66,7 +66,17 @@ def first_light(
         )
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
-        return tuple(_with_directions(each, geometry, medium) for each in lights), richest, []
+        still, domain = geometry.camera.at(0), geometry.domain
+        return (
+            tuple(
+                replace(each, directions=environment_count(each, still, domain, medium))
+                if isinstance(each, EnvironmentLight) and each.directions is None
+                else each
+                for each in lights
+            ),
+            richest,
+            [],
+        )
     found = estimate.source
     if found is None:
         source = source_radiance(estimate.samples)
@@ -90,13 +100,6 @@ def _source_finding(shown: Picture | None, taken: Doubles) -> Finding:
     red, green, blue = map(float, shown)
     figures |= {"red": red, "green": green, "blue": blue}
     return Finding(about, figures, about=about, value=(red, green, blue), source="measured")
-
-
-def _with_directions(light: Light, geometry: Geometry, medium: Medium) -> Light:
-    """The light; an environment with the number of directions that it needs."""
-    if not isinstance(light, EnvironmentLight) or light.directions is not None:
-        return light
-    return replace(light, directions=environment_count(light, geometry.camera.at(0), geometry.domain, medium))
 
 
 def light_doubts(scattering: Finding, samples: SmokeSamples, noise: Noise, *, burns: bool) -> list[Finding]:
