@@ -73,7 +73,7 @@ class Frame:
 def frames_after(before: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
     """Yield a shot's frames after one, or all; the first waits until the second gives it a velocity."""
     count = len(shot.clip)
-    follows = method.follows_picture and shot.alone
+    follows = method.follows_picture and len(shot.views) == 1 and not shot.moves
     estimator = method.velocity_estimator.of_one_view() if follows else method.velocity_estimator
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot), velocity_estimator=estimator)

@@ -141,11 +141,6 @@ class Shot:
         return self.scene.camera.moves
 
     @property
-    def alone(self) -> bool:
-        """Whether one camera that stands still alone sees the smoke."""
-        return len(self.views) == 1 and not self.moves
-
-    @property
     def length(self) -> int:
         """Number of frames."""
         return len(self.clip)

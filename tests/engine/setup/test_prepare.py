@@ -72,7 +72,7 @@ def test_a_complete_scene_stays_as_it_is_and_its_settings_prepare_it_again(given
     assert [found.kind for found in given.findings if found.value is None] == []
     assert given.scene == completed(plume.scene)
     assert given.optics.scattering == "single"
-    assert given.alone
+    assert len(given.views) == 1 and not given.moves
     assert shot_of(plume.scene, given.settings).settings == given.settings
 
 
@@ -141,7 +141,7 @@ def test_each_frame_has_its_own_small_picture_unless_it_shows_nothing_of_the_dom
     poses = (away, *tracked.camera.matrices[1:])
     scene = replace(tracked, camera=replace(tracked.camera, matrix=away, matrices=poses))
     shot = shot_of(scene, draft)
-    assert shot.scene == completed(scene) and shot.moves and not shot.alone
+    assert shot.scene == completed(scene) and shot.moves
     assert shot.views[0].working.camera.matrix == poses[1]
     assert shot.observe(0) == ()
     for frame in range(1, 5):
