@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from smokelift.density import DensitySettings
@@ -134,13 +134,11 @@ class Settings:
         resolution: tuple[int, int, int] | Literal["auto"] | None = None,
     ) -> "Settings":
         """The settings of a quality and a method; SceneError if there is no such one."""
-        if quality not in QUALITIES:
-            raise SceneError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}.")
         if method == "paper":
             return cls(method=method, quality=quality, resolution=resolution, measure=False, detail=0.0)
+        settings = cls(method=method, quality=quality, resolution=resolution)
         fit, descent = ITERATIONS[quality]
-        density = DensitySettings(fit_iterations=fit, descent_iterations=descent)
-        return cls(method=method, quality=quality, resolution=resolution, density=density)
+        return replace(settings, density=DensitySettings(fit_iterations=fit, descent_iterations=descent))
 
     def as_dict(self) -> dict[str, Any]:
         """The settings as plain nested values, the velocity solver with its name."""
