@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from smokelift.checks import Finding, counted
+from smokelift.checks import Array, Doubles, Finding, Mask, counted
 from smokelift.extraction.matte import Matte, matte
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.output.images import eight_bit
-from smokelift.report.page import TILE, Page, Panel, tile_size
+from smokelift.report.page import TILE, Color, Page, Panel, tile_size
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project_points
 from smokelift.setup.first_estimate import unknown_part
@@ -23,7 +23,7 @@ Tile = NDArray[np.uint8]
 BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40), (230, 60, 200), (120, 255, 120)
 """Colors (sRGB codes) of the box, light, smoke, unknown background and camera's path."""
 
-MASK = (255, 60, 60)
+MASK_EDGE = (255, 60, 60)
 """Color (sRGB code) of the mask's outline."""
 
 ARROW_LENGTH = 0.35
@@ -75,11 +75,11 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     return Page(f"{name}: {frames}", doubts, panels, known, notes)
 
 
-def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: int) -> Tile:
+def _with_box(shot: Shot, camera: Camera, picture: Array, number: int) -> Tile:
     """A frame with the mask's outline, the box's edges, and an arrow for each light with a direction."""
     codes, seen = eight_bit(picture), shot.clip.seen(number, *camera.size)
     if seen is not None:
-        codes[seen & ~ndimage.binary_erosion(seen, np.ones((3, 3)), border_value=1)] = MASK
+        codes[seen & ~ndimage.binary_erosion(seen, np.ones((3, 3)), border_value=1)] = MASK_EDGE
     domain, shown = shot.scene.domain, Image.fromarray(codes)
     draw = ImageDraw.Draw(shown)
     corners = domain.corners()
@@ -92,7 +92,7 @@ def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: 
     return np.asarray(shown)
 
 
-def _light_starts(shot: Shot, domain: Domain) -> list[NDArray[np.float64]]:
+def _light_starts(shot: Shot, domain: Domain) -> list[Doubles]:
     """Points (3,) where the lights' arrows to the middle of the box begin."""
     if shot.scene.scattering not in SHADOWED:
         return []
@@ -103,13 +103,7 @@ def _light_starts(shot: Shot, domain: Domain) -> list[NDArray[np.float64]]:
     return [middle - length * way / np.linalg.norm(way) for way in ways]
 
 
-def _line(
-    draw: ImageDraw.ImageDraw,
-    camera: Camera,
-    points: NDArray[np.float64],
-    color: tuple[int, int, int],
-    head: bool = False,
-) -> None:
+def _line(draw: ImageDraw.ImageDraw, camera: Camera, points: Doubles, color: Color, head: bool = False) -> None:
     """A line through world points (n, 3), if all are before the camera; with a ``head`` an arrow."""
     pixels, depth = project_points(camera, points)
     if (depth <= 0).any():
@@ -130,14 +124,14 @@ def _matte_picture(seen: Matte) -> Tile:
     return np.asarray(np.rint(strength * (255 + seen.probability[..., None] * (np.array(SMOKE) - 255))), np.uint8)
 
 
-def _unknown_picture(plate: Plate, unknown: NDArray[np.bool_]) -> Tile:
+def _unknown_picture(plate: Plate, unknown: Mask) -> Tile:
     """The background, with its unknown part in one color."""
     codes = eight_bit(plate.image)
     codes[unknown] = np.rint(0.4 * codes[unknown] + 0.6 * np.array(HIDDEN))
     return codes
 
 
-def _histogram(picture: NDArray[np.float32], plate: Plate, seen: Matte) -> Tile:
+def _histogram(picture: Array, plate: Plate, seen: Matte) -> Tile:
     """Histogram of sRGB values, on a logarithmic scale."""
     width, height = TILE[0], TILE[0] // 2
     shown = Image.new("RGB", (width, height), (12, 12, 14))
@@ -156,7 +150,7 @@ def _histogram(picture: NDArray[np.float32], plate: Plate, seen: Matte) -> Tile:
     return np.asarray(shown)
 
 
-def _path(shot: Shot, camera: Camera, picture: NDArray[np.float32]) -> Tile | None:
+def _path(shot: Shot, camera: Camera, picture: Array) -> Tile | None:
     """Path of the box's middle in the picture of a camera that moves; None if it stands still."""
     if not shot.moves:
         return None

@@ -17,6 +17,9 @@ from smokelift.checks import UNDETERMINED, Finding
 from smokelift.checks.whole_files import atomic_path, write_text
 from smokelift.report.views import fact, sentence
 
+Color = tuple[int, int, int]
+"""Codes (sRGB) of red, green and blue."""
+
 PAGE_KINDS = (".png", ".html")
 
 TILE = (480, 400)
@@ -103,7 +106,7 @@ def _side_by_side(panels: Sequence[Panel]) -> NDArray[np.uint8]:
     return np.asarray(strip)
 
 
-def _written(cells: Sequence[str], colors: Sequence[tuple[int, int, int]], size: int = _TEXT) -> NDArray[np.uint8]:
+def _written(cells: Sequence[str], colors: Sequence[Color], size: int = _TEXT) -> NDArray[np.uint8]:
     """One text over the whole width, or those of a table's columns."""
     font = ImageFont.load_default(size)
     starts = _STARTS if len(cells) > 1 else (_GAP,)

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smokelift.checks import Figures, Finding
+from smokelift.checks import Array, Figures, Finding
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.extraction.backdrop import find_backdrop
@@ -46,8 +45,6 @@ one side is brighter there: cameras exposed alike differ by up to 1.30 (docs/exp
 
 MAX_GAIN = 8.0
 """Largest gain, and the inverse of the smallest: three stops. What asks for more has another background."""
-
-Gain = NDArray[np.float32]
 
 
 def open_views(
@@ -138,7 +135,7 @@ def _match_exposure(
     if not frames:
         return view, []
 
-    def compare(gain: Gain) -> HeldOut:
+    def compare(gain: Array) -> HeldOut:
         evened = [replace(frame, views=(frame.views[0], frame.views[1].divided(gain))) for frame in frames]
         return held_out(evened, scene.scattering, scene.scattering, settings.density)
 
