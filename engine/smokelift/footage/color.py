@@ -60,8 +60,7 @@ def to_bt709(linear: Array, primaries: int) -> Array:
         return linear
     bt709 = _to_xyz(((0.640, 0.330), (0.300, 0.600), (0.150, 0.060)))
     matrix = np.linalg.solve(bt709, _to_xyz(PRIMARIES[primaries][1])).astype(np.float32)
-    converted: Array = np.maximum(linear @ matrix.T, np.float32(0.0))
-    return converted
+    return np.asarray(np.maximum(linear @ matrix.T, np.float32(0.0)))
 
 
 def _to_xyz(chromaticities: tuple[tuple[float, float], ...]) -> npt.NDArray[np.float64]:

@@ -110,16 +110,14 @@ def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
     """Decode sRGB values (1 is white) to linear ones by the exact piecewise curve, continued above 1."""
     e = np.asarray(encoded, np.float32)
     curve = ((np.maximum(e, np.float32(0.04)) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    linear: Picture = np.where(e <= np.float32(0.04045), e / np.float32(12.92), curve)
-    return linear
+    return np.asarray(np.where(e <= np.float32(0.04045), e / np.float32(12.92), curve))
 
 
 def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     """Encode linear values as sRGB (1 is white) by the exact piecewise curve, continued above 1."""
     v = np.asarray(linear, np.float32)
     curve = np.float32(1.055) * np.maximum(v, np.float32(0.003)) ** np.float32(1 / 2.4) - np.float32(0.055)
-    encoded: Picture = np.where(v <= np.float32(0.0031308), v * np.float32(12.92), curve)
-    return encoded
+    return np.asarray(np.where(v <= np.float32(0.0031308), v * np.float32(12.92), curve))
 
 
 _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {

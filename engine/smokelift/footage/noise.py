@@ -64,8 +64,7 @@ class Noise:
     @property
     def total(self) -> Picture:
         """Standard deviation (3,) of both together."""
-        total: Picture = np.sqrt(self.white**2 + self.lasting**2)
-        return total
+        return np.asarray(np.sqrt(self.white**2 + self.lasting**2))
 
     def averaged(self, pixels: float) -> "Noise":
         """Return the noise of means over a number of pixels."""
@@ -87,8 +86,7 @@ def block_means(pictures: Picture) -> Picture:
     frames, rows, columns = len(pictures), pictures.shape[1] // size, pictures.shape[2] // size
     whole = pictures[:, : rows * size, : columns * size]
     lines = whole.reshape(frames, rows, size, columns * size * 3).sum(axis=2)  # in memory order: several times faster
-    means: Picture = lines.reshape(frames, rows, columns, size, 3).sum(axis=3) / np.float32(size**2)
-    return means
+    return np.asarray(lines.reshape(frames, rows, columns, size, 3).sum(axis=3) / np.float32(size**2))
 
 
 def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
