@@ -22,6 +22,9 @@ from smokelift.checks import Array
 Encoding = Literal["srgb", "linear", "hlg", "pq"]
 Association = Literal["straight", "premultiplied in linear light", "premultiplied in code values"]
 
+Decoder = Callable[[npt.ArrayLike], Array]
+"""What makes encoded values linear."""
+
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
 """Encodings by transfer characteristics (ITU-T H.273); all others are read as sRGB, as screens do."""
 
@@ -71,7 +74,7 @@ def _to_xyz(chromaticities: tuple[tuple[float, float], ...]) -> npt.NDArray[np.f
     return np.asarray(columns * np.linalg.solve(columns, white))
 
 
-def association(pictures: Iterable[npt.NDArray[Any]], decode: Callable[[npt.ArrayLike], Array]) -> Association:
+def association(pictures: Iterable[npt.NDArray[Any]], decode: Decoder) -> Association:
     """Return how pictures (rows, columns, rgba) of encoded values, with 1 as white, hold their colors.
 
     ``decode`` makes values linear. Opaque pictures are straight.

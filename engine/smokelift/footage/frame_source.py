@@ -12,7 +12,7 @@ import scipy.sparse
 
 import smokelift._core as _core
 from smokelift.checks import Finding
-from smokelift.footage.color import Association
+from smokelift.footage.color import Association, Decoder, association
 from smokelift.footage.images import Layer, Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
 
 DEFAULT_FPS = 24.0
@@ -164,29 +164,29 @@ class FrameSource:
     def close(self) -> None:
         """Close the file, if one is held open."""
 
+    def shown(self, layer: Layer) -> Picture:
+        """Return a picture over the backdrop, or over black if there is none."""
+        picture, alpha = layer
+        if alpha is None or not self.backdrop:
+            return picture
+        return picture + (np.float32(1.0) - alpha[..., None]) * np.float32(self.backdrop)
 
-def focal_length(value: object) -> float | None:
-    """Return the focal length in millimeters that a file's value says; None if it says none."""
-    try:
-        focal = float(str(value))
-    except ValueError:
-        return None
-    return focal if FOCAL_LENGTHS[0] <= focal <= FOCAL_LENGTHS[1] else None
+    def _sound_samples(self, read: Callable[[int], Sample]) -> Iterator[Sample]:
+        """Read a few frames spread over all, with smoke and without; damaged ones are left out."""
+        for n in sorted({0, self.count // 4, self.count // 2, self.count - 1}):
+            with suppress(DamagedFrameError):
+                yield read(n)
 
+    def _find_matte(self, encoded: Iterable[Picture], decode: Decoder, layers: Iterable[Layer]) -> None:
+        """Find how pictures (rows, columns, rgba) of encoded values hold their colors, then the backdrop of layers."""
+        self._held = association(encoded, decode)
+        self.backdrop = backdrop_of(layers)
 
-def sound_samples(count: int, read: Callable[[int], Sample]) -> Iterator[Sample]:
-    """Read a few frames spread over ``count``, with smoke and without; damaged ones are left out."""
-    for n in sorted({0, count // 4, count // 2, count - 1}):
-        with suppress(DamagedFrameError):
-            yield read(n)
-
-
-def shown_before(layer: Layer, backdrop: float | None) -> Picture:
-    """Return a picture over a linear gray, or over black if that is None."""
-    picture, alpha = layer
-    if alpha is None or not backdrop:
-        return picture
-    return picture + (np.float32(1.0) - alpha[..., None]) * np.float32(backdrop)
+    def _set_lens(self, value: object) -> None:
+        """Take what a file says of the focal length in millimeters, if it says one."""
+        with suppress(ValueError):
+            focal = float(str(value))
+            self.lens = focal if FOCAL_LENGTHS[0] <= focal <= FOCAL_LENGTHS[1] else None
 
 
 def backdrop_of(layers: Iterable[Layer]) -> float | None:

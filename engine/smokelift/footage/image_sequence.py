@@ -6,18 +6,7 @@ from pathlib import Path
 from PIL import Image
 
 from smokelift.checks import Finding
-from smokelift.footage.color import association
-from smokelift.footage.frame_source import (
-    DEFAULT_FPS,
-    ClipError,
-    DamagedFrameError,
-    FrameSource,
-    StoredPicture,
-    backdrop_of,
-    focal_length,
-    shown_before,
-    sound_samples,
-)
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.images import (
     READABLE,
     Codes,
@@ -49,12 +38,11 @@ class ImageSequence(FrameSource):
         self.count = len(self.files)
         if fps is None and self.count > 1:
             self.warning = Finding("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
-        self.lens = _focal_length(self.files[0])
+        self._set_lens(_focal_length(self.files[0]))
         self._size: tuple[int, int] | None = None
-        samples = sound_samples(self.count, self._stored)
+        samples = self._sound_samples(self._stored)
         codes = (stored for stored in samples if not isinstance(stored, tuple) and stored.shape[-1] == 4)
-        self._held = association(map(encoded_values, codes), decoder(transfer))
-        self.backdrop = backdrop_of(sound_samples(self.count, self._layer))
+        self._find_matte(map(encoded_values, codes), decoder(transfer), self._sound_samples(self._layer))
 
     @property
     def notes(self) -> tuple[Finding, ...]:
@@ -63,7 +51,7 @@ class ImageSequence(FrameSource):
         return (*super().notes, Finding("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
-        image = shown_before(self._layer(n), self.backdrop)
+        image = self.shown(self._layer(n))
         height, width = image.shape[:2]
         self._size = self._size or (width, height)
         if (width, height) != self._size:
@@ -144,10 +132,10 @@ def _found(path: Path, prefix: str, digits: int, suffix: str) -> dict[int, Path]
     return {int(number): each for number, each in found.items() if len(number) >= digits}
 
 
-def _focal_length(path: Path) -> float | None:
+def _focal_length(path: Path) -> object:
     """The focal length in a picture's EXIF, in millimeters on 35 mm film; None if there is none."""
     try:
         with Image.open(path) as picture:
-            return focal_length(picture.getexif().get_ifd(0x8769).get(0xA405))  # FocalLengthIn35mmFilm of Exif
+            return picture.getexif().get_ifd(0x8769).get(0xA405)  # FocalLengthIn35mmFilm of Exif
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # a picture without such tags
         return None

@@ -11,7 +11,7 @@ import re
 import struct
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -34,7 +34,7 @@ from PIL.TiffImagePlugin import (
 )
 
 import smokelift._core as _core
-from smokelift.footage.color import Association, Encoding, hlg_to_linear, pq_to_linear
+from smokelift.footage.color import Association, Decoder, Encoding, hlg_to_linear, pq_to_linear
 from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
@@ -120,7 +120,7 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return np.asarray(np.where(v <= np.float32(0.0031308), v * np.float32(12.92), curve))
 
 
-_DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
+_DECODERS: Mapping[Encoding, Decoder] = {
     "linear": partial(np.asarray, dtype=np.float32),
     "srgb": srgb_to_linear,
     "hlg": hlg_to_linear,
@@ -148,7 +148,7 @@ def decode(codes: Codes, encoding: Encoding | None = None, white: float = 1.0, h
     return picture * opacity if held == "straight" else picture, alpha
 
 
-def decoder(encoding: Encoding | None) -> Callable[[npt.ArrayLike], Picture]:
+def decoder(encoding: Encoding | None) -> Decoder:
     """Return the function that makes values of an encoding, by default sRGB, linear."""
     return _DECODERS[encoding or "srgb"]
 

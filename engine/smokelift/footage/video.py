@@ -27,24 +27,8 @@ from av.video.reformatter import ColorRange, Interpolation
 from av.video.stream import VideoStream
 
 from smokelift.checks import Finding
-from smokelift.footage.color import (
-    ENCODINGS,
-    PRIMARIES,
-    Encoding,
-    association,
-    to_bt709,
-)
-from smokelift.footage.frame_source import (
-    DEFAULT_FPS,
-    ClipError,
-    DamagedFrameError,
-    FrameSource,
-    StoredPicture,
-    backdrop_of,
-    focal_length,
-    shown_before,
-    sound_samples,
-)
+from smokelift.footage.color import ENCODINGS, PRIMARIES, Encoding, to_bt709
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.images import (
     Layer,
     Picture,
@@ -110,9 +94,9 @@ class Video(FrameSource):
         self._varies, self._interlaced = False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
-        self.backdrop = self._matted()
+        self._examine_alpha()
         self._format = self._described()
-        self.lens = focal_length({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
+        self._set_lens({**self._container.metadata, **self._stream.metadata}.get(_FOCAL_LENGTH))
 
     @property
     def notes(self) -> tuple[Finding, ...]:
@@ -121,7 +105,7 @@ class Video(FrameSource):
     def read(self, n: int) -> StoredPicture:
         frame = self._decode(self._shown[n])
         if _has_alpha(frame) or self._stream.codec_context.color_primaries in PRIMARIES:
-            return StoredPicture(shown_before(self._layer(frame), self.backdrop))
+            return StoredPicture(self.shown(self._layer(frame)))
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
         return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
@@ -339,16 +323,15 @@ class Video(FrameSource):
                 break
         return good
 
-    def _matted(self) -> float | None:
-        """Find out how colors are held beside alpha; return the gray to show them over, None without alpha."""
+    def _examine_alpha(self) -> None:
+        """Find out how colors are held beside alpha, and the gray to show them over, if there is alpha."""
         frames = []
-        for frame in sound_samples(self.count, lambda n: self._decode(self._shown[n])):
+        for frame in self._sound_samples(lambda n: self._decode(self._shown[n])):
             if not _has_alpha(frame):
-                return None
+                return
             frames.append(frame)
         encoded = (encoded_values(self._codes(frame), _white(frame)) for frame in frames)
-        self._held = association(encoded, decoder(self._encoding()))
-        return backdrop_of(map(self._layer, frames))
+        self._find_matte(encoded, decoder(self._encoding()), map(self._layer, frames))
 
     def _size(self) -> tuple[int, int]:
         """Return the width and height that pictures are read at, before they are turned: pixels are square."""

@@ -8,7 +8,7 @@ from PIL import Image
 
 from smokelift.extraction.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import Layer, StoredPicture, backdrop_of, shown_before
+from smokelift.footage.frame_source import FrameSource, Layer, StoredPicture, backdrop_of
 from smokelift.footage.images import area_average, code_values, linear_to_srgb, srgb_to_linear
 from smokelift.scene import Background
 from tests.engine.films import encode
@@ -42,8 +42,10 @@ def layer(gray: float, alpha: float | None) -> Layer:
 @pytest.mark.parametrize(("gray", "backdrop"), [(0.05, 1.0), (0.9, 0.0)])
 def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray: float, backdrop: float) -> None:
     clip = [layer(gray, 0.0), layer(gray, 0.5)]
-    assert backdrop_of(clip) == backdrop
-    shown = shown_before(clip[1], backdrop)
+    source = FrameSource()
+    source.backdrop = backdrop_of(clip)
+    assert source.backdrop == backdrop
+    shown = source.shown(clip[1])
     np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
 
 
