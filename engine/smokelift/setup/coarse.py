@@ -6,7 +6,6 @@ let through of the background is subtracted there; the rest is light that the sm
 to be for it is the least-squares factor, zero at least.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,6 +22,7 @@ from smokelift.footage.images import area_average
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 from smokelift.scene.projection import voxel_width
+from smokelift.setup.resolution import proportional
 from smokelift.setup.shot import ShotView
 from smokelift.setup.working_picture import CameraError, working_picture
 
@@ -112,11 +112,9 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
     """
     longest = max(domain.resolution)
     most = min(most_voxels, int(longest * pixels / MIN_VOXEL_PIXELS))
-    common = math.gcd(*domain.resolution)
-    for times in (n for n in range(1, common + 1) if common % n == 0):
-        x, y, z = (n // times for n in domain.resolution)
-        if most / 2 <= max(x, y, z) <= most and min(x, y, z) >= MIN_SIDE_VOXELS:
-            return replace(domain, resolution=(x, y, z))
+    for shape in reversed(proportional(domain.resolution, max(-(-most // 2), 1), most)):
+        if longest % max(shape) == 0 and min(shape) >= MIN_SIDE_VOXELS:
+            return replace(domain, resolution=shape)
     return domain.with_at_most(max(most, MIN_SIDE_VOXELS))
 
 

@@ -17,15 +17,12 @@ from smokelift.extraction.fire import MIN_COLORED_VALUE
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.image import environment_count
-from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
+from smokelift.scene import SCATTERINGS, SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.geometry import Geometry
 from smokelift.setup.medium import source_radiance
 from smokelift.setup.settings import Settings
-
-MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
-"""Models of scattering, from the cheapest to the richest."""
 
 MAX_ERROR_RATIO = 0.75
 """Error of multiple over single scattering, below which multiple is taken. It is 0.01 to 0.63 for traced paths, unless
@@ -145,7 +142,8 @@ def find_scattering(
         if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:
             richest = "multiple"
     chosen = richest
-    for model in MODELS[: MODELS.index(richest)]:
+    cheaper = SCATTERINGS[SCATTERINGS.index(richest) + 1 :]
+    for model in reversed(cheaper):
         errors[model] = min(held_out(frames, model, richest, fit).error, 1.0)  # which no smoke at all leaves
         if errors[model] <= errors[richest] + tolerance:
             chosen = model
@@ -155,6 +153,6 @@ def find_scattering(
     if len(errors) == 1:
         return chosen, found
     # the one that it is compared with is the richest, or the next cheaper one if it is the richest itself
-    other = MODELS[MODELS.index(richest) - 1] if chosen == richest else richest
+    other = cheaper[0] if chosen == richest else richest
     figures = {**figures, "error": errors[chosen], "other": other, "other_error": errors[other]}
     return chosen, replace(found, kind="compared scattering", figures=figures)
