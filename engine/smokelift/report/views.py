@@ -25,16 +25,6 @@ def sentence(finding: Finding) -> str:
     return f"View {finding.figures['view']}: {words}" if "view" in finding.figures else words
 
 
-def value(finding: Finding) -> str:
-    """Return what is taken, as a line of a table says it."""
-    return _filled(VALUES.get(finding.kind, "{value}"), finding)
-
-
-def origin(finding: Finding) -> str:
-    """Return where a value comes from, as a line of a table says it."""
-    return UNDETERMINED if finding.source == "assumed" else finding.source or ""
-
-
 def message(finding: Finding) -> dict[str, Any]:
     """Return what an event says: the words, with kind and figures, of which programs make their own."""
     return {"text": sentence(finding), "kind": finding.kind, "figures": _figures(finding)}
@@ -46,11 +36,12 @@ def fact(finding: Finding) -> dict[str, str]:
     What is given needs no sentence.
     """
     said = finding.source != "given" and finding.kind in SENTENCES
+    value = VALUES.get(finding.kind, "{value}")
     return {
         "what": finding.about,
-        "value": value(finding),
-        "short": _filled(SHORT[finding.kind], finding) if finding.kind in SHORT else value(finding),
-        "origin": origin(finding),
+        "value": _filled(value, finding),
+        "short": _filled(SHORT.get(finding.kind, value), finding),
+        "origin": UNDETERMINED if finding.source == "assumed" else finding.source or "",
         "how": sentence(finding) if said else "",
     }
 
@@ -104,15 +95,9 @@ class _Words(Formatter):
         if isinstance(value, tuple):
             lengths = format_spec.endswith(" x") or all(isinstance(one, int) for one in value)
             return (" x " if lengths else ", ").join(format(one, format_spec.removesuffix(" x")) for one in value)
-        if format_spec == "place":
-            return _place(value)
+        if format_spec == "place":  # of a depth (m) behind the middle
+            way = "behind" if value > 0 else "before"
+            return f"{abs(value):.2g} m {way} the middle" if abs(value) >= MIN_DEPTH else "in the middle"
         if isinstance(value, int) and len(format_spec) > 1 and format_spec.replace(" ", "").isalpha():
             return counted(value, format_spec)
         return format(MODELS.get(value, value), format_spec)
-
-
-def _place(depth: float) -> str:
-    """Where a depth (m) behind the middle is, in words."""
-    if abs(depth) < MIN_DEPTH:
-        return "in the middle"
-    return f"{abs(depth):.2g} m {'behind' if depth > 0 else 'before'} the middle"

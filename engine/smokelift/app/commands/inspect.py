@@ -16,7 +16,7 @@ from smokelift.report.facts import boundaries, facts, forecast_of
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
 from smokelift.report.result import expected_shortcomings, made_up
-from smokelift.report.views import choices, origin, sentence, value
+from smokelift.report.views import choices, fact, sentence
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
-        f"{counted(frames, 'frame')} of {voxels} voxels: {value(known[-1])}. {sentence(known[-1])}{written}",
+        f"{counted(frames, 'frame')} of {voxels} voxels: {fact(known[-1])['value']}. {sentence(known[-1])}{written}",
         {
             "frames": frames,
             "scene": scene_to_dict(shot.scene),
@@ -92,7 +92,8 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path
     scene, given = Scene(**vars(shot.scene)), shot.scene.background
     plate = shot.found_background if given.estimated else None
     picture = path.with_name(f"{path.stem}_background.exr")
-    said = [f"{line.about}: {value(line)} ({origin(line)})" for line in known if line.about != "cost"]
+    lines = [fact(each) for each in known if each.about != "cost"]
+    said = ["{what}: {value} ({origin})".format(**line) for line in lines]
     color = None if plate is None else plate[0, 0]
     one_color = color is not None and bool((plate == color).all())
     files = (path,) if plate is None or one_color else (path, picture)
