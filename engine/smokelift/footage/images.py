@@ -216,14 +216,14 @@ def readable_size(width: int | Fraction, height: int) -> tuple[int, int]:
     return max(1, round(width / divisor)), max(1, round(height / divisor))
 
 
-def size_refusal(width: int, height: int) -> str | None:
-    """Return why a picture of its header's size is refused, before memory is taken for it; None if it is not."""
-    if 0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS:
-        return None
-    return (
-        f"cannot be read: its header says {width} x {height} pixels; a picture has 1 to {LARGEST_PICTURE} along a side "
-        f"and {MAX_PIXELS} in all at most"
-    )
+def require_size(path: Path, size: tuple[int, int], error: type[ValueError] = ImageError) -> None:
+    """Refuse a picture of its header's width and height before memory is taken for it."""
+    width, height = size
+    if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS):
+        raise error(
+            f"{path}: cannot be read: its header says {width} x {height} pixels; a picture has 1 to {LARGEST_PICTURE} "
+            f"along a side and {MAX_PIXELS} in all at most"
+        )
 
 
 def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
@@ -245,7 +245,7 @@ def _read_with_ffmpeg(path: Path, pixels: str | None = None) -> npt.NDArray[Any]
     # as a pattern, "frame_%d.png" would mean other files
     with open_container(path, "image2", pattern_type="none") as container:
         stream = container.streams.video[0]
-        _require_size(path, (stream.width, stream.height))
+        require_size(path, (stream.width, stream.height))
         frame = next(container.decode(stream))
         parts = frame.format.components
         alpha = "a" * any(part.is_alpha for part in parts)
@@ -253,11 +253,6 @@ def _read_with_ffmpeg(path: Path, pixels: str | None = None) -> npt.NDArray[Any]
         return frame.to_ndarray(
             format=pixels or (f"rgb{alpha}{64 if alpha else 48}le" if wide else f"rgb{alpha or 24}")
         )
-
-
-def _require_size(path: Path, size: tuple[int, int]) -> None:
-    if refusal := size_refusal(*size):
-        raise ImageError(f"{path}: {refusal}")
 
 
 def _read_radiance(path: Path) -> npt.NDArray[Any]:
@@ -284,7 +279,7 @@ def _read_integers(path: Path) -> Codes:
     if by_ffmpeg:
         return _read_with_ffmpeg(path)  # Pillow would cut 16 bit color to 8
     with Image.open(path) as picture:
-        _require_size(path, picture.size)
+        require_size(path, picture.size)
         upright = ImageOps.exif_transpose(picture)
         return np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
 
@@ -326,7 +321,7 @@ def _read_exr(path: Path) -> Layer:
         headers = OpenEXR.File(str(path), header_only=True).parts
     for part in headers:
         for name in ("displayWindow", "dataWindow"):
-            _require_size(path, _window(part, name)[1])
+            require_size(path, _window(part, name)[1])
     with _silent():
         parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # so the library reports damaged pixels

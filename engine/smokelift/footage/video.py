@@ -40,7 +40,7 @@ from smokelift.footage.images import (
     linear_to_srgb,
     open_container,
     readable_size,
-    size_refusal,
+    require_size,
     srgb_to_linear,
 )
 
@@ -172,8 +172,7 @@ class Video(FrameSource):
             raise ClipError(
                 f"{self._path}: holds video of a kind that cannot be decoded; convert it, for example to H.264"
             )
-        if refusal := size_refusal(stream.width, stream.height):
-            raise ClipError(f"{self._path}: {refusal}")
+        require_size(self._path, (stream.width, stream.height), ClipError)
         return stream
 
     def _frames(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
