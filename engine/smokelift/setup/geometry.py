@@ -218,10 +218,7 @@ def _domain_above(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     """The box of voxels with this edge (m) about the middle of its floor (3,)."""
     size = np.array(resolution) * voxel
     low = floor - size * (0.5, 0.5, 0)
-    high = low + size
-    return Domain(
-        (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
-    )
+    return Domain(low.tolist(), (low + size).tolist(), resolution)
 
 
 def _smoke_bounds(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
