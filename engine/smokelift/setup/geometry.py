@@ -102,9 +102,9 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         resolution = Finding("given", about="resolution", value=asked, source="given")
         qualities = dict.fromkeys(QUALITIES, Grid(asked, None))
     else:
-        domain, resolution, qualities = choose_grid(
-            grids, lambda whole: _smoke_detail(estimate, camera, whole), settings
-        )
+        allowed = {quality: grids(quality) for quality in QUALITIES}
+        detail = _smoke_detail(estimate, camera, allowed[settings.quality][-1])
+        domain, resolution, qualities = choose_grid(allowed, detail, settings)
     if box is None:
         figures: Figures = {"size": domain.size, "resolution": domain.resolution}
         around = Finding("box around the smoke", figures, about="box", source="estimated")

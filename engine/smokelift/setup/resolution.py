@@ -6,7 +6,7 @@ contrast that is finer. Figures: docs/experiments/clip-pixels.md.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,36 +77,33 @@ def proportional(resolution: Shape, least: int, most: int) -> list[Shape]:
 
 
 def choose_grid(
-    grids: Callable[[Quality], Sequence[Domain]], detail: Callable[[Domain], DetailSpectrum | None], settings: Settings
+    allowed: Mapping[Quality, Sequence[Domain]], spectrum: DetailSpectrum | None, settings: Settings
 ) -> tuple[Domain, Finding, Mapping[Quality, Grid]]:
     """Choose the coarsest of a quality's grids that loses no more of what the finest shows than tolerated.
 
-    ``grids`` returns those that a quality allows, the coarsest first; ``detail`` the smoke's detail in a box, None
-    without smoke. Returned are the grid, why it is that one, and what each quality would take.
+    ``allowed`` are those of each quality, the coarsest first; ``spectrum`` is the smoke's detail in the finest of the
+    settings' quality, None without smoke. Returned are the grid, why it is that one, and what each quality would take.
     """
-    own = grids(settings.quality)
-    spectrum = detail(own[-1])
+    own = allowed[settings.quality]
     if spectrum is None:
         shape = own[0].resolution
         unseen = Finding("resolution without smoke", about="resolution", value=shape, source="assumed")
         return own[0], unseen, dict.fromkeys(QUALITIES, Grid(shape, None))
 
-    def coarsest(allowed: Sequence[Domain], tolerance: float) -> Domain:
-        finest = max(allowed[-1].resolution)
-        return next((grid for grid in allowed if spectrum.lost(max(grid.resolution), finest) <= tolerance), allowed[-1])
+    def coarsest(grids: Sequence[Domain], tolerance: float) -> Domain:
+        finest = max(grids[-1].resolution)
+        return next((grid for grid in grids if spectrum.lost(max(grid.resolution), finest) <= tolerance), grids[-1])
 
-    tolerance = LOST_DETAIL[settings.quality]
-    domain = coarsest(own, tolerance)
+    taken = {quality: coarsest(grids, LOST_DETAIL[quality]) for quality, grids in allowed.items()}
+    domain = taken[settings.quality]
     longest = max(domain.resolution)
     figures: Figures = {
         "lost": spectrum.lost(longest),
         "lost_beside_finest": spectrum.lost(longest, max(own[-1].resolution)),
         "pixels": spectrum.pixels,
         "quality": settings.quality,
-        "tolerance": tolerance,
+        "tolerance": LOST_DETAIL[settings.quality],
     }
-    taken = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
-    taken[settings.quality] = domain
     qualities = {name: Grid(grid.resolution, spectrum.lost(max(grid.resolution))) for name, grid in taken.items()}
     why = Finding("resolution", figures, about="resolution", value=domain.resolution, source="measured")
     return domain, why, qualities
