@@ -290,18 +290,13 @@ void adjoint_sweeps(const Rays &rays, int width, std::size_t first, std::size_t 
 SMOKELIFT_CLONES
 void scatter_runs(const Rays &rays, int axis, int first, int end, const Record &record,
                   const Voxels &gradient) {
-    for (const Run &run : rays.runs) {
-        if (run.axis != axis)
-            continue;
-        if (gradient.width == 1)
-            scatter_planes<1, true>(rays, run, record, gradient, first, end);
-        else if (gradient.width == 2 && axis == 2)
-            scatter_planes<2, false>(rays, run, record, gradient, first, end);
-        else if (gradient.width == 2)
-            scatter_planes<2, true>(rays, run, record, gradient, first, end);
-        else
-            scatter_planes<CHANNELS, false>(rays, run, record, gradient, first, end);
-    }
+    by_width(gradient.width, [&](auto width) SMOKELIFT_INLINE_LAMBDA {
+        for (const Run &run : rays.runs)
+            if (run.axis == axis && axis == 2)
+                scatter_planes<width, false>(rays, run, record, gradient, first, end);
+            else if (run.axis == axis)
+                scatter_planes<width, true>(rays, run, record, gradient, first, end);
+    });
 }
 
 SMOKELIFT_CLONES
