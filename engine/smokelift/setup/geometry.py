@@ -65,12 +65,15 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
     clip, samples, box = estimate.clip, estimate.samples, scene.domain
     known = None if scene.camera is None else fitting(scene.camera, clip)
     _require_camera_and_box(scene, known)
+    assumed = partial(Finding, about="camera", source="assumed")
     if known is not None:
-        focal = known.fy
+        focal, scale = known.fy, assumed("assumed scale", about="")
     elif clip.lens is not None:
         focal = clip.lens / math.hypot(*FILM_SIZE) * math.hypot(*clip.size)
+        scale = assumed("assumed camera with the file's lens", {"lens": clip.lens})
     else:
         focal = LENS_FOCAL_LENGTH / FILM_SIZE[0] * max(clip.size)
+        scale = assumed("assumed camera", {"lens": LENS_FOCAL_LENGTH, "film": FILM_SIZE[0]})
     # what a pixel shows where the smoke is
     meters = PICTURE_HEIGHT / clip.size[1] if settings.distance is None else settings.distance / focal
     camera = known or _level_camera(clip.size, focal, meters)
@@ -110,7 +113,7 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         around = Finding("box around the smoke", figures, about="box", source="estimated")
         if not samples.smoky:
             around = replace(around, kind="box over the picture", source="assumed")
-        found = _scale_finding(known, clip.lens, meters * camera.size[1]), around
+        found = replace(scale, figures={"height": meters * camera.size[1], **scale.figures}), around
     elif not np.allclose([domain.min, domain.max], [box.min, box.max], rtol=0, atol=1e-3 * domain.voxel_size):
         found = (Finding("grown box", {"size": domain.size}, about="box", source="given"),)
     return Geometry(camera, domain, qualities, (*found, resolution))
@@ -137,19 +140,6 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
             f"({clip.path.name}); the camera's size must have the clip's shape."
         )
     return camera.resized(*clip.size)
-
-
-def _scale_finding(given: Camera | None, lens: float | None, height: float) -> Finding:
-    """What is assumed of a camera, or of the scale alone if the camera is given.
-
-    ``lens`` (mm) is the file's, ``height`` (m) that of the picture where the smoke is.
-    """
-    if given is not None:
-        return Finding("assumed scale", {"height": height}, source="assumed")
-    camera = partial(Finding, about="camera", source="assumed")
-    if lens is not None:
-        return camera("assumed camera with the file's lens", {"height": height, "lens": lens})
-    return camera("assumed camera", {"height": height, "lens": LENS_FOCAL_LENGTH, "film": FILM_SIZE[0]})
 
 
 def _level_camera(size: tuple[int, int], focal: float, meters: float) -> Camera:

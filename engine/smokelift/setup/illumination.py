@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.checks import UNDETERMINED, Doubles, Figure, Figures, Finding
+from smokelift.checks import UNDETERMINED, Figures, Finding
 from smokelift.extraction import brightest_smoke
 from smokelift.extraction.fire import MIN_COLORED_VALUE
-from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise
 from smokelift.render.image import environment_count
 from smokelift.scene import SCATTERINGS, SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
@@ -74,29 +73,23 @@ def first_light(
             richest,
             [],
         )
-    found = estimate.source
+    found, about = estimate.source, "source radiance"
     if found is None:
         source = source_radiance(estimate.samples)
+        shown = Finding(f"undetermined {about}", about=about, value=UNDETERMINED, source="assumed")
     else:
         # without shadows no smoke is brighter than the light makes all of it
         brightest = brightest_smoke(estimate.clip, estimate.plate, estimate.samples.smoky[0], found)
         source = found * max(1.0, brightest / float(found.mean()))
+        red, green, blue = map(float, found)
+        figures: Figures = {"red": red, "green": green, "blue": blue}
+        shown = Finding(about, figures, about=about, value=(red, green, blue), source="measured")
+    shown = replace(shown, figures={"taken": tuple(source.tolist()), **shown.figures})
     scattered = np.array(medium.albedos) / (4 * np.pi)
     red, green, blue = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0).tolist()
     light = DirectionalLight((0.0, 0.0, -1.0), (red, green, blue))
     assumed = Finding("assumed light", {"irradiance": light.irradiance}, source="assumed")
-    return (light,), richest, [assumed, _source_finding(found, source)]
-
-
-def _source_finding(shown: Picture | None, taken: Doubles) -> Finding:
-    """The source radiance (3,) of the smoke that is shown, and the one that is taken; undetermined if none is shown."""
-    about = "source radiance"
-    figures: dict[str, Figure] = {"taken": tuple(taken.tolist())}
-    if shown is None:
-        return Finding(f"undetermined {about}", figures, about=about, value=UNDETERMINED, source="assumed")
-    red, green, blue = map(float, shown)
-    figures |= {"red": red, "green": green, "blue": blue}
-    return Finding(about, figures, about=about, value=(red, green, blue), source="measured")
+    return (light,), richest, [assumed, shown]
 
 
 def light_doubts(scattering: Finding, samples: SmokeSamples, noise: Noise, *, burns: bool) -> list[Finding]:
