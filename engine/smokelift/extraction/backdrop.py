@@ -17,7 +17,7 @@ from smokelift.extraction.background_kind import MAX_DEVIATION, color_around, li
 from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.extraction.given_background import mean_of_frames, read_background
-from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered, without_noise_light
+from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plate, uncovered, without_noise_light
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
 from smokelift.extraction.strokes import Strokes, stroked_plate, without_others
 from smokelift.footage.clip import Clip
@@ -138,6 +138,8 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             noise, (plate, shown) = plate.noise, known(quiet)
             plate = replace(plate, noise=noise)
+        # one that many frames show has lost as much detail to the codec as they have
+        plate = replace(plate, finest=finest_detail(clip))
         found = Backdrop("alpha" if gray else "given", shown, plate, behind, motion=motion)
     plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)

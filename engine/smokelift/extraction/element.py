@@ -71,9 +71,9 @@ BRIGHT_PERCENTILE, MIN_SOURCE = 99, 0.01
 """Percentile of a picture's brightness that it starts from where smoke only darkens, and its lower bound, linear: a
 picture darker than that shows no light in eight bits."""
 
-FINER, FINEST = 1.5, 2
-"""Pixels along a cell whose detail is compared, and pixels of the clip along one of these at least: a codec takes the
-finest detail of a plate away, and that of thin smoke with it (docs/experiments/extraction.md)."""
+FINER = 1.5
+"""Pixels along a cell whose detail is compared, but for what is finer than a codec keeps of it: `Plate.finest`
+(docs/experiments/extraction.md)."""
 
 WINDOW_BLUR = 2.0
 """Standard deviation, in cells, of the Gaussian that smooths the deviation of T, which is found in windows of four."""
@@ -175,10 +175,10 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
     return source_in([Cells.compared(picture, plate, size, finer) for picture, plate in pictures])
 
 
-def source_size(clip: Clip) -> tuple[int, int]:
+def source_size(clip: Clip, finest: float) -> tuple[int, int]:
     """Return the numbers of columns and rows of the pixels that `source_cells` are made of."""
     cells = reduced_size(*clip.size, SOURCE_SIDE)
-    return compared_size(cells, clip.size, FINER * MAX_CELLS / max(cells))
+    return compared_size(cells, clip.size, finest, FINER * MAX_CELLS / max(cells))
 
 
 def source_cells(clip: Clip, plate: Plate, frames: Sequence[int]) -> list[Cells]:
@@ -186,15 +186,18 @@ def source_cells(clip: Clip, plate: Plate, frames: Sequence[int]) -> list[Cells]
 
     ``frames`` (one at least) have those with the most smoke first. The plate may be `resized` to `source_size`.
     """
-    size, cells = source_size(clip), reduced_size(*clip.size, SOURCE_SIDE)
+    size, cells = source_size(clip, plate.finest), reduced_size(*clip.size, SOURCE_SIDE)
     numbers = sorted(frames[:SOURCE_FRAMES])
     shown = [(clip.stored(frame).averaged(*size), resized(plate.at(frame), size)) for frame in numbers]
     return [Cells.of(picture, behind, cells) for picture, behind in shown]
 
 
-def compared_size(cells: tuple[int, int], whole: tuple[int, int], finer: float = FINER) -> tuple[int, int]:
+def compared_size(
+    cells: tuple[int, int], whole: tuple[int, int], finest: float, finer: float = FINER
+) -> tuple[int, int]:
     """Return the numbers of columns and rows of the pixels whose detail cells of a ``whole`` picture compare."""
-    columns, rows = (min(round(finer * count), max(1, of // FINEST)) for count, of in zip(cells, whole, strict=True))
+    most = (max(1, round(count / finest)) for count in whole)
+    columns, rows = (min(round(finer * count), of) for count, of in zip(cells, most, strict=True))
     return columns, rows
 
 
@@ -344,7 +347,7 @@ class Cells:
     def compared(picture: Picture, plate: Plate, size: tuple[int, int], finer: float = FINER) -> Cells:
         """Average a whole picture and its plate down to what is compared, ``finer`` than a cell, and to cells."""
         rows, columns = picture.shape[:2]
-        compared = compared_size(size, (columns, rows), finer)
+        compared = compared_size(size, (columns, rows), plate.finest, finer)
         return Cells.of(area_average(picture, *compared), resized(plate, compared), size)
 
     @staticmethod

@@ -82,7 +82,7 @@ def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int])
     """
     if plate.images is not None or is_known(plate):
         return plate, source_in(source_cells(clip, plate, smoky))
-    frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip))
+    frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip, plate.finest))
     seen = source_cells(clip, small, smoky)
     starts = [likeliest(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
@@ -138,7 +138,7 @@ class SomeFrames:
     def of(clip: Clip, plate: Plate) -> "SomeFrames":
         """Read the frames of a clip at its plate's exposure."""
         cells, numbers = reduced_size(*clip.size, SIDE), clip.spread(FRAMES)
-        columns, rows = compared_size(cells, clip.size)
+        columns, rows = compared_size(cells, clip.size, plate.finest)
         pictures = [clip.stored(frame).averaged(columns, rows) for frame in numbers]
         return SomeFrames(clip, numbers, pictures, resized(plate, (columns, rows)), cells)
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.image_sequence import is_video
 from smokelift.footage.images import Picture, area_average, brightest_channel, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
@@ -24,6 +25,7 @@ from smokelift.footage.noise import (
     noise_about,
     some_blocks,
 )
+from smokelift.footage.video import median_quantizer
 
 CLIPPED_LEVEL = np.float32(0.1)
 """Smallest lasting noise over white noise clipped at black, whose mean depends on how the file rounds."""
@@ -36,6 +38,17 @@ MIDDLE = np.full(3, 0.5, np.float32)
 
 UNCOVERED = 5
 """Frames whose median is the background where a mask hides all of them."""
+
+FINEST, LARGEST_FINEST = 2.0, 8.0
+"""Pixels along the finest detail of a plate that a codec leaves of it behind thin smoke, at `FINE_QUANTIZER` and less,
+and the most that are taken (docs/experiments/extraction.md)."""
+
+FINE_QUANTIZER, COARSENING = 18.0, 10.0
+"""Quantizer of H.264 at which a clip is hard to tell from its original, and how much more doubles these pixels, whose
+number grows as the quantizer's step to the power of .6 (docs/experiments/extraction.md)."""
+
+USUAL_QUANTIZER = 23.0
+"""Quantizer of a video that does not say its own: x264's default, and the median of 30 public clips."""
 
 NO_NOISE = lasting_noise(0.0)
 """Noise of a plate until it is measured (by definition)."""
@@ -60,6 +73,8 @@ class Plate:
         raises ClipError if it cannot. None if the background stands still.
     files
         What such images are read from.
+    finest
+        Pixels along the finest detail of it that the clip keeps behind smoke; see `finest_detail`.
     """
 
     image: Picture
@@ -68,6 +83,7 @@ class Plate:
     errors: Picture = field(default_factory=lambda: np.zeros((3, 3), np.float32))
     images: Callable[[int], Picture] | None = None
     files: tuple[Path, ...] = ()
+    finest: float = FINEST
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame, counted from 0, which has one image."""
@@ -95,6 +111,15 @@ def resized(plate: Plate, size: tuple[int, int]) -> Plate:
     """Return a plate reduced to a size (columns, rows)."""
     columns, rows = plate.image.shape[1::-1]
     return plate.through(lambda part: area_average(part, *size), columns * rows / (size[0] * size[1]))
+
+
+def finest_detail(clip: Clip) -> float:
+    """Return the pixels along the finest detail of a given plate that a clip's codec leaves behind thin smoke."""
+    if not is_video(clip.path):
+        return FINEST
+    quantizer = median_quantizer(clip.path)
+    coarser = (USUAL_QUANTIZER if quantizer is None else quantizer) - FINE_QUANTIZER
+    return float(np.clip(FINEST * 2 ** (coarser / COARSENING), FINEST, LARGEST_FINEST))
 
 
 def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = False) -> tuple[Plate, Clip]:

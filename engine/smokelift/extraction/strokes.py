@@ -76,7 +76,7 @@ def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -
     unknown = (confidence == 0) & np.isin(patches, patches[strokes.smoke | seen])
     image[unknown] = srgb_to_linear(push_pull(linear_to_srgb(image), confidence))[unknown]
     errors = plate.errors if plate.errors.any() else continuation_errors(image, confidence > 0)
-    return Plate(image, confidence, plate.noise, errors)
+    return replace(plate, image=image, confidence=confidence, errors=errors)
 
 
 def without_others(strokes: Strokes, clip: Clip, plate: Plate) -> Clip:

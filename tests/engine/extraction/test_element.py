@@ -146,6 +146,17 @@ def test_before_black_the_picture_is_what_smoke_sends() -> None:
     assert rms((found.transmittance - TRANSMITTANCE)[smoky]) < 1.5 * rms(found.deviation[smoky])
 
 
+def test_detail_that_a_codec_takes_from_thin_smoke_is_no_opacity() -> None:
+    """The finer half of the wall's detail is missing from the picture wherever smoke is."""
+    grain = np.random.default_rng(3).standard_normal((ROWS, COLUMNS, 1)).astype(np.float32)
+    fine, coarse = blurred(grain, 0.8), blurred(grain[::-1], 5.0)
+    held = np.maximum(0.3 * (1 + 0.3 * coarse / coarse.std()), 0.03) * np.ones(3, np.float32)
+    plate = np.maximum(held + 0.06 * fine / fine.std(), 0.01).astype(np.float32)
+    picture = filmed(clear_picture(np.where(TRANSMITTANCE[..., None] < 0.97, held, plate)))
+    sharp, kept = (extracted(picture, replace(plate_of(plate), finest=finest)) for finest in (2.0, 6.0))
+    assert rms(kept.transmittance - TRANSMITTANCE) < 0.6 * rms(sharp.transmittance - TRANSMITTANCE)
+
+
 # what does not fit
 
 

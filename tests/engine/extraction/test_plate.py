@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.matte import matte
-from smokelift.extraction.plate import known_plate, without_noise_light
+from smokelift.extraction.plate import finest_detail, known_plate, without_noise_light
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
@@ -119,3 +120,10 @@ def test_noise_does_not_brighten_a_clip(tmp_path: Path) -> None:
     before, after = (np.mean(list(clip), axis=(0, 1, 2)) - truth.mean((0, 1)) for clip in (noisy, quiet))
     assert before.min() > 0.005
     assert np.abs(after).max() < 0.1 * before.min()
+
+
+@pytest.mark.parametrize(("quantizer", "finest"), [(10.0, 2.0), (18.0, 2.0), (28.0, 4.0), (50.0, 8.0), (None, 2.83)])
+def test_a_coarse_codec_keeps_coarse_detail_alone(monkeypatch, quantizer: float | None, finest: float) -> None:
+    monkeypatch.setattr("smokelift.extraction.plate.median_quantizer", lambda path: quantizer)
+    assert finest_detail(SimpleNamespace(path=Path("clip.mp4"))) == pytest.approx(finest, abs=0.01)
+    assert finest_detail(SimpleNamespace(path=Path("clip_####.png"))) == 2.0
