@@ -229,7 +229,9 @@ def _run(
         finally:
             process.kill()  # nothing, unless we are interrupted ourselves
     status = _STATUS.get(code, "crashed")
-    if message.get("later") and status not in ("done", "cancelled"):
+    if status != "done" and stop.is_set():  # if it was killed, too
+        status = "cancelled"
+    elif message.get("later") and status not in ("done", "cancelled"):
         status = "stuck"
     how = f"signal {-code}" if code < 0 else f"status {code}"
     ended = replace(

@@ -2,11 +2,13 @@
 
 Its input is a JSON file: ``frames``; ``seconds`` of a frame; ``memory`` that it foretells; ``ends``: what ends the run
 before a frame, by the frame's number (``"crash"``, ``"refuse"`` or a path: the disk is full while that exists; a crash
-happens once). Every finished frame is written down in ``NAME.ledger`` beside the sequence.
+happens once); ``stubborn``: whether neither the end of its input nor a signal that can be ignored ends it. Every
+finished frame is written down in ``NAME.ledger`` beside the sequence.
 """
 
 import json
 import os
+import signal
 import sys
 import threading
 import time
@@ -28,8 +30,12 @@ def say(event, **fields):
 
 
 def main(words):
-    threading.Thread(target=end_with_input, daemon=True).start()
     task = json.loads(Path(words[1]).read_text())
+    if task["stubborn"]:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+    else:
+        threading.Thread(target=end_with_input, daemon=True).start()
     if words[0] == "inspect":
         return say("done", text="Known.", frames=task["frames"], seconds=2.0 * task["frames"], memory=task["memory"])
     out = Path(words[words.index("--out") + 1])

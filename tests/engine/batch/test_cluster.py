@@ -8,8 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import SimpleNamespace
@@ -91,16 +90,10 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     made.close()
 
 
-def until(true: Callable[[], object]) -> None:
-    """Wait for something to become true."""
-    end = time.monotonic() + SECONDS
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 @posix
-def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, make_shot, tmp_path, ledger) -> None:
+def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(
+    cluster, make_shot, tmp_path, ledger, until
+) -> None:
     """A worker and the scheduler are killed while shots run, and the storage is full for a while."""
     full = tmp_path / "full"
     full.touch()
@@ -142,7 +135,7 @@ def test_a_worker_returns_its_shot_unless_it_ends_itself(make_shot, monkeypatch)
 
 
 @posix
-def test_a_batch_that_is_cancelled_ends_its_shots_at_once(cluster, make_shot, tmp_path, ledger) -> None:
+def test_a_batch_that_is_cancelled_ends_its_shots_at_once(cluster, make_shot, ledger, engines, until) -> None:
     shots = [make_shot(f"shot{n}", frames=1000, seconds=0.02) for n in range(2)]
     cluster.scheduler()
     driver = cluster.drive()
@@ -154,5 +147,6 @@ def test_a_batch_that_is_cancelled_ends_its_shots_at_once(cluster, make_shot, tm
     said, _ = driver.communicate(timeout=SECONDS)
     assert said.splitlines()[-1] == "cancelled"
     until(lambda: not (begun.folder / f".{begun.name}.lock").exists())
+    assert not engines()
     assert 0 < len(ledger(begun)) < 1000
     assert not other.file("ledger").exists()

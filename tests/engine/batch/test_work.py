@@ -1,16 +1,24 @@
 """The work on one shot: nothing is lost, and nothing is done twice."""
 
+import functools
+import os
+import signal
+import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-import psutil
 import pytest
 
+import smokelift
 from smokelift.batch.shots import BatchShot
 from smokelift.batch.work import Record, finish_shot, inspect_shot, is_finished, read_index, read_record, run_here
+
+SECONDS = 120.0
+"""Longest wait for a batch to end, for a machine that does much else."""
 
 PYTHON = (sys.executable, "-c")
 
@@ -82,16 +90,16 @@ def test_two_that_work_on_one_shot_do_it_once(make_shot, fake, ledger) -> None:
     assert ledger(shot) == [1, 2, 3, 4]
 
 
-def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake) -> None:
+def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake, engines, until) -> None:
     shot = make_shot(frames=1000, seconds=0.02)
     stop = threading.Event()
-    threading.Timer(0.4, stop.set).start()
-    assert finish_shot(shot, stop, engine=fake).status == "cancelled"
-    there = len(read_index(shot).frames)
-    assert 0 < there < 1000
-    time.sleep(0.1)
-    assert len(read_index(shot).frames) == there
-    assert not [child for child in psutil.Process().children() if "fake_engine" in " ".join(child.cmdline())]
+    with ThreadPoolExecutor() as pool:
+        ended = pool.submit(finish_shot, shot, stop, engine=fake)
+        until(lambda: read_index(shot).frames)
+        stop.set()
+    assert ended.result().status == "cancelled"
+    assert not engines()
+    assert 0 < len(read_index(shot).frames) < 1000
 
 
 def test_a_shot_is_forecast_once(make_shot, fake) -> None:
@@ -168,13 +176,43 @@ def test_a_small_shot_overtakes_a_large_one(shots) -> None:
     assert work.order == ["shot0", "shot2", "shot1"]
 
 
-def test_leaving_early_stops_the_work(shots) -> None:
-    def wait(shot, stop) -> Record:
-        if shot.name != "shot0":
-            assert stop.wait(10)
-        return DONE
+def test_leaving_early_ends_the_engines(make_shot, fake, engines, until, monkeypatch) -> None:
+    """The caller leaves after the first shot; of the others an engine has to be killed."""
+    monkeypatch.setattr("smokelift.batch.work.GRACE_SECONDS", 0.1)
+    quick, gentle = make_shot("quick", frames=1), make_shot("gentle", frames=1000, seconds=0.02)
+    stubborn = make_shot("stubborn", frames=1000, seconds=0.02, stubborn=True)
+    task = functools.partial(finish_shot, engine=fake)
+    ended = run_here([(quick, 0), (gentle, 0), (stubborn, 0)], task, 1, 3)
+    assert next(ended)[0] == quick
+    until(lambda: read_index(gentle).frames and read_index(stubborn).frames)
+    assert len(engines()) == 2
+    ended.close()
+    assert not engines()
+    assert not read_index(gentle).complete and not read_index(stubborn).complete
 
-    began = time.monotonic()
-    for _ in run_here(shots(1, 1), wait, 10, 2):
-        break
-    assert time.monotonic() - began < 5
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals to send")
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_a_batch_that_is_interrupted_leaves_no_engine(make_shot, engines, until, tmp_path, number) -> None:
+    """Only the batch gets the signal. An engine that does not end by itself is killed, unless the batch is."""
+    killed = number == "SIGKILL"
+    shots = [make_shot(f"shot{n}", frames=1000, seconds=0.02, stubborn=n == 0 and not killed) for n in range(2)]
+    path = tmp_path / "shots.toml"
+    path.write_text("".join(f'[[shots]]\ninput = "{shot.input.name}"\n' for shot in shots))
+    command = [sys.executable, str(Path(__file__).with_name("command_driver.py")), "batch", str(path), "--workers", "2"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as batch:
+        try:
+            until(lambda: all(read_index(shot).frames for shot in shots))
+            assert len(engines()) == 2
+            batch.send_signal(signal.Signals[number])
+            _, said = batch.communicate(timeout=SECONDS)
+        finally:
+            batch.kill()
+    if killed:
+        until(lambda: not engines())
+    else:
+        assert not engines()
+        assert (batch.returncode, said) == (130, b"Cancelled.\n")
+        assert [read_record(shot).status for shot in shots] == ["cancelled"] * 2
+    assert not any(read_index(shot).complete for shot in shots)
