@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
@@ -34,8 +35,11 @@ that."""
 WAKE_SECONDS = 0.5
 """Seconds of a wait for a shot, at most: on some systems Python handles no signal while it waits."""
 
-RETRIES, PAUSE_SECONDS, PATIENCE_SECONDS = 2, 30.0, 3600.0
-"""New tries after a crash. Seconds between tries while a disk is full, say, and in all without a new frame."""
+PAUSE_SECONDS = 30.0
+"""Seconds between tries while a disk is full, say."""
+
+RETRIES = {"crashed": 2, "stuck": 120}
+"""New tries, by how the last one ended; while it is stuck, those of an hour without a new frame."""
 
 Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "cancelled"]
 """``running``: or its machine was lost while it ran; ``refused``: the engine says what is wrong; ``stuck``: what passes
@@ -111,13 +115,12 @@ def inspect_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] =
     try:
         shot.folder.mkdir(parents=True, exist_ok=True)
         ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine)
-        if ended.status != "done":
-            return ended
-        record = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
-        record.write(shot)
+        if ended.status == "done":
+            ended = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
+            ended.write(shot)
+        return ended
     except OSError as error:  # the storage itself
-        return replace(record, status="stuck", sentence=str(error), forecast=None)
-    return record
+        return replace(record, status="stuck", sentence=str(error))
 
 
 def finish_shot(
@@ -129,27 +132,40 @@ def finish_shot(
 ) -> Record:
     """Reconstruct a shot to its end, going on from the frames that are there, and return its record.
 
-    After a crash it is tried again. A failure that passes is waited for: `say` is called with what it is, and `pause`
-    is the seconds until the next try. Once `stop` is set the work ends; finished frames stay.
+    The engine runs only while nobody else has the shot's lock. After a crash it is tried again. A failure that passes
+    is waited for: `say` is called with what it is, and `pause` is the seconds until the next try. Once `stop` is set
+    the work ends; finished frames stay.
     """
-    crashes, waited, frames = 0, 0.0, 0
+    words = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.file("png"))]
+    lock, tries, frames = Lock(shot.folder / f".{shot.name}.lock"), Counter[str](), 0
     while True:
         try:
-            record = _reconstruct(shot, stop, engine)
+            shot.folder.mkdir(parents=True, exist_ok=True)
+            free = lock.acquire()
+            record = read_record(shot)
+            if not free:
+                sentence = f"{shot.directory}: another batch is at work on this shot."
+                record = replace(record, status="stuck", sentence=sentence)
+            elif not (is_finished(shot, record) or stop.is_set()):
+                record = replace(record, status="running", sentence="", runs=record.runs + 1)
+                record.write(shot)
+                record, _ = _run(shot, record, [*words, "--resume", *shot.options], stop, engine)
+                record.write(shot)
         except OSError as error:  # the storage itself
             record = replace(read_record(shot), status="stuck", sentence=str(error))
+        finally:
+            with suppress(OSError):
+                lock.release()
         if stop.is_set() and record.status != "done":
             return replace(record, status="cancelled", sentence="Cancelled; finished frames stay.")
         if (there := len(read_index(shot).frames)) > frames:
-            waited, frames = 0.0, there
-        if record.status == "crashed" and crashes < RETRIES:
-            crashes += 1
-        elif record.status == "stuck" and waited < PATIENCE_SECONDS:
+            tries["stuck"], frames = 0, there
+        tries[record.status] += 1
+        if tries[record.status] > RETRIES.get(record.status, 0):
+            return record
+        if record.status == "stuck":
             say(f"{shot.name}: {record.sentence} It is tried again in {pause:.0f} s.")
             stop.wait(pause)
-            waited += pause
-        else:
-            return record
 
 
 def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterator[tuple[BatchShot, Record]]:
@@ -172,26 +188,6 @@ def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterat
                     yield running.pop(future)[0], future.result()
         finally:
             stop.set()
-
-
-def _reconstruct(shot: BatchShot, stop: threading.Event, engine: Sequence[str]) -> Record:
-    """Run the engine once, if nobody else does."""
-    shot.folder.mkdir(parents=True, exist_ok=True)
-    lock = Lock(shot.folder / f".{shot.name}.lock")
-    if not lock.acquire():
-        sentence = f"{shot.directory}: another batch is at work on this shot."
-        return replace(read_record(shot), status="stuck", sentence=sentence)
-    try:
-        record = read_record(shot)
-        if not (is_finished(shot, record) or stop.is_set()):
-            record = replace(record, status="running", sentence="", runs=record.runs + 1)
-            record.write(shot)
-            words = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.file("png"))]
-            record, _ = _run(shot, record, [*words, "--resume", *shot.options], stop, engine)
-            record.write(shot)
-        return record
-    finally:
-        lock.release()
 
 
 def _run(

@@ -15,7 +15,16 @@ import pytest
 
 import smokelift
 from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import Record, finish_shot, inspect_shot, is_finished, read_index, read_record, run_here
+from smokelift.batch.work import (
+    RETRIES,
+    Record,
+    finish_shot,
+    inspect_shot,
+    is_finished,
+    read_index,
+    read_record,
+    run_here,
+)
 
 SECONDS = 120.0
 """Longest wait for a batch to end, for a machine that does much else."""
@@ -73,6 +82,22 @@ def test_a_full_disk_is_waited_for(make_shot, fake, tmp_path, ledger) -> None:
     record = finish_shot(shot, threading.Event(), hear, 0.05, fake)
     assert (record.status, ledger(shot)) == ("done", [1, 2, 3])
     assert said[0] == "shot: The disk is full. It is tried again in 0 s."
+
+
+def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, fake, tmp_path, ledger, monkeypatch) -> None:
+    """One try is allowed here without a new frame."""
+    monkeypatch.setitem(RETRIES, "stuck", 1)
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.touch(), second.touch()
+    shot = make_shot(n2=str(first), n3=str(second))
+    said: list[str] = []
+
+    def hear(text: str) -> None:
+        said.append(text)
+        first.unlink(missing_ok=True)
+
+    record = finish_shot(shot, threading.Event(), hear, 0.0, fake)
+    assert (record.status, record.runs, len(said), ledger(shot)) == ("stuck", 3, 2, [1, 2])
 
 
 def test_two_that_work_on_one_shot_do_it_once(make_shot, fake, ledger) -> None:
