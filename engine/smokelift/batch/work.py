@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -29,11 +29,8 @@ ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
 """The command line, which ends with the process that started it."""
 
 POLL_SECONDS, GRACE_SECONDS = 0.25, 20.0
-"""Seconds between two measurements of a running engine, and for a cancelled one to end, which kills itself before
-that."""
-
-WAKE_SECONDS = 0.5
-"""Seconds of a wait for a shot, at most: on some systems Python handles no signal while it waits."""
+"""Seconds between two measurements of a running engine, and of a wait for one, at most: on some systems Python handles
+no signal while it waits. Seconds for a cancelled engine to end, which kills itself before that."""
 
 PAUSE_SECONDS = 30.0
 """Seconds between tries while a disk is full, say."""
@@ -74,8 +71,8 @@ class Record:
 Task = Callable[[BatchShot, threading.Event], Record]
 """Work on a shot, and what ends it; a worker of a cluster has to be able to import it."""
 
-ShotMemory = Sequence[tuple[BatchShot, int]]
-"""Shots with the bytes of memory that each needs; 0 if that is not known."""
+ShotMemory = Mapping[BatchShot, int]
+"""Bytes of memory that each shot needs, in the order in which they begin; 0 if that is not known."""
 
 
 def read_record(shot: BatchShot) -> Record:
@@ -171,21 +168,22 @@ def finish_shot(
 def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterator[tuple[BatchShot, Record]]:
     """Run shots side by side, `workers` at most, and yield each when it has ended.
 
-    A shot starts as soon as its part of `memory` is left, in the order of the list; a small one may overtake a large
-    one. What needs more than all of it runs alone. When the caller leaves early the work ends, and is waited for.
+    A shot starts as soon as the bytes that it needs are left of `memory`, in the order of the shots; a small one may
+    overtake a large one. What needs more than all of it runs alone. When the caller leaves early the work ends, and is
+    waited for.
     """
     stop = threading.Event()
-    waiting, running = list(shots), dict[Future[Record], tuple[BatchShot, int]]()
+    waiting, running = list(shots), dict[Future[Record], BatchShot]()
     with ThreadPoolExecutor(workers) as pool:
         try:
             while waiting or running:
-                for shot, needed in list(waiting):
-                    taken = sum(each for _, each in running.values())
-                    if not running or (len(running) < workers and taken + needed <= memory):
-                        waiting.remove((shot, needed))
-                        running[pool.submit(task, shot, stop)] = shot, needed
-                for future in wait(running, WAKE_SECONDS, FIRST_COMPLETED).done:
-                    yield running.pop(future)[0], future.result()
+                for shot in list(waiting):
+                    taken = sum(map(shots.__getitem__, running.values()))
+                    if not running or (len(running) < workers and taken + shots[shot] <= memory):
+                        waiting.remove(shot)
+                        running[pool.submit(task, shot, stop)] = shot
+                for future in wait(running, POLL_SECONDS, FIRST_COMPLETED).done:
+                    yield running.pop(future), future.result()
         finally:
             stop.set()
 

@@ -30,7 +30,7 @@ def main(address: str, folder: Path) -> None:
     shots = [BatchShot(path.stem, path, (), folder / "results") for path in sorted(folder.glob("*.task"))]
     task = functools.partial(finish_shot, pause=0.2, engine=FAKE)
     print("began", flush=True)
-    ended = run_on_cluster([(shot, 0) for shot in shots], task, address, functools.partial(print, flush=True))
+    ended = run_on_cluster(dict.fromkeys(shots, 0), task, address, functools.partial(print, flush=True))
     try:
         for shot, record in ended:
             print(shot.name, record.status, flush=True)

@@ -163,7 +163,7 @@ def shots(make_shot):
     """Make shots that need so much memory each."""
 
     def make(*needs: int):
-        return [(make_shot(f"shot{n}"), memory) for n, memory in enumerate(needs)]
+        return {make_shot(f"shot{n}"): memory for n, memory in enumerate(needs)}
 
     return make
 
@@ -207,7 +207,7 @@ def test_leaving_early_ends_the_engines(make_shot, fake, engines, until, monkeyp
     quick, gentle = make_shot("quick", frames=1), make_shot("gentle", frames=1000, seconds=0.02)
     stubborn = make_shot("stubborn", frames=1000, seconds=0.02, stubborn=True)
     task = functools.partial(finish_shot, engine=fake)
-    ended = run_here([(quick, 0), (gentle, 0), (stubborn, 0)], task, 1, 3)
+    ended = run_here(dict.fromkeys((quick, gentle, stubborn), 0), task, 1, 3)
     assert next(ended)[0] == quick
     until(lambda: read_index(gentle).frames and read_index(stubborn).frames)
     assert len(engines()) == 2

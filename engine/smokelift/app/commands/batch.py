@@ -47,7 +47,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     add_device(of_a_shot)
     reconstruct.add_options(of_a_shot)
     records = {shot: read_record(shot) for shot in read_shots(options.list, of_a_shot)}
-    unknown = [(shot, 0) for shot, record in records.items() if record.forecast is None]
+    unknown = {shot: 0 for shot, record in records.items() if record.forecast is None}
     if unknown:
         say.note(f"Inspecting {counted(len(unknown), 'clip')} ...")
     with closing(_run_shots(options.scheduler, unknown, inspect_shot, say.note, 1)) as inspected:
@@ -75,13 +75,13 @@ def _run_remaining(
         return finish_shot(shot, stop, say.note)
 
     total = psutil.virtual_memory().total
-    shots = []
+    shots = {}
     for each in left:
         if options.scheduler is None and each.memory > total:
             needs = f"needs {_gib(each.memory)} and this machine has {_gib(total)}"
             say.note(f"{each.shot.name}: {needs}; choose a lower resolution.")
         else:
-            shots.append((each.shot, each.memory))
+            shots[each.shot] = each.memory
     task = finish_shot if options.scheduler is not None else work
     with closing(_run_shots(options.scheduler, shots, task, say.note, options.workers)) as ended:
         for shot, record in ended:
