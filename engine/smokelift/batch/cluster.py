@@ -42,32 +42,31 @@ def run_on_cluster(
 ) -> Iterator[tuple[BatchShot, Record]]:
     """Run shots on the workers of the scheduler at an address, as ``tcp://host:8786``, and yield each at its end.
 
-    Workers that have the resource `MEMORY` count what shots need. Leaving early ends them; finished frames stay. `say`
-    is called when the scheduler goes away; ValueError if it does not answer, or not return.
+    Workers that have the resource `MEMORY` count the bytes that shots need. Leaving early ends them; finished frames
+    stay. `say` is called when the scheduler goes away; ValueError if it does not answer, or not return.
     """
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":  # it tells of every lost connection; so do we, once
             logging.getLogger(name).setLevel(logging.CRITICAL)
     left, batch, seconds = dict(shots), f"smokelift-{uuid.uuid4().hex}", CONNECT_SECONDS
     while left:
-        connected = False
         try:
-            with distributed.Client(address, timeout=seconds, set_as_default=False) as client:
-                connected = True
-                for shot, record in _submitted(client, left, task, batch):
-                    yield shot, record
-                    del left[shot]
+            client = distributed.Client(address, timeout=seconds, set_as_default=False)
         except OSError as error:
-            if not connected:
-                raise ValueError(
-                    f"{address}: no Dask scheduler answers ({error}); start it, or check its address. Not finished: "
-                    f"{', '.join(shot.name for shot in left)}. Give the same command again to go on with them."
-                ) from error
+            raise ValueError(
+                f"{address}: no Dask scheduler answers ({error}); start it, or check its address. Not finished: "
+                f"{', '.join(shot.name for shot in left)}. Give the same command again to go on with them."
+            ) from error
+        with suppress(OSError), client:
+            for shot, record in _submitted(client, left, task, batch):
+                yield shot, record
+                del left[shot]
+        if left:
             say(f"The scheduler at {address} went away; waiting for it to return.")
             seconds = RETURN_SECONDS
 
 
-def _submitted(client: Any, shots: dict[BatchShot, int], task: Task, batch: str) -> Iterator[tuple[BatchShot, Record]]:
+def _submitted(client: Any, shots: ShotMemory, task: Task, batch: str) -> Iterator[tuple[BatchShot, Record]]:
     """Give shots to a scheduler and yield each when it has ended; ConnectionError if it forgets them."""
     client.register_plugin(Stop(), name=batch)
     by_memory = client.run_on_scheduler(
@@ -83,11 +82,11 @@ def _submitted(client: Any, shots: dict[BatchShot, int], task: Task, batch: str)
             if future.status in ("cancelled", "lost"):
                 raise ConnectionError("the scheduler forgot the shots")
             try:
-                yield of[future], future.result()
+                record = future.result()
             except distributed.KilledWorker:
                 sentence = "The workers that had this shot were lost, one after the other; is there too little memory?"
-                yield of[future], replace(read_record(of[future]), status="crashed", sentence=sentence)
-            del of[future]
+                record = replace(read_record(of[future]), status="crashed", sentence=sentence)
+            yield of.pop(future), record
     finally:
         if client.status == "running":  # else there is nobody to tell; the workers end their tasks then
             with suppress(Exception):
@@ -96,7 +95,7 @@ def _submitted(client: Any, shots: dict[BatchShot, int], task: Task, batch: str)
 
 
 def work(shot: BatchShot, task: Task, batch: str) -> Record:
-    """Work on a shot, on a worker; Reschedule if that ends before the shot does."""
+    """Work on a shot of the batch with this name, on a worker; Reschedule if that ends before the shot does."""
     record = task(shot, distributed.get_worker().plugins[batch].event)
     if record.status == "cancelled":
         raise distributed.Reschedule
