@@ -82,6 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 figures = measured(smoke, compose(smoke, plate, filming, folder), folder / f"{known}.toml", settings)
                 if "refused" not in figures:  # the next state of the code may not refuse
                     rows.add(key, figures)
+                    figures = rows.find(key) or figures  # as rounded as they are when they are read again
             print(line([*about, *cells(figures)]), flush=True)
 
 
