@@ -155,9 +155,13 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     )
     clear = 1 - fields[..., 0]
     smooth = fields[..., :1] * source_of(fields, source)
-    # what is finer than the cells is the smoke's own
-    left = small - clear[..., None] * behind - smooth
-    return Element(smooth + weight[..., None] * left, clear, deviation, shared, weight)
+    passed = clear[..., None] * behind
+    # what is finer than the cells is the smoke's own as far as its light varies, the rest noise and the plate's
+    own = np.square(BRIGHTNESS_RANGE * smooth).mean(-1)
+    noise = np.square(noise_at(small, plate)).mean(-1) * (columns * rows / plate.confidence.size)
+    noise += np.square(MODEL_ERROR * passed).mean(-1)
+    kept = np.asarray(weight * own / np.maximum(own + noise, MIN_VARIANCE), np.float32)
+    return Element(smooth + kept[..., None] * (small - passed - smooth), clear, deviation, shared, weight)
 
 
 def source_of(fields: Picture, source: Picture) -> Picture:

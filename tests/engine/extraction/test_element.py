@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smokelift.extraction import Element, extract_element
+from smokelift.extraction.element import MODEL_ERROR
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise
@@ -100,7 +101,8 @@ def test_a_blob_is_found_before_a_plate(plate: Picture, size: tuple[int, int]) -
     assert found.weight.mean() > 0.99
     seen = area_average(picture, *size)
     left = np.abs(found.over(area_average(plate, *size)) - seen)
-    assert (left <= noise_at(seen, plate_of(plate)))[found.weight == 1].all()
+    error = np.hypot(noise_at(seen, plate_of(plate)), MODEL_ERROR * seen)
+    assert (left <= 3 * error)[found.weight == 1].all()
     assert found.radiance.dtype == found.transmittance.dtype == np.float32
 
 
@@ -127,6 +129,7 @@ def test_clear_air_sends_nothing() -> None:
     found = extracted(filmed(plate), plate_of(plate))
     assert found.transmittance.mean() > 0.98
     assert np.abs(found.radiance.mean((0, 1))).max() < 0.01
+    assert rms(detail(found.radiance)) < 0.3 * rms(detail(filmed(plate) - plate))
 
 
 def test_before_black_the_picture_is_what_smoke_sends() -> None:
@@ -140,7 +143,7 @@ def test_before_black_the_picture_is_what_smoke_sends() -> None:
     dark[:, 56:136] = True
     fits = dark & (found.weight == 1)
     assert fits.sum() > 0.95 * dark.sum()
-    np.testing.assert_allclose(found.radiance[fits], picture[fits], atol=1e-6)
+    np.testing.assert_allclose(found.radiance[fits], picture[fits], atol=4e-4)  # a code of black
     smoky = dark & (TRANSMITTANCE < 0.6)
     assert np.median(found.deviation[smoky]) > 1.5 * np.median(seen.deviation[smoky])
     assert rms((found.transmittance - TRANSMITTANCE)[smoky]) < 1.5 * rms(found.deviation[smoky])
