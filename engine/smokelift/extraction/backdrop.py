@@ -138,8 +138,9 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             noise, (plate, shown) = plate.noise, known(quiet)
             plate = replace(plate, noise=noise)
-        # one that many frames show has lost as much detail to the codec as they have
-        plate = replace(plate, finest=finest_detail(clip))
+        if behind is not None and behind.color is None:
+            # one that many frames show has lost as much detail to the codec as they have; one color has none
+            plate = replace(plate, finest=finest_detail(clip))
         found = Backdrop("alpha" if gray else "given", shown, plate, behind, motion=motion)
     plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)

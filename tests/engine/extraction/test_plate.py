@@ -9,10 +9,11 @@ import pytest
 
 from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.matte import matte
-from smokelift.extraction.plate import finest_detail, known_plate, without_noise_light
+from smokelift.extraction.plate import FINEST, finest_detail, known_plate, without_noise_light
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
+from smokelift.scene import Background
 from tests.engine.films import (
     COUNT,
     HEIGHT,
@@ -127,3 +128,19 @@ def test_a_coarse_codec_keeps_coarse_detail_alone(monkeypatch, quantizer: float 
     monkeypatch.setattr("smokelift.extraction.plate.median_quantizer", lambda path: quantizer)
     assert finest_detail(SimpleNamespace(path=Path("clip.mp4"))) == pytest.approx(finest, abs=0.01)
     assert finest_detail(SimpleNamespace(path=Path("clip_####.png"))) == 2.0
+
+
+@pytest.mark.parametrize("how", ["picture", "frame", "color", "found"])
+def test_a_codec_tells_of_given_pictures_alone(tmp_path: Path, monkeypatch, how: str) -> None:
+    """One color has no detail, and a plate that many frames show has lost what they have."""
+    monkeypatch.setattr("smokelift.extraction.backdrop.finest_detail", lambda clip: 5.0)
+    behind = wall(0.1, 0.5)
+    write_image(tmp_path / "wall.png", behind)
+    given = {
+        "picture": Background(image=tmp_path / "wall.png"),
+        "frame": Background(frame=(0,)),
+        "color": Background(color=(0.1, 0.1, 0.1)),
+        "found": None,
+    }[how]
+    plate = find_backdrop(film(tmp_path, behind, puff, 0.6), None, given).plate
+    assert plate.finest == (5.0 if how in ("picture", "frame") else FINEST)

@@ -75,7 +75,7 @@ def test_before_a_smooth_wall_of_another_hue_the_light_is_as_strong_as_the_smoke
 def test_a_given_light_has_the_white_balance_of_a_clip_in_which_that_changes(plume, draft, tmp_path) -> None:
     """Before a plate that was found in it: that is as red as the clip's middle, and so is the smoke before it."""
     detail = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None]
-    write_image(tmp_path / "wall.png", (0.02 + 0.4 * detail * (1.0, 0.8, 0.6)).astype("f4"))
+    write_image(tmp_path / "wall.png", (0.05 + 0.2 * detail * (1.0, 0.8, 0.6)).astype("f4"))
     before = replace(plume.scene, background=Background(image=tmp_path / "wall.png"))
     passing = [plume.blob(plume.scene, height) for height in np.linspace(-0.3, 1.9, 14)]
     scene = replace(plume.write(tmp_path / "clip", passing, before), background=None)
