@@ -19,7 +19,7 @@ from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spre
 from smokelift.extraction.given_background import mean_of_frames, read_background
 from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plate, uncovered, without_noise_light
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
-from smokelift.extraction.strokes import Strokes, stroked_plate, without_others
+from smokelift.extraction.strokes import PAINTED, Strokes, stroked_plate, without_others
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
 from smokelift.footage.inpainting import DETAIL, continuation_errors
@@ -126,7 +126,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
         given = None if behind is None else read_background(behind, camera)
     clip, motion = _on_plate(clip, given)
     if given is None:
-        found = _estimated(clip, moves)
+        found = _estimated(clip, moves, None if strokes is None else strokes.smoke)
     else:
 
         def known(clip: Clip) -> tuple[Plate, Clip]:
@@ -149,7 +149,9 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     if moves or plate.images is not None:
         raise ValueError(STROKES_OVER_ONE_FRAME)
     one_color = background.color is not None or (background.estimated and found.source != "picture")
-    plate = stroked_plate(strokes, plate, found.clip, one_color)
+    # a picture was found with what is painted as smoke
+    left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if found.source == "picture" else strokes
+    plate = stroked_plate(left, plate, found.clip, one_color)
     clip = without_others(strokes, found.clip, plate)
     return replace(found, clip=clip, plate=plate, background=background, strokes=strokes)
 
@@ -171,8 +173,11 @@ def _registered(clip: Clip, motion: CameraMotion) -> Clip:
     return clip.registered(lambda number, frame: motion.at(number, lambda: frame.averaged(*size)))
 
 
-def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> Backdrop:
-    """The background of a clip when none is given; ``motion`` is that by which its frames are registered."""
+def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion | None = None) -> Backdrop:
+    """The background of a clip when none is given; ``smoke`` (rows, columns) was painted over one of its frames.
+
+    ``motion`` is that by which the frames are registered.
+    """
     filmed = clip
     if len(clip) == len(clip.whole()) == 1 and (around := color_around(clip.frame(0))) is not None:
         plate, clip = known_plate(around, clip)
@@ -202,7 +207,7 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
         if shaken == "other":
             raise ValueError(MOVING_CAMERA)
         if shaken is not None:
-            return _estimated(_registered(filmed, shaken), moves, shaken)
+            return _estimated(_registered(filmed, shaken), moves, smoke, shaken)
     shot = part.numbers[0], part.numbers[-1]
 
     def made(source: Source, plate: Plate) -> Backdrop:
@@ -213,7 +218,7 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
         shown = part.with_still()
-        plate = _picture(clip, shown, white)
+        plate = _picture(clip, shown, white, smoke)
         if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
             return made("picture", plate)
         # fog drifts over all of the file: treat it as filmed before black
@@ -221,10 +226,12 @@ def _estimated(clip: Clip, moves: bool, motion: CameraMotion | None = None) -> B
     return made(source, _of_one_color(clip, part, color, objects, white))
 
 
-def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
-    """The plate that the clear frames show."""
+def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Plate:
+    """The plate that the clear frames show; ``smoke`` (rows, columns) was painted."""
+    rows, columns = proxy.seen.shape[1:]
+    painted = None if smoke is None else area_average(smoke, columns, rows) >= PAINTED
     noise = proxy.noise_about(median_of_seen(proxy.pictures), white)
-    picture = clear_picture(proxy, noise.averaged(proxy.scale**2), DETAIL / proxy.scale)
+    picture = clear_picture(proxy, noise.averaged(proxy.scale**2), DETAIL / proxy.scale, painted)
     known = spread_out(picture.known, clip.size).astype(np.float32)
     image, noise = whole_plate(clip, proxy, picture), proxy.noise_about(picture.image, white)
     return Plate(image, known, noise, continuation_errors(picture.image, picture.known))

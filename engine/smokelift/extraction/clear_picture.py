@@ -85,6 +85,9 @@ MIN_CONTRAST = 0.02
 """Smallest difference of the background from the smoke's brightness, in sRGB values, at which a mean tells how much of
 it passes: noise and codecs change a mean by a code or two."""
 
+MIN_STANDING = 0.05
+"""Weight, in the smoothed value of a pixel, of painted smoke that never changes, above which that hides the pixel."""
+
 MAX_CORRECTION = 3.0
 """Difference of a clear moment from what is continued there, in standard deviations, beyond which it is an object's."""
 
@@ -111,10 +114,11 @@ class ClearPicture:
     correction: Picture
 
 
-def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
+def clear_picture(proxy: Proxy, noise: Noise, detail: float, painted: Mask | None = None) -> ClearPicture:
     """Return the background of pictures of one exposure.
 
-    ``detail`` is `DETAIL` at their size: the standard deviation of that Gaussian in their pixels.
+    ``detail`` is `DETAIL` at their size: the standard deviation of that Gaussian in their pixels. Where smoke is
+    ``painted`` (rows, columns), what never changes is smoke, and no frame shows what is behind it.
     """
     width = smoothing(noise)
     pictures, seen = proxy.pictures, proxy.seen
@@ -136,7 +140,11 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         image[band], known[band], change[band], clear[:, band] = _clear_values(
             pictures[:, band], values[:, band], window, similarity
         )
-    known, calm = in_one_piece(known), change <= window + DRIFT
+    calm, never = change <= window + DRIFT, ~seen.any(0)
+    if painted is not None:
+        # beside it the smoothed values change as well
+        never |= painted & (blurred((painted & calm).astype(np.float32), width) > MIN_STANDING)
+    known, calm = in_one_piece(known & ~never), calm & ~never
     if not known.all():
         # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
         unlike = np.abs(_unlike(image, known).mean(-1))
@@ -146,7 +154,6 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float) -> ClearPicture:
         known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known)
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
-    never = ~seen.any(0)
     if never.any():
         known &= ~never
         mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]

@@ -1,7 +1,8 @@
 """Strokes painted over one frame: where smoke is, where none ever is, and where the background shows as it is.
 
-They add to what the clip shows, wherever the background came from. What is smoke is unknown of the plate, which is
-continued there from around it. What is not smoke, and what is behind it, is known: the clip's own median over time.
+They add to what the clip shows, wherever the background came from. A given plate is unknown where smoke is painted; of
+one that frames show clear at times, only what never changes is (`clear_picture`). What is unknown is continued from
+around it. What is not smoke, and what is behind it, is known: the clip's own median over time.
 """
 
 from __future__ import annotations

@@ -87,14 +87,15 @@ def test_nothing_that_is_painted_red_is_smoke(tmp_path: Path) -> None:
 
 
 def test_what_is_painted_blue_is_behind_and_continued(tmp_path: Path) -> None:
-    """Smoke that stands before a bright stripe of its width, and leaves a gap in most of the frames."""
+    """Smoke stands before a bright stripe of its width, and leaves a gap in most of the frames, or never."""
     stripe = GRADIENT + 0.2 * np.exp(-(((COLUMNS - 28) / 6) ** 2))[..., None]
     gap = (PLUME > 0) & (ROWS > 30) & (ROWS < 40)
     clip = film(tmp_path, stripe, lambda n: np.where(gap & (n % 5 > 0), 0, PLUME), 1.0)
     green = (PLUME > 0) & ~gap
-    _, alone = painted(clip, (PLUME > 0, GREEN))
+    (tmp_path / "closed").mkdir()
+    _, alone = painted(film(tmp_path / "closed", stripe, lambda _: PLUME, 1.0), (PLUME > 0, GREEN))
     _, plate = painted(clip, (green, GREEN), (gap, BLUE))
-    assert (plate.confidence[gap] == 1).all() and (plate.confidence[green] == 0).all()
+    assert (plate.confidence[gap] == 1).all() and (plate.confidence[green] == 0).mean() > 0.9
     assert codes_apart(plate.image, stripe)[gap].max() < 3
     near = green & (np.abs(ROWS - 35) < 9)
     assert codes_apart(plate.image, stripe)[near].mean() < 0.6 * codes_apart(alone.image, stripe)[near].mean()
@@ -120,7 +121,18 @@ def test_a_stroke_says_nothing_of_what_is_unknown_elsewhere(tmp_path: Path) -> N
     unknown = before.confidence == 0
     assert unknown[:, 8:12].all() and not unknown[:, 30:].any()
     _, plate = painted(clip, ((COLUMNS > 40) & (ROWS > 40), GREEN))
-    np.testing.assert_array_equal(plate.image[unknown], before.image[unknown])
+    assert codes_apart(plate.image, before.image)[unknown].max() < 3
+
+
+def test_green_keeps_what_clear_moments_show(tmp_path: Path) -> None:
+    """Smoke sways before a wall of tiles: over all of it or none, the strokes leave what frames show as it was."""
+    tiles = wall(0.2, 0.5)
+    clip = film(tmp_path, tiles, lambda n: np.roll(PLUME, round(16 * np.sin(n)), axis=1), 0.9)
+    passed = (np.abs(COLUMNS - 28) < 20) & (ROWS > 14)
+    before, (_, plate) = plate_of(clip), painted(clip, (passed, GREEN))
+    shown = passed & (before.confidence == 1) & (PLUME == 0)
+    assert shown.mean() > 0.2 and (plate.confidence[shown] == 1).mean() > 0.9
+    assert codes_apart(plate.image, tiles)[shown].mean() < 1.1 * codes_apart(before.image, tiles)[shown].mean()
 
 
 @pytest.mark.parametrize("given", [None, (0.0, 0.0, 0.0)])
@@ -138,13 +150,16 @@ def test_strokes_that_say_nothing_are_refused(tmp_path: Path) -> None:
         ((), 1, "nothing is painted"),
         (((ROWS < 20, white),), 1, "no stroke is green"),
         (((ROWS < 20, white),), 2, f"{2 * WIDTH} x {HEIGHT} pixels, another shape"),
-        (((ROWS >= 0, GREEN),), 1, "nothing that is not smoke"),
     ):
         file = strokes(tmp_path, *lines)
         with Image.open(file) as picture:
             picture.resize((WIDTH * width, HEIGHT)).save(file)
         with pytest.raises(ClipError, match=said):
             find_backdrop(clip, None, Background(strokes=file))
+    everywhere = strokes(tmp_path, (ROWS >= 0, GREEN))
+    write_image(tmp_path / "plate.png", GRADIENT)
+    with pytest.raises(ClipError, match="nothing that is not smoke"):
+        find_backdrop(clip, None, Background(image=tmp_path / "plate.png", strokes=everywhere))
     with pytest.raises(ImageError, match="no such file"):
         find_backdrop(clip, None, Background(strokes=tmp_path / "no.png"))
     with pytest.raises(ValueError, match="one frame"):
