@@ -17,18 +17,10 @@ LISTED = 3
 
 @dataclass(frozen=True)
 class ImageSequence:
-    """A sequence of numbered pictures.
+    """A sequence of numbered pictures."""
 
-    Attributes
-    ----------
-    count
-        From the first to the last, with those that are missing in between.
-    missing
-        Names of these.
-    """
-
-    count: int
-    missing: tuple[str, ...]
+    count: int  # from the first to the last, with those that are missing in between
+    missing: tuple[str, ...]  # names of these
 
     def missing_names(self) -> str:
         """The first names of those that are missing, and how many there are more."""

@@ -103,51 +103,23 @@ def _processor() -> str:
 
 
 class Job:
-    """One run of the engine.
+    """One run of the engine by a command, all of whose messages are appended to a log.
 
-    Parameters
-    ----------
-    command
-        What to start.
-    log
-        File to which all messages are appended.
-    before
-        Number of the clip's frames before the first of the result.
-    done
-        Frames that are finished already, which a run that is resumed counts too.
-
-    Attributes
-    ----------
-    outcome
-        Its state.
-    done, total
-        Finished frames and all frames; 0 of 0 while unknown.
-    seconds_left
-        The engine's estimate; None while unknown.
-    notes
-        The engine's assumptions and warnings, a sentence each.
-    doubts
-        Why the result may be nothing, or wrong, each after the engine's name for it; what helps is left out.
-    forecast
-        What a run says of its shot before its first frame, with the doubts of then; None before it does.
-    sentence
-        The result, or the reason of a failure.
-    details
-        The fields of the engine's "done" message.
-    status
-        The engine's exit status; None before it ends.
+    So many frames of the clip lie ``before`` the first of the result. A run that is resumed has ``done`` some already.
     """
 
     def __init__(self, command: Sequence[str], log: Path, before: int = 0, done: int = 0) -> None:
         self.outcome: Outcome = "waiting"
-        self.done, self.total = done, 0
-        self.seconds_left: float | None = None
-        self.notes: list[str] = []
+        self.done, self.total = done, 0  # finished frames and all frames; 0 of 0 while unknown
+        self.seconds_left: float | None = None  # the engine's estimate; None while unknown
+        self.notes: list[str] = []  # the engine's assumptions and warnings, a sentence each
+        # why the result may be nothing, or wrong, each after the engine's name for it; what helps is left out
         self.doubts: list[tuple[str, str]] = []
+        # what a run says of its shot before its first frame, with the doubts of then; None before it does
         self.forecast: tuple[Mapping[str, Any], list[tuple[str, str]]] | None = None
-        self.sentence = ""
-        self.details: Mapping[str, Any] = {}
-        self.status: int | None = None
+        self.sentence = ""  # the result, or the reason of a failure
+        self.details: Mapping[str, Any] = {}  # the fields of the engine's "done" message
+        self.status: int | None = None  # the engine's exit status; None before it ends
         self._command = list(command)
         self._log_path = log
         self._before = before
@@ -237,13 +209,8 @@ class Job:
         text = line.decode("utf-8", "replace").rstrip()
         try:
             message = json.loads(text)
-            event = message.pop("event")
-        except (ValueError, AttributeError, LookupError, TypeError):
-            self._write_log(text)
-            return False
-        try:
-            return self._handle(event, message)
-        except (LookupError, TypeError, ValueError):
+            return self._handle(message.pop("event"), message)
+        except (AttributeError, LookupError, TypeError, ValueError):
             self._write_log(text)
             return False
 

@@ -206,33 +206,15 @@ class Take:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """What the files of a take say at one time.
+    """What the files of a take say at one time."""
 
-    Attributes
-    ----------
-    direction
-        What is done to another take, a key of `DIRECTIONS`; None of one that is made from a clip, or damaged.
-    source
-        The other take; None of one that is made from a clip, or damaged.
-    options
-        The engine's further options; None where the request is missing or damaged.
-    title
-        The name that the artist gave it, or its number.
-    index
-        The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one.
-    begun
-        Whether it has what a run needs.
-    files
-        The .blend files that may show it, without links; None of one that an earlier version made, which kept no list.
-    """
-
-    direction: str | None
-    source: Take | None
-    options: list[str] | None
-    title: str
-    index: dict[str, Any] | None
-    begun: bool
-    files: frozenset[Path] | None
+    direction: str | None  # what is done to another take, by `DIRECTIONS`; None of one of a clip, or damaged
+    source: Take | None  # the other take; None likewise
+    options: list[str] | None  # the engine's further options; None where the request is missing or damaged
+    title: str  # the name that the artist gave it, or its number
+    index: dict[str, Any] | None  # `sequence.json`, not to be changed; None before there is one, or of a foreign one
+    begun: bool  # whether it has what a run needs
+    files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
     @property
     def frames(self) -> int:
@@ -339,15 +321,11 @@ def toml_text(tables: Mapping[str, Any]) -> str:
     """The text of a TOML file, whose tables, and lists of them, hold numbers, texts, or nested lists of those."""
     parts = []
     for name, content in tables.items():
-        if isinstance(content, list):
-            parts += [_toml_table(f"[[{name}]]", table) for table in content]
-        else:
-            parts.append(_toml_table(f"[{name}]", content))
+        header, listed = (f"[[{name}]]", content) if isinstance(content, list) else (f"[{name}]", [content])
+        for table in listed:
+            lines = [header, *(f"{key} = {_toml_value(value)}" for key, value in table.items())]
+            parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)
-
-
-def _toml_table(header: str, table: Mapping[str, Any]) -> str:
-    return "\n".join([header, *(f"{key} = {_toml_value(value)}" for key, value in table.items())]) + "\n"
 
 
 def _toml_value(value: Any) -> str:

@@ -47,32 +47,16 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
 
 @dataclass
 class ShotCheck:
-    """The last check, of which the newest figures are shown until there are others.
+    """The last check, of which the newest figures are shown until there are others."""
 
-    Attributes
-    ----------
-    settings
-        Those of the smoke that was checked, as `settings_text` has them; empty where something else has changed.
-    page
-        Picture of what was found.
-    done, error
-        Whether the engine has said what it found, or why it could not.
-    of, details
-        The number of the smoke that the engine spoke of last, and what it said at its end.
-    doubts
-        Why the result may be wrong, as `Job` has them.
-    awaited
-        Those of the smoke that is checked soon.
-    """
-
-    settings: str = ""
-    page: str = ""
-    done: bool = False
-    error: str = ""
-    of: int = 0
-    details: Mapping[str, Any] = field(default_factory=dict)
-    doubts: list[tuple[str, str]] = field(default_factory=list)
-    awaited: str = ""
+    settings: str = ""  # of the smoke that was checked, by `settings_text`; empty where something else has changed
+    page: str = ""  # picture of what was found
+    done: bool = False  # whether the engine has said what it found
+    error: str = ""  # why it could not
+    of: int = 0  # number of the smoke that the engine spoke of last
+    details: Mapping[str, Any] = field(default_factory=dict)  # what it said at its end
+    doubts: list[tuple[str, str]] = field(default_factory=list)  # why the result may be wrong, as `Job` has them
+    awaited: str = ""  # settings of the smoke that is checked soon
 
     def fits(self, smoke: bpy.types.Object) -> bool:
         """Whether it is of this smoke as it is."""

@@ -27,33 +27,17 @@ End = Callable[[bpy.types.Object, Job], None]
 
 
 class SideJob:
-    """One such job at a time, and after its end what it said; never saved.
-
-    Attributes
-    ----------
-    job
-        The one that runs.
-    smoke
-        Number of the smoke that it is for.
-    operator
-        Identifier of the operator that has files written; empty for an estimate.
-    seconds
-        Whole seconds since its start.
-    sentence
-        The result, or the reason of a failure; empty for an estimate.
-    doubts
-        Why the result may be wrong, as `Job` has them.
-    """
+    """One such job at a time, and after its end what it said; never saved."""
 
     all: ClassVar[list["SideJob"]] = []
 
     def __init__(self) -> None:
-        self.job: Job | None = None
-        self.smoke = 0
-        self.operator = ""
-        self.seconds = 0
-        self.sentence = ""
-        self.doubts: list[tuple[str, str]] = []
+        self.job: Job | None = None  # the one that runs
+        self.smoke = 0  # number of the smoke that it is for
+        self.operator = ""  # identifier of the operator that has files written; empty for an estimate
+        self.seconds = 0  # whole seconds since its start
+        self.sentence = ""  # the result, or the reason of a failure; empty for an estimate
+        self.doubts: list[tuple[str, str]] = []  # why the result may be wrong, as `Job` has them
         self._end: End | None = None
         self._began = 0.0
         self._timer = self.poll  # Blender knows a timer by the object, and each `self.poll` is another

@@ -27,40 +27,18 @@ _written_to: dict[int, tuple[str, Path]] = {}
 
 @dataclass(eq=False)
 class Run:
-    """A run of this session in the panel, which is never saved.
+    """A run of this session in the panel, which is never saved."""
 
-    Attributes
-    ----------
-    take, smoke
-        What is made, and the number of its smoke.
-    job
-        The engine's process, which may wait.
-    shown
-        How many frames of it are on show, and whether its end is.
-    settings
-        Those that it was begun with, until its forecast is taken for a check of them; empty without one.
-    first
-        Whether nothing of it was shown yet.
-    before
-        What was on show when its first frame came.
-    seen
-        Whether the playhead went to its first smoke.
-    left
-        Whether the artist chose another result while it runs.
-    icon
-        Of its thumbnail; 0 without one.
-    """
-
-    take: Take
-    smoke: int
-    job: Job
-    shown: tuple[int, bool]
-    settings: str = ""
-    first: bool = True
-    before: Take | None = None
-    seen: bool = False
-    left: bool = False
-    icon: int = 0
+    take: Take  # what is made
+    smoke: int  # number of its smoke
+    job: Job  # the engine's process, which may wait
+    shown: tuple[int, bool]  # how many frames of it are on show, and whether its end is
+    settings: str = ""  # what it was begun with, until its forecast is taken for a check of that; empty without one
+    first: bool = True  # whether nothing of it was shown yet
+    before: Take | None = None  # what was on show when its first frame came
+    seen: bool = False  # whether the playhead went to its first smoke
+    left: bool = False  # whether the artist chose another result while it runs
+    icon: int = 0  # of its thumbnail; 0 without one
 
 
 runs: list[Run] = []

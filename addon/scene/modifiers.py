@@ -21,21 +21,13 @@ from .nodes import Input, add_node, file_group, get_input, input_path, math_node
 
 @dataclass(frozen=True)
 class SecondVolume:
-    """A kind of modifier, of which a smoke has one or none.
+    """A kind of modifier, of which a smoke has one or none."""
 
-    Attributes
-    ----------
-    name, mark, inputs, build
-        Of the modifier and its node group, as `file_group` has them.
-    socket
-        Input that is the second Volume's object, whose name ends so.
-    """
-
-    name: str
+    name: str  # of the modifier and its node group, as `file_group` has the next ones too
     mark: str
     inputs: tuple[Input, ...]
     build: Callable[[bpy.types.NodeTree], None]
-    socket: str
+    socket: str  # input that is the second Volume's object, whose name ends so
 
     def modifier(self, smoke: bpy.types.Object) -> bpy.types.Modifier | None:
         """The modifier of a smoke."""
