@@ -3,7 +3,6 @@
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras import view3d_utils
-from mathutils import Vector
 
 from ..core import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
@@ -155,43 +154,35 @@ class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
         if event.type in ("ESC", "RIGHTMOUSE"):
             self._view.view_perspective = self._before
             return self._end(context, {"CANCELLED"})
-        if event.type == "MOUSEMOVE":
-            context.workspace.status_text_set(self._said(context, event))
-            return {"RUNNING_MODAL"}
-        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+        clicked = event.type == "LEFTMOUSE" and event.value == "PRESS"
+        if not clicked and event.type != "MOUSEMOVE":
             return {"PASS_THROUGH"}  # so that the view can be zoomed
         try:
-            active_smoke(context.scene).smokelift.distance = self._distance(context, event)
+            distance, why = self._distance(context, event), ""
         except ShotError as error:
-            self.report({"ERROR"}, str(error))
+            distance, why = 0.0, str(error)
+        if not clicked:
+            context.workspace.status_text_set(why or rpt_("Distance: {:.3g} m").format(distance))
+            return {"RUNNING_MODAL"}
+        if why:
+            self.report({"ERROR"}, why)
             return self._end(context, {"CANCELLED"})
+        active_smoke(context.scene).smokelift.distance = distance
         return self._end(context, {"FINISHED"})
-
-    def _said(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
-        """What a click would mean there, for the status bar."""
-        try:
-            return rpt_("Distance: {:.3g} m").format(self._distance(context, event))
-        except ShotError as error:
-            return str(error)
 
     def _distance(self, context: bpy.types.Context, event: bpy.types.Event) -> float:
         """The distance of what is under the mouse; ShotError if that is not known."""
         region = next(region for region in context.area.regions if region.type == "WINDOW")
-        x, y = event.mouse_x - region.x, event.mouse_y - region.y
-        return self._floor.clicked([_pixel_ray(region, self._view, (x, y)), _pixel_ray(region, self._view, (x, y - 1))])
+        rays = []
+        for down in (0, 1):
+            seen = region, self._view, (event.mouse_x - region.x, event.mouse_y - region.y - down)
+            rays.append((view3d_utils.region_2d_to_origin_3d(*seen), view3d_utils.region_2d_to_vector_3d(*seen)))
+        return self._floor.clicked(rays)
 
     def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
         return outcome
-
-
-def _pixel_ray(region: bpy.types.Region, view: bpy.types.RegionView3D, pixel: tuple[int, int]) -> tuple[Vector, Vector]:
-    """Origin and direction of what a pixel of a view shows."""
-    return (
-        view3d_utils.region_2d_to_origin_3d(region, view, pixel),
-        view3d_utils.region_2d_to_vector_3d(region, view, pixel),
-    )
 
 
 def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -5,7 +5,6 @@ import os
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..result import smoke_takes
@@ -16,7 +15,7 @@ from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, u
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
-from .common import ChangesScene, ChoosesFile, needs_clip, operator
+from .common import HIDDEN, ChangesScene, ChoosesFile, needs_clip, operator
 from .editors import open_tab
 from .layout import draw_hint, draw_text
 from .settings import automatic_unless, choice, link, number, string, vector, whole
@@ -197,7 +196,7 @@ class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, bpy.types.Operator)
     bl_label = "Choose Picture"
     needs = (needs_clip,)
 
-    setting: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+    setting: HIDDEN
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         settings = active_smoke(context.scene).smokelift
@@ -240,8 +239,7 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
     if not clip_path(clip).is_file():
-        text = iface_("{:s} is not there: choose the clip again.")
-        draw_text(layout, text.format(str(clip_path(clip))), "ERROR")
+        draw_text(layout, "{:s} is not there: choose the clip again.", "ERROR", str(clip_path(clip)))
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
@@ -267,10 +265,10 @@ def _draw_gaps(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
         return
     column = layout.column(align=True)
     if found.missing:
-        draw_text(column, iface_("Missing: {:s}.").format(found.missing_names()), "ERROR")
+        draw_text(column, "Missing: {:s}.", "ERROR", found.missing_names())
     if settings.last < found.count:
-        text = iface_("Blender sees {:d} of {:d} frames.").format(settings.clip.frame_duration, found.count)
-        draw_text(column, text, "BLANK1" if found.missing else "INFO")
+        frames, icon = (settings.clip.frame_duration, found.count), "BLANK1" if found.missing else "INFO"
+        draw_text(column, "Blender sees {:d} of {:d} frames.", icon, *frames)
         column.operator("smokelift.use_all_files")
     else:
         draw_text(column, "A neighboring picture stands in for each.", "BLANK1")

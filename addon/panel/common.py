@@ -1,6 +1,6 @@
 """What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import bpy
@@ -14,9 +14,11 @@ from ..scene.smoke import active_smoke
 EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
 """The editors that have the tab in their sidebar."""
 
+HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+"""A text that a button gives its operator."""
 
-Act = Callable[[bpy.types.Context, bpy.types.Object], None]
-"""Does something with the active smoke; ShotError if something is in the way."""
+Act = Callable[..., str | None]
+"""Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""
 
 Need = Callable[[bpy.types.Context, bpy.types.Object | None], str]
 """Why something cannot be done now with the active smoke, or without one; empty where it can."""
@@ -61,16 +63,16 @@ class ActsOnSmoke(Needing):
     def __init_subclass__(cls) -> None:
         cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
 
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        """Do it; ShotError if something is in the way."""
-        raise NotImplementedError
+    act: Act
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            self.act(context, active_smoke(context.scene))
+            said = self.act(context, active_smoke(context.scene))
         except ShotError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        if said:
+            self.report({"INFO"}, said)
         return {"FINISHED"}
 
 
@@ -80,16 +82,19 @@ class ChangesScene(ActsOnSmoke):
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
 
-def operator(label: str, *needs: Need, base: type = ActsOnSmoke, **attributes: Any) -> Callable[[Act], type]:
+def operator(
+    label: str, *needs: Need, base: type = ActsOnSmoke, given: Mapping[str, Any] | None = None, **attributes: Any
+) -> Callable[[Act], type]:
     """Make an operator of what it does: the class SMOKELIFT_OT_NAME, with the function's name and docstring.
 
     Its button says the label, and it can be used where nothing is missing that it needs. It has the base and
-    further attributes.
+    further attributes. What it is ``given``, Blender's properties, the function gets by their names.
     """
 
     def made(act: Act) -> type:
         own = {"__module__": act.__module__, "__doc__": act.__doc__, "bl_label": label, "needs": needs, **attributes}
-        own["act"] = lambda _operator, context, smoke: act(context, smoke)
+        own["__annotations__"] = given or {}
+        own["act"] = lambda this, *acted_on: act(*acted_on, **{name: getattr(this, name) for name in given or ()})
         return type(f"SMOKELIFT_OT_{act.__name__}", (base, bpy.types.Operator), own)
 
     return made

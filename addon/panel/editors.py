@@ -6,12 +6,11 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..core.take import Take
 from ..result.shot_check import state
-from .common import ActsOnSmoke, needs_clip, operator
+from .common import HIDDEN, needs_clip, needs_smoke, operator
 
 DRAWN_SECONDS = 0.3
 """After which a new window has been drawn."""
@@ -22,22 +21,17 @@ LONGEST_OPENING = 5.0
 LOG_TEXT = "Smokelift Log"
 
 
-class SMOKELIFT_OT_open_log(ActsOnSmoke, bpy.types.Operator):
+@operator("Open Log", needs_smoke, given={"take": HIDDEN})
+def open_log(_context: bpy.types.Context, _smoke: bpy.types.Object, take: str) -> None:
     """Show the log of the run in a text editor"""
-
-    bl_label = "Open Log"
-
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def act(self, _context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
-        log = Take(Path(self.take)).log_file
-        if not log.is_file():
-            raise ShotError(rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
-        text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
-        text.from_string(log.read_text(encoding="utf-8", errors="replace"))
-        if not bpy.app.background:
-            space = _editor("TEXT_EDITOR").spaces.active
-            space.text, space.top = text, 0
+    log = Take(Path(take)).log_file
+    if not log.is_file():
+        raise ShotError(rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
+    text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
+    text.from_string(log.read_text(encoding="utf-8", errors="replace"))
+    if not bpy.app.background:
+        space = _editor("TEXT_EDITOR").spaces.active
+        space.text, space.top = text, 0
 
 
 def _needs_page(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:

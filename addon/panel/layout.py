@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -59,10 +60,7 @@ def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.t
 
 
 def draw_doubts(
-    layout: bpy.types.UILayout,
-    smoke: bpy.types.Object,
-    doubts: Iterable[tuple[str, str]],
-    said: set[str],
+    layout: bpy.types.UILayout, smoke: bpy.types.Object, doubts: Iterable[tuple[str, str]], said: set[str]
 ) -> None:
     """Why a result may be wrong, what is left to do about it, and the button that does it.
 
@@ -103,9 +101,9 @@ def draw_hint(layout: bpy.types.UILayout, words: str, operator: str, icon: str =
     column.operator(operator, icon=icon)
 
 
-def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
-    """A label in the user's language, wrapped to the sidebar's width."""
-    text = iface_(text)
+def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", *figures: Any) -> None:
+    """A label in the user's language, into which the figures are put, wrapped to the sidebar's width."""
+    text = iface_(text).format(*figures) if figures else iface_(text)
     region = bpy.context.region
     width = NEW_WIDTH if region is None else region.width / bpy.context.preferences.system.ui_scale
     lines = textwrap.wrap(text, max(16, int((width - (50.0 if icon == "NONE" else 70.0)) / POINTS_PER_LETTER)))

@@ -135,8 +135,8 @@ def draw_check(layout: bpy.types.UILayout, smoke: bpy.types.Object, said: set[st
     elif state.done:
         cost = state.costs(smoke)[smoke.smokelift.quality]
         if cost["memory"] > cost["memory_free"]:
-            text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(layout, text.format(cost["memory_free"] / 2**30), "ERROR")
+            gigabytes = cost["memory_free"] / 2**30
+            draw_text(layout, "Only {:.1f} GiB are free: choose a lower quality.", "ERROR", gigabytes)
         draw_doubts(layout, smoke, state.doubts, said)
 
 

@@ -14,41 +14,28 @@ from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import absolute, redraw
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, panels
+from .common import HIDDEN, ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, operator, panels
 from .layout import draw_text
 
 
-class _OnResult:
-    """An operator on one result."""
-
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def result(self) -> Take:
-        """The result; ShotError if it has no finished frame."""
-        take = Take(Path(self.take))
-        if not take.read().frames:
-            raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
-        return take
+def _finished(directory: str) -> Take:
+    """The result in a directory; ShotError if it has no finished frame."""
+    take = Take(Path(directory))
+    if not take.read().frames:
+        raise ShotError(rpt_("There is no finished frame in {:s}.").format(directory))
+    return take
 
 
-class SMOKELIFT_OT_show_take(_OnResult, ChangesScene, bpy.types.Operator):
+@operator("Show Result", needs_clip, base=ChangesScene, given={"take": HIDDEN})
+def show_take(_context: bpy.types.Context, smoke: bpy.types.Object, take: str) -> None:
     """Show this result in the smoke. Its place and its material stay as they are"""
-
-    bl_label = "Show Result"
-    needs = (needs_clip,)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        smoke_takes.choose(smoke, self.result())
+    smoke_takes.choose(smoke, _finished(take))
 
 
-class SMOKELIFT_OT_show_beside(_OnResult, ChangesScene, bpy.types.Operator):
+@operator("Show Beside", needs_result, base=ChangesScene, given={"take": HIDDEN})
+def show_beside(_context: bpy.types.Context, smoke: bpy.types.Object, take: str) -> None:
     """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
-
-    bl_label = "Show Beside"
-    needs = (needs_result,)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        volume.show_beside(smoke, self.result())
+    volume.show_beside(smoke, _finished(take))
 
 
 class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, bpy.types.Operator):
@@ -61,11 +48,12 @@ class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, bpy.types.Operato
         smoke_takes.move_results(smoke, absolute(self.directory))
 
 
-class SMOKELIFT_OT_name_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
     """Give this result a name"""
 
     bl_label = "Name Result"
 
+    take: HIDDEN
     title: StringProperty(name="Name", options={"SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -77,10 +65,12 @@ class SMOKELIFT_OT_name_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
         redraw()
 
 
-class SMOKELIFT_OT_remove_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
+class SMOKELIFT_OT_remove_take(ActsOnSmoke, bpy.types.Operator):
     """Delete the files of this result"""
 
     bl_label = "Delete Result?"
+
+    take: HIDDEN
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         take = Take(Path(self.take))
@@ -103,7 +93,7 @@ class SMOKELIFT_OT_remove_takes(ActsOnSmoke, bpy.types.Operator):
     bl_label = "Delete Earlier Results?"
     needs = (needs_clip,)
 
-    asked: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+    asked: HIDDEN
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         removable = earlier_takes(context)
@@ -126,7 +116,6 @@ def _confirm(
 
 
 def _size(takes: list[Take]) -> str:
-    """How much disk takes occupy, in words."""
     return disk_size(sum(take.size() for take in takes))
 
 
@@ -147,7 +136,7 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
         text = iface_("Show {:s} Beside").format(other.read().title)
         column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = name
     if found:
-        draw_text(layout, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
+        draw_text(layout, "In {:s}", "FILE_FOLDER", str(smoke_takes.output_folder(smoke)))
     removable = earlier_takes(context)
     row = layout.row()
     row.enabled = bool(removable)

@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core import ShotError
 from ..scene import shot_setup, volume
 from ..scene.plate import clip_behind
-from .common import ChangesScene, needs_clip, needs_result, panels
+from .common import ChangesScene, needs_clip, needs_result, operator, panels
 from .layout import draw_settings
 from .settings import choice, link, tick
 
@@ -62,30 +62,26 @@ class SetUpSettings:
     )
 
 
-class SMOKELIFT_OT_set_up(ChangesScene, bpy.types.Operator):
+DESCRIPTION = (
+    "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
+    "and colors, with samples for about a minute in a new file. The old world stays in the file"
+)
+
+
+@operator("Set Up Shot", needs_clip, needs_result, base=ChangesScene, bl_description=DESCRIPTION)
+def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
     """Make a render from the camera match the clip."""
-
-    bl_description = (
-        "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
-        "and colors, with samples for about a minute in a new file. The old world stays in the file"
-    )
-    bl_label = "Set Up Shot"
-    needs = (needs_clip, needs_result)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = volume.shown_take(smoke)
-        if volume.shown_index(smoke) is None:
-            text = rpt_("The files of the smoke in {:s} are missing: make it again.")
-            raise ShotError(text.format(str(take.directory)))
-        settings = smoke.smokelift
-        if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
-            raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
-        said = shot_setup.set_up(smoke)
-        if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
-            context.space_data.region_3d.view_perspective = "CAMERA"
-        volume.show(smoke, take)  # the frame rate may have changed
-        done = rpt_("The shot is set up: press F12 for a render that matches the clip.")
-        self.report({"INFO"}, " ".join([done, *said]))
+    take, settings = volume.shown_take(smoke), smoke.smokelift
+    if volume.shown_index(smoke) is None:
+        text = rpt_("The files of the smoke in {:s} are missing: make it again.")
+        raise ShotError(text.format(str(take.directory)))
+    if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
+        raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
+    said = shot_setup.set_up(smoke)
+    if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
+        context.space_data.region_3d.view_perspective = "CAMERA"
+    volume.show(smoke, take)  # the frame rate may have changed
+    return " ".join([rpt_("The shot is set up: press F12 for a render that matches the clip."), *said])
 
 
 def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
