@@ -81,9 +81,5 @@ ZIP_FILE = "smokelift-{version}-{blenders}-{platform}.zip"
 BLENDERS = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}
 """What a zip is called by the version of Python that it is for."""
 
-PLATFORMS = {
-    ("linux", "x86_64"): "linux-x64",
-    ("win32", "amd64"): "windows-x64",
-    ("darwin", "arm64"): "macos-arm64",
-}
+PLATFORMS = {("linux", "x86_64"): "linux-x64", ("win32", "amd64"): "windows-x64", ("darwin", "arm64"): "macos-arm64"}
 """Blender's platforms that there are zips for, by Python's names of system and processor."""

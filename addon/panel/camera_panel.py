@@ -70,7 +70,7 @@ class ShotSettings:
     )
     use_distance: automatic_unless("distance", "Distance", _middle_of_box)
     closed: closed_sides(
-        "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
+        "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor"
     )
     light_mode: choice(
         "Light",

@@ -119,25 +119,16 @@ def complete_import(folder: Path) -> None:
             obj.data.velocity_grid = next((name for name in grids if name.startswith("vel")), "velocity")
 
 
-class SMOKELIFT_USD_import(getattr(bpy.types, "USDHook", object)):
-    """Completes what is imported."""
+# without USD's module Blender ends when it calls a hook
+if hasattr(bpy.types, "USDHook") and importlib.util.find_spec("pxr") is not None:
 
-    bl_idname = "smokelift.usd_import"
-    bl_label = "Smokelift"
+    class SMOKELIFT_USD_import(bpy.types.USDHook):
+        """Completes what is imported."""
 
-    @staticmethod
-    def on_import(context: object) -> bool:
-        complete_import(Path(context.get_stage().GetRootLayer().realPath).parent)
-        return True
+        bl_idname = "smokelift.usd_import"
+        bl_label = "Smokelift"
 
-
-def register() -> None:
-    """Register the hook, unless USD or its module is missing: without that Blender ends when it calls a hook."""
-    if hasattr(bpy.types, "USDHook") and importlib.util.find_spec("pxr") is not None:
-        bpy.utils.register_class(SMOKELIFT_USD_import)
-
-
-def unregister() -> None:
-    """Unregister it."""
-    if getattr(SMOKELIFT_USD_import, "is_registered", False):
-        bpy.utils.unregister_class(SMOKELIFT_USD_import)
+        @staticmethod
+        def on_import(context: object) -> bool:
+            complete_import(Path(context.get_stage().GetRootLayer().realPath).parent)
+            return True

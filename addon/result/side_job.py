@@ -117,14 +117,11 @@ def write_files(
 
 @persistent
 def _stop_all(_file: str = "") -> None:
-    """End the engine: another file is loaded."""
+    """End the engine, as another file is loaded."""
     for job in SideJob.all:
         job.stop()
 
 
 HANDLERS = ((bpy.app.handlers.load_pre, _stop_all),)
 
-
-def unregister() -> None:
-    """End the engine."""
-    _stop_all()
+unregister = _stop_all

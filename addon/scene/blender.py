@@ -9,7 +9,8 @@ from types import ModuleType
 from typing import Any
 
 import bpy
-from mathutils import Matrix
+import numpy as np
+import numpy.typing as npt
 
 PACKAGE = __package__.rpartition(".")[0]
 """The add-on's name, under which Blender keeps its preferences."""
@@ -90,30 +91,25 @@ def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: s
     a vector or a matrix, in an attribute of the holder.
     """
     before = owner.get(_property_name(name))
-    if before is None or _equal(_numbers(getattr(holder, attribute)), list(before)):
-        set_and_remember(owner, name, holder, attribute, value)
+    if before is not None:
+        found, last = _numbers(getattr(holder, attribute)), np.array(before)
+        if found.shape != last.shape or not np.all(abs(found - last) <= TOLERANCE * np.maximum(1.0, abs(last))):
+            return
+    set_and_remember(owner, name, holder, attribute, value)
 
 
 def set_and_remember(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
     """Set a value, whatever it is, so that it follows the newest result from now on; parameters as above."""
     setattr(holder, attribute, value)
-    owner[_property_name(name)] = _numbers(getattr(holder, attribute))
+    owner[_property_name(name)] = _numbers(getattr(holder, attribute)).tolist()
 
 
 def _property_name(name: str) -> str:
-    return f"smokelift_{name}"
+    return f"smokelift_{name.lower().replace(' ', '_')}"
 
 
-def _numbers(value: Any) -> list[float]:
-    if isinstance(value, Matrix):
-        return [number for row in value for number in row]
-    return [float(number) for number in value] if hasattr(value, "__len__") else [float(value)]
-
-
-def _equal(found: list[float], set_last: list[float]) -> bool:
-    return len(found) == len(set_last) and all(
-        abs(a - b) <= TOLERANCE * max(1.0, abs(b)) for a, b in zip(found, set_last, strict=True)
-    )
+def _numbers(value: Any) -> npt.NDArray[np.float64]:
+    return np.ravel(value).astype(np.float64)
 
 
 def call_later(timer: Callable[[], float | None], seconds: float) -> None:
@@ -160,9 +156,9 @@ def unregister_modules(modules: Sequence[ModuleType]) -> None:
 def _classes(module: ModuleType) -> list[type]:
     """What Blender has to know of a module: its own classes, and those of a tuple in it, in their order."""
     values = [each for value in vars(module).values() for each in (value if isinstance(value, tuple) else (value,))]
-    types = bpy.types
-    kinds = (types.Operator, types.Panel, types.PropertyGroup, types.AddonPreferences, types.FileHandler)
-    classes = [each for each in values if isinstance(each, type) and issubclass(each, kinds)]
+    kinds = ("Operator", "Panel", "PropertyGroup", "AddonPreferences", "FileHandler", "USDHook")
+    known = tuple(getattr(bpy.types, kind) for kind in kinds if hasattr(bpy.types, kind))  # some are built without USD
+    classes = [each for each in values if isinstance(each, type) and issubclass(each, known)]
     return [cls for cls in classes if cls.__module__ == module.__name__]
 
 

@@ -168,43 +168,37 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
 
 def _connect_plate(tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
     """Feed the plate's socket, whose source has our name unless the artist put another there."""
-    background, socket = shown_background(smoke), node.inputs["Plate"]
-    name = f"{GROUP} Plate"
-    if socket.links and tree.nodes.get(name) is None:
-        return
-    if "image" not in background:
-        if tree.nodes.get(name) is not None:
-            tree.nodes.remove(tree.nodes[name])
-        socket.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-        return
-    source = tree.nodes.get(name)
+    background = shown_background(smoke)
+    source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
     if source is None:
-        source = _source(tree, "CompositorNodeImage", name, node, -300.0, socket)
-    source.image = plate_image(smoke)
-    synchronize_plate(smoke, source.image, source)
+        return
+    if "image" in background:
+        source.image = plate_image(smoke)
+        synchronize_plate(smoke, source.image, source)
+    else:
+        tree.nodes.remove(source)
+        node.inputs["Plate"].default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
 
 
 def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
-    name, socket = f"{GROUP} Clip", node.inputs["Clip"]
     for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
-    source = tree.nodes.get(name)
-    if source is None:
-        if socket.links:
-            return
-        source = _source(tree, "CompositorNodeMovieClip", name, node, -600.0, socket)
-    source.clip = clip
+    source = _source(tree, "CompositorNodeMovieClip", node, "Clip", -600.0)
+    if source is not None:
+        source.clip = clip
 
 
 def _source(
-    tree: bpy.types.NodeTree, kind: str, name: str, node: bpy.types.Node, down: float, socket: bpy.types.NodeSocket
-) -> bpy.types.Node:
-    """A node of pictures that feeds a socket of ours."""
-    source = tree.nodes.new(kind)
-    source.name = source.label = name
-    source.location = node.location + Vector((-300.0, down))
-    tree.links.new(source.outputs["Image"], socket)
+    tree: bpy.types.NodeTree, kind: str, node: bpy.types.Node, socket: str, down: float
+) -> bpy.types.Node | None:
+    """Our node of pictures that feeds a socket of ours, made if need be; None where the artist put another there."""
+    source = tree.nodes.get(f"{GROUP} {socket}")
+    if source is None and not node.inputs[socket].links:
+        source = tree.nodes.new(kind)
+        source.name = source.label = f"{GROUP} {socket}"
+        source.location = node.location + Vector((-300.0, down))
+        tree.links.new(source.outputs["Image"], node.inputs[socket])
     return source
 
 
@@ -261,10 +255,8 @@ def _mix(
     if SINCE_5:
         node = tree.nodes.new("ShaderNodeMix")
         node.data_type, node.clamp_factor, node.clamp_result = "RGBA", False, clamp
-        sockets = [
-            next(s for s in node.inputs if s.identifier == name) for name in ("Factor_Float", "A_Color", "B_Color")
-        ]
-        result = next(s for s in node.outputs if s.identifier == "Result_Color")
+        known = {socket.identifier: socket for socket in (*node.inputs, *node.outputs)}
+        *sockets, result = (known[name] for name in ("Factor_Float", "A_Color", "B_Color", "Result_Color"))
     else:
         node = tree.nodes.new("CompositorNodeMixRGB")
         node.use_clamp = clamp

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from .blender import set_and_remember, set_unless_changed
-from .nodes import add_node, color, file_group, math_node, number, scaled_vector, vector_node
+from .nodes import add_node, color, empty_material, file_group, math_node, number, scaled_vector, vector_node
 
 NODE = "Smokelift"
 """Name of the node that holds the values; a material without it is the artist's own."""
@@ -125,7 +125,7 @@ def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
         fitted["Flame Color"] = (*medium["flame_color"], 1.0)
     for name, value in fitted.items():
         if name in node.inputs:  # a file's own node group may be older
-            set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
+            set_unless_changed(material, name, node.inputs[name], "default_value", value)
 
 
 def material_of(smoke: bpy.types.Object) -> bpy.types.Material | None:
@@ -166,7 +166,7 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
         smoke.material_slots[0].material = own
     node = node_of(smoke)
     socket = node.inputs["Anisotropy"]
-    set_and_remember(material_of(smoke), _key(socket.name), socket, "default_value", fitted_anisotropy)
+    set_and_remember(material_of(smoke), socket.name, socket, "default_value", fitted_anisotropy)
     as_in_clip = {item.name: item.default for item in _INPUTS[:6]}
     for key, value in (as_in_clip | PRESETS[name][2]).items():
         if key in node.inputs:
@@ -174,16 +174,9 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
     return True
 
 
-def _key(name: str) -> str:
-    return name.lower().replace(" ", "_")
-
-
 def _new_material(name: str) -> bpy.types.Material:
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:  # since 5.0 there always is one
-        material.use_nodes = True
+    material = empty_material(name)
     tree = material.node_tree
-    tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")], _build)
@@ -194,10 +187,7 @@ def _new_material(name: str) -> bpy.types.Material:
 
 
 def _build(tree: bpy.types.NodeTree) -> None:
-    """Make the group's nodes."""
-    given = tree.nodes.new("NodeGroupInput")
-    given.location = (-200.0, -600.0)
-    source = given.outputs
+    source = add_node(tree, "NodeGroupInput", -1, 3).outputs
     feeds = {
         "Density": _extinction(tree, source),
         "Color": _albedo(tree, source),

@@ -141,9 +141,7 @@ def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> 
     set_input(modifier, "Seconds", seconds)
     path = input_path(modifier, "Part")
     smoke.driver_remove(path)
-    driver = smoke.driver_add(path).driver
-    driver.type = "SCRIPTED"
-    driver.expression = f"fmod({place},1)"
+    smoke.driver_add(path).driver.expression = f"fmod({place},1)"
 
 
 def _build_interpolation(tree: bpy.types.NodeTree) -> None:

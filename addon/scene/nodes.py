@@ -32,6 +32,15 @@ def color(name: str, description: str, default: tuple[float, float, float, float
     return Input(name, "NodeSocketColor", description, default)
 
 
+def empty_material(name: str) -> bpy.types.Material:
+    """A new material without nodes."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # since 5.0 there always is one
+        material.use_nodes = True
+    material.node_tree.nodes.clear()
+    return material
+
+
 def file_group(
     name: str,
     kind: str,

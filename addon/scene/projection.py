@@ -11,7 +11,7 @@ from mathutils import Matrix, Vector
 
 from .blender import set_unless_changed
 from .box import engine_to_world
-from .nodes import Input, add_node, file_group, math_node, number, vector_node
+from .nodes import Input, add_node, empty_material, file_group, math_node, number, vector_node
 from .plate import show_plate
 from .smoke import scene_of
 from .volume import frames_before, shown_index
@@ -141,13 +141,9 @@ def _material(projector: bpy.types.Object, table: dict[str, Any]) -> bpy.types.M
 
 def _new_material() -> bpy.types.Material:
     """A material that the camera sees, and which neither lights the smoke nor takes light from it."""
-    material = bpy.data.materials.new(MATERIAL)
+    material = empty_material(MATERIAL)
     material[MARK] = True
-    if material.node_tree is None:  # since 5.0 there always is one
-        material.use_nodes = True
     tree = material.node_tree
-    tree.nodes.clear()
-
     output, mix = add_node(tree, "ShaderNodeOutputMaterial", 5, 0), add_node(tree, "ShaderNodeMixShader", 4, 0)
     rays, clear = add_node(tree, "ShaderNodeLightPath", 3, -2), add_node(tree, "ShaderNodeBsdfTransparent", 3, -1)
     shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL, label=MATERIAL)

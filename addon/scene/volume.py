@@ -256,7 +256,6 @@ def _play(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
 
 
 def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> None:
-    """Make a Volume read the files of a take."""
     path = relative(file)
     if volume.filepath != path:
         volume.filepath = path
@@ -297,16 +296,11 @@ def _set_time(smoke: bpy.types.Object, index: dict[str, Any]) -> None:
         if real or live:
             # Blender shows one file in each frame of the scene; the driven offset selects another
             file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
-            _drive(volume, "frame_offset", f"{file}-(frame-{start})+{numbers[0] - 1}")
+            volume.driver_add("frame_offset").driver.expression = f"{file}-(frame-{start})+{numbers[0] - 1}"
         if live and len(speeds) > 1:
-            _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({timing.speed(time)})")
+            scale = f"{1.0 if real else ratio:.9g}*({timing.speed(time)})"
+            volume.driver_add("velocity_scale").driver.expression = scale
     drive_interpolation(smoke, place, 1.0 / index["scene"]["clip"]["fps"])
-
-
-def _drive(volume: bpy.types.Volume, name: str, expression: str) -> None:
-    driver = volume.driver_add(name).driver
-    driver.type = "SCRIPTED"
-    driver.expression = expression
 
 
 def _ratio(smoke: bpy.types.Object, index: dict[str, Any]) -> float:
@@ -352,8 +346,7 @@ _TIMES = (
 HANDLERS = ((bpy.app.handlers.load_post, correct_positions), (bpy.app.handlers.load_post, _listen))
 
 
-def register() -> None:
-    _listen()
+register = _listen
 
 
 def unregister() -> None:
