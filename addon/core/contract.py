@@ -53,16 +53,8 @@ SIDES = ("x-", "y-", "z-", "x+", "y+", "z+")
 
 DIRECTIONS = {
     "continue": (
-        "--frames",
-        "--start",
-        "--fade",
-        "--room",
-        "--buoyancy",
-        "--dissipation",
-        "--closed",
-        "--wind",
-        "--turbulence",
-        "--fan",
+        *("--frames", "--start", "--fade", "--room", "--buoyancy", "--dissipation"),
+        *("--closed", "--wind", "--turbulence", "--fan"),
     ),
     "retime": ("--speed",),
     "loop": ("--frames", "--overlap"),

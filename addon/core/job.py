@@ -45,6 +45,9 @@ GRACE_SECONDS = 8.0
 DRAIN_SECONDS = 1.0
 """Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""
 
+_QUIET = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+"""Flags that give no console window and a low priority on Windows."""
+
 _START = """
 import os, runpy, sys
 
@@ -151,7 +154,7 @@ class Job:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._log,
-                creationflags=_quiet_flags(),
+                creationflags=_QUIET,
             )
         except OSError as error:
             self._close()
@@ -293,10 +296,3 @@ def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
         for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
             lines.put(line)
     lines.put(None)
-
-
-def _quiet_flags() -> int:
-    """Flags that give no console window and a low priority on Windows."""
-    if sys.platform == "win32":
-        return subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS
-    return 0

@@ -299,16 +299,12 @@ def _size_at(directory: Path, _time: int) -> float:
 
 def takes(folder: Path) -> list[Take]:
     """The takes in a folder, oldest first."""
-    return [_take(folder, number) for number in sorted(_numbers(folder))]
+    return [Take(folder / f"take_{number:04d}") for number in sorted(_numbers(folder))]
 
 
 def new_take(folder: Path) -> Take:
     """The take with the next free number in a folder."""
-    return _take(folder, max(_numbers(folder), default=0) + 1)
-
-
-def _take(folder: Path, number: int) -> Take:
-    return Take(folder / f"take_{number:04d}")
+    return Take(folder / f"take_{max(_numbers(folder), default=0) + 1:04d}")
 
 
 def _numbers(folder: Path) -> set[int]:

@@ -10,7 +10,7 @@ from ..scene.floor import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ChangesScene, Needing, needs_clip, needs_smoke, operator
+from .common import ChangesScene, Need, Needing, needs_clip, needs_smoke, operator
 from .layout import draw_automatic, draw_closed
 from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
@@ -99,8 +99,17 @@ class ShotSettings:
     anisotropy: number("Anisotropy", "Forward scattering above 0, backward scattering below", min=-0.95, max=0.95)
 
 
-def _needs_camera(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:
-    return "" if context.scene.camera else "The scene has no camera: add one where the clip was filmed from"
+_needs_camera = Need(
+    "The scene has no camera: add one where the clip was filmed from", lambda context, _: context.scene.camera
+)
+_needs_floor = Need(
+    "Choose Scene Camera and make a Box first: its bottom is the floor",
+    lambda _, smoke: smoke.smokelift.camera_mode == "SCENE" and box_of(smoke),
+)
+_needs_view = Need(
+    "Use the tab in a 3D View: the click is made there",
+    lambda context, _: context.area is not None and context.area.type == "VIEW_3D",
+)
 
 
 @operator("Frame Box", needs_smoke, _needs_camera, base=ChangesScene)
@@ -115,16 +124,6 @@ def make_box(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     box.rotation_euler = (0.0, 0.0, 0.0)
     box.location = (low + high) / 2
     box.scale = (high - low) / 2
-
-
-def _needs_floor(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    known = smoke.smokelift.camera_mode == "SCENE" and box_of(smoke) is not None
-    return "" if known else "Choose Scene Camera and make a Box first: its bottom is the floor"
-
-
-def _needs_view(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:
-    in_view = context.area is not None and context.area.type == "VIEW_3D"
-    return "" if in_view else "Use the tab in a 3D View: the click is made there"
 
 
 class SMOKELIFT_OT_place(Needing, bpy.types.Operator):

@@ -15,7 +15,7 @@ from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, u
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
-from .common import HIDDEN, ChangesScene, ChoosesFile, needs_clip, operator
+from .common import HIDDEN, ChangesScene, ChoosesFile, Need, needs_clip, operator
 from .editors import open_tab
 from .layout import draw_hint, draw_text
 from .settings import automatic_unless, choice, link, number, string, vector, whole
@@ -152,9 +152,10 @@ def match_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     shot_setup.match_clip(smoke)
 
 
-def _needs_distortion(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    distorted = is_distorted(smoke.smokelift.clip)
-    return "" if distorted else "The clip's lens has no distortion: calibrate it in the Movie Clip Editor"
+_needs_distortion = Need(
+    "The clip's lens has no distortion: calibrate it in the Movie Clip Editor",
+    lambda _, smoke: is_distorted(smoke.smokelift.clip),
+)
 
 
 @operator("Undistort Clip", needs_clip, _needs_distortion, base=ChangesScene)

@@ -1,7 +1,7 @@
 """What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -20,24 +20,18 @@ HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 Act = Callable[..., str | None]
 """Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""
 
-Need = Callable[[bpy.types.Context, bpy.types.Object | None], str]
-"""Why something cannot be done now with the active smoke, or without one; empty where it can."""
+
+class Need(NamedTuple):
+    """What something needs that is done with the active smoke, or without one."""
+
+    why: str  # it cannot be done otherwise
+    is_there: Callable[[bpy.types.Context, bpy.types.Object | None], Any]
 
 
-def needs_smoke(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    return "" if smoke is not None else "Add smoke first"
-
-
-def needs_clip(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    return "" if smoke is not None and smoke.smokelift.clip is not None else "Choose a clip first"
-
-
-def needs_result(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    return "" if smoke is not None and volume.shown_take(smoke) is not None else "Make smoke first"
-
-
-def needs_rest(_context: bpy.types.Context, _smoke: bpy.types.Object | None) -> str:
-    return "Other files are being written: wait for them, or cancel that" if writing_job.writing else ""
+needs_smoke = Need("Add smoke first", lambda _, smoke: smoke)
+needs_clip = Need("Choose a clip first", lambda _, smoke: smoke and smoke.smokelift.clip)
+needs_result = Need("Make smoke first", lambda _, smoke: smoke and volume.shown_take(smoke))
+needs_rest = Need("Other files are being written: wait for them, or cancel that", lambda *_: not writing_job.writing)
 
 
 class Needing:
@@ -48,7 +42,7 @@ class Needing:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         smoke = active_smoke(context.scene)
-        why = next((why for need in cls.needs if (why := need(context, smoke))), "")
+        why = next((need.why for need in cls.needs if not need.is_there(context, smoke)), "")
         if why and issubclass(cls, bpy.types.Operator):  # a panel is left out in silence
             cls.poll_message_set(why)
         return not why
@@ -59,11 +53,10 @@ class ActsOnSmoke(Needing):
 
     bl_idname: str
     needs: Sequence[Need] = (needs_smoke,)
+    act: Act
 
     def __init_subclass__(cls) -> None:
         cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
-
-    act: Act
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:

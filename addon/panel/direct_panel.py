@@ -9,7 +9,7 @@ from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import ChangesScene, needs_clip, needs_result, operator, panels, speed_changed
+from .common import ChangesScene, Need, needs_clip, needs_result, operator, panels, speed_changed
 from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
 from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
@@ -135,8 +135,7 @@ def _may_act(context: bpy.types.Context, smoke: bpy.types.Object) -> list[bpy.ty
     return [obj for obj in context.selected_objects if obj != box and obj.type in {*MESHES, "EMPTY"}]
 
 
-def _needs_effector(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    return "" if _may_act(context, smoke) else "Select a mesh, a Wind or Turbulence force field, or an Empty"
+_needs_effector = Need("Select a mesh, a Wind or Turbulence force field, or an Empty", _may_act)
 
 
 @operator("Add Selected to Effectors", needs_result, _needs_effector, base=ChangesScene)

@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core import ShotError
 from ..core.take import Take
 from ..result.shot_check import state
-from .common import HIDDEN, needs_clip, needs_smoke, operator
+from .common import HIDDEN, Need, needs_clip, needs_smoke, operator
 
 DRAWN_SECONDS = 0.3
 """After which a new window has been drawn."""
@@ -34,8 +34,9 @@ def open_log(_context: bpy.types.Context, _smoke: bpy.types.Object, take: str) -
         space.text, space.top = text, 0
 
 
-def _needs_page(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    return "" if state.fits(smoke) and state.done and Path(state.page).is_file() else "Check the shot first"
+_needs_page = Need(
+    "Check the shot first", lambda _, smoke: state.fits(smoke) and state.done and Path(state.page).is_file()
+)
 
 
 @operator("Report", needs_clip, _needs_page)

@@ -6,7 +6,7 @@ from ..result.export import arguments, copy_later, folder_of, size_estimate, wri
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import Needing, needs_rest, needs_result, needs_smoke, operator, panels
+from .common import Need, Needing, needs_rest, needs_result, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text, draw_work
 from .settings import choice, string, tick, whole
 
@@ -85,12 +85,8 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 
-def _needs_sequence(context: bpy.types.Context, _smoke: bpy.types.Object | None) -> str:
-    obj = context.object
-    if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
-        return "Select a Volume that plays a sequence"
-    driven = obj.data.animation_data is not None and obj.data.animation_data.drivers
-    return "Set Speed to Frame by Frame first" if driven else ""
+def _is_driven(obj: bpy.types.Object) -> bool:
+    return obj.data.animation_data is not None and len(obj.data.animation_data.drivers) > 0
 
 
 class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
@@ -99,7 +95,13 @@ class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
     bl_idname = "smokelift.add_instance"
     bl_label = "Instance in Time"
     bl_options = {"REGISTER", "UNDO"}
-    needs = (_needs_sequence,)
+    needs = (
+        Need(
+            "Select a Volume that plays a sequence",
+            lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
+        ),
+        Need("Set Speed to Frame by Frame first", lambda context, _: not _is_driven(context.object)),
+    )
 
     offset: whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12)
     repeat: tick("Repeat", "Play the frames again and again, as for a loop")

@@ -6,7 +6,7 @@ from ..core import ShotError
 from ..scene import look, volume
 from ..scene.modifiers import PROXY, in_viewport
 from ..scene.smoke import is_override, smoke_with_look
-from .common import ChangesScene, needs_result, operator, panels
+from .common import ChangesScene, Need, needs_result, operator, panels
 from .layout import draw_text, draw_work
 from .settings import choice
 
@@ -14,11 +14,11 @@ SHORT = {"Absorption Color": "Absorption"}
 """Names of inputs that the sidebar would cut off."""
 
 
-def _needs_look(context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    """Also a smoke that is linked from another file can be changed so."""
-    return "" if is_override(smoke_with_look(context.scene)) else needs_result(context, smoke)
-
-
+# also a smoke that is linked from another file can be changed so
+_needs_look = Need(
+    needs_result.why,
+    lambda context, smoke: is_override(smoke_with_look(context.scene)) or needs_result.is_there(context, smoke),
+)
 PRESETS = [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
 
 

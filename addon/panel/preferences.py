@@ -10,7 +10,7 @@ from ..core import ShotError
 from ..core.contract import QUALITIES
 from ..scene.blender import PACKAGE
 from ..scene.smoke import is_smoke
-from .common import Needing, operator
+from .common import Need, Needing, operator
 from .layout import draw_automatic, draw_settings
 from .settings import automatic_unless, choice, string, whole
 
@@ -21,18 +21,8 @@ FOLDER = "smokelift"
 """Below the user's folder of presets."""
 
 SETTINGS = (
-    "quality",
-    "detail",
-    "light_mode",
-    "closed",
-    "longest_side",
-    "transfer",
-    "speed",
-    "device",
-    "use_medium",
-    "extinction",
-    "albedo",
-    "anisotropy",
+    *("quality", "detail", "light_mode", "closed", "longest_side", "transfer", "speed", "device"),
+    *("use_medium", "extinction", "albedo", "anisotropy"),
 )
 """What does not belong to one clip: no paths, no objects, no frames."""
 
@@ -89,7 +79,7 @@ class SMOKELIFT_OT_add_preset(Needing, AddPresetBase, bpy.types.Operator):
 
     bl_idname = "smokelift.add_preset"
     bl_label = "Add Smoke Preset"
-    needs = (lambda context, _smoke: "" if is_smoke(context.object) else "Select the smoke first",)
+    needs = (Need("Select the smoke first", lambda context, _: is_smoke(context.object)),)
     preset_menu = "SMOKELIFT_PT_presets"
     preset_subdir = FOLDER
     # a preset is a script of Blender's, which knows the active object but not this add-on

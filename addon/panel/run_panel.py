@@ -13,7 +13,7 @@ from ..result.smoke_takes import Run, runs
 from ..scene import volume
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import find_smoke
-from .common import needs_clip, operator
+from .common import Need, needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_hint, draw_progress, draw_text
 from .quality_panel import SEEDS, draw_check
 
@@ -24,9 +24,10 @@ def run(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     run_queue.enqueue(smoke, smoke_takes.write_take(smoke), settings_text(smoke))
 
 
-def _needs_detail(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    only_one = smoke.smokelift.detail == 0.0
-    return "Without detail in depth there is only one smoke: raise Depth Detail first" if only_one else ""
+_needs_detail = Need(
+    "Without detail in depth there is only one smoke: raise Depth Detail first",
+    lambda _, smoke: smoke.smokelift.detail > 0.0,
+)
 
 
 @operator("Another Variation", needs_clip, _needs_detail, bl_options={"UNDO"})
