@@ -150,11 +150,7 @@ class Job:
             self._log_path.parent.mkdir(parents=True, exist_ok=True)
             self._log = self._log_path.open("ab", buffering=0)
             self._process = subprocess.Popen(
-                self._command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._log,
-                creationflags=_QUIET,
+                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, creationflags=_QUIET
             )
         except OSError as error:
             self._close()
@@ -170,15 +166,13 @@ class Job:
             return False
         assert self._process is not None
         changed = False
-        for _ in range(LINES_PER_POLL):
-            try:
+        with suppress(queue.Empty):
+            for _ in range(LINES_PER_POLL):
                 line = self._lines.get_nowait()
-            except queue.Empty:
-                break
-            if line is None:
-                self._output_ended = True
-                break
-            changed = self._read_line(line) or changed
+                if line is None:
+                    self._output_ended = True
+                    break
+                changed = self._read_line(line) or changed
         if self._kill_at is not None and time.monotonic() > self._kill_at:
             self._process.kill()
         if self._process.poll() is not None:

@@ -84,10 +84,7 @@ class Take:
         return f"{beside}_{drawn.name}"
 
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
-        """Write the scene file from its tables, and the engine's further options.
-
-        ShotError if the folder cannot be written to.
-        """
+        """Write the scene file from its tables, and the engine's further options; ShotError if that fails."""
         self._write({self.scene_file: toml_text(tables).encode(), self.request_file: _request(options)})
 
     def write_directed(

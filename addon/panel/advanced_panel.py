@@ -15,10 +15,8 @@ class PlaybackSettings:
     speed: choice(
         "Speed",
         "Speed of the smoke if clip and scene differ in frame rate",
-        [
-            ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
-            ("REAL", "Real Time", "As fast as in reality"),
-        ],
+        ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
+        ("REAL", "Real Time", "As fast as in reality"),
         update=speed_changed,
     )
     between: tick(

@@ -39,14 +39,12 @@ class ShotSettings:
     camera_mode: choice(
         "Camera",
         "Where the clip was filmed from",
-        [
-            (
-                "ESTIMATE",
-                "From the Clip",
-                "Assume a level camera with an ordinary lens and a box around the smoke, and add it",
-            ),
-            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
-        ],
+        (
+            "ESTIMATE",
+            "From the Clip",
+            "Assume a level camera with an ordinary lens and a box around the smoke, and add it",
+        ),
+        ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
     )
     box: link(
         "Box",
@@ -75,10 +73,8 @@ class ShotSettings:
     light_mode: choice(
         "Light",
         "What lights the smoke in the clip",
-        [
-            ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
-            ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
-        ],
+        ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
+        ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
     )
     use_medium: tick("Smoke Material", "Set the smoke's optical properties")
     extinction: number(

@@ -60,12 +60,10 @@ class ClipSettings:
     plate_mode: choice(
         "Background",
         "The picture without smoke",
-        [
-            ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
-            ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
-            ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
-            ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
-        ],
+        ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
+        ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
+        ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
+        ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
         update=_background_chosen,
     )
     plate_color: vector(
@@ -104,11 +102,9 @@ class ClipSettings:
     transfer: choice(
         "Color Space",
         "Color space of the clip",
-        [
-            ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
-            ("srgb", "sRGB", "Ordinary video and pictures"),
-            ("linear", "Linear Rec.709", "Proportional to light"),
-        ],
+        ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
+        ("srgb", "sRGB", "Ordinary video and pictures"),
+        ("linear", "Linear Rec.709", "Proportional to light"),
     )
 
 

@@ -46,11 +46,9 @@ class DirectSettings:
     direction: choice(
         "Direction",
         "What is made of the result on show",
-        [
-            ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
-            ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
-            ("loop", "Loop", "Repeat the smoke without a seam"),
-        ],
+        ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
+        ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
+        ("loop", "Loop", "Repeat the smoke without a seam"),
     )
     frames: whole("Frames", "Number of frames to add", default=48, min=1, max=100_000)
     fade: whole("Fade", "Frames at the end in which the smoke fades to nothing", min=0)

@@ -72,11 +72,9 @@ class SMOKELIFT_OT_stroke(bpy.types.Operator):
     means: choice(
         "Means",
         "What is painted",
-        [
-            ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
-            ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
-            ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
-        ],
+        ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
+        ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
+        ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -23,29 +23,23 @@ class ExportSettings:
     host: choice(
         "For",
         "Program that reads the files",
-        [
-            ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
-            ("houdini", "Houdini", "Y up, grids density and vel"),
-            ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
-        ],
+        ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
+        ("houdini", "Houdini", "Y up, grids density and vel"),
+        ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
     )
     precision: choice(
         "Precision",
         "Bits of each value. Smoke too thin to be seen is left out either way",
-        [
-            ("half", "Half", "Floats of 16 bits"),
-            ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
-        ],
+        ("half", "Half", "Floats of 16 bits"),
+        ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
     )
     use_velocity: tick("Velocity", "Export the velocity, which motion blur needs", default=True)
     proxy: choice(
         "Proxy",
         "Second, coarser sequence for the viewports of those who get the export",
-        [
-            ("1", "None", "No proxy"),
-            ("2", "1/2", "Half the resolution, an eighth of the voxels"),
-            ("4", "1/4", "A quarter of the resolution"),
-        ],
+        ("1", "None", "No proxy"),
+        ("2", "1/2", "Half the resolution, an eighth of the voxels"),
+        ("4", "1/4", "A quarter of the resolution"),
     )
 
 

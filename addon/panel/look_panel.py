@@ -22,7 +22,7 @@ _needs_look = Need(
 PRESETS = [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
 
 
-@operator("Use Look", _needs_look, base=ChangesScene, given={"preset": choice("Preset", "Kind of smoke", PRESETS)})
+@operator("Use Look", _needs_look, base=ChangesScene, given={"preset": choice("Preset", "Kind of smoke", *PRESETS)})
 def use_look(context: bpy.types.Context, _smoke: bpy.types.Object, preset: str) -> None:
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
     smoke = smoke_with_look(context.scene)

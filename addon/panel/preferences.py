@@ -38,7 +38,7 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
     quality: choice(
-        "Quality", "Quality of new smokes", [(name, name.capitalize(), "") for name in QUALITIES], default="balanced"
+        "Quality", "Quality of new smokes", *[(name, name.capitalize(), "") for name in QUALITIES], default="balanced"
     )
     threads: whole(
         "Threads",

@@ -24,16 +24,10 @@ class QualitySettings:
         "Quality",
         "More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the fraction of the contrast of the "
         "clip's smoke that is finer than the voxels",
-        [
-            ("draft", "Draft", "A quick preview"),
-            ("balanced", "Balanced", "Good for most shots"),
-            ("fine", "Fine", "More of the clip's detail, several times slower"),
-            (
-                "final",
-                "Final",
-                "All of the clip's detail, one voxel per pixel: much memory, seconds to minutes per frame",
-            ),
-        ],
+        ("draft", "Draft", "A quick preview"),
+        ("balanced", "Balanced", "Good for most shots"),
+        ("fine", "Fine", "More of the clip's detail, several times slower"),
+        ("final", "Final", "All of the clip's detail, one voxel per pixel: much memory, seconds to minutes per frame"),
         default="balanced",
     )
     detail: number(
@@ -61,11 +55,9 @@ class QualitySettings:
     device: choice(
         "Device",
         "Device that renders",
-        [
-            ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
-            ("cpu", "CPU", "The CPU only"),
-            ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
-        ],
+        ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
+        ("cpu", "CPU", "The CPU only"),
+        ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
     )
 
 

@@ -26,7 +26,7 @@ tick, number, whole, string, vector = map(
 """Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
 
 
-def choice(name: str, description: str, items: list[tuple[Any, ...]], **options: Any) -> Any:
+def choice(name: str, description: str, *items: tuple[Any, ...], **options: Any) -> Any:
     """One of some items, by default the first."""
     return EnumProperty(name=name, description=description, items=items, **options)
 
@@ -52,4 +52,4 @@ def automatic_unless(name: str, label: str, start: float | Callable[[Any], float
 def closed_sides(description: str) -> Any:
     """A row of buttons, one for each side of the box."""
     items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
-    return choice("Closed Sides", description, items, options={"ANIMATABLE", "ENUM_FLAG"})
+    return choice("Closed Sides", description, *items, options={"ANIMATABLE", "ENUM_FLAG"})

@@ -41,21 +41,19 @@ class SetUpSettings:
     plate_place: choice(
         "Place",
         "Where the background is put behind the smoke",
-        [
-            ("WORLD", "World", "In the world, seen by the camera only"),
-            (
-                "COMPOSITE",
-                "Compositor",
-                "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
-                "the clip's grain, and the clip in front of it all where a mask says so",
-            ),
-            (
-                "PROJECTION",
-                "Projection",
-                "On a card behind the smoke, projected from where the clip was filmed, so that it stays in its place "
-                "when the camera of the render moves",
-            ),
-        ],
+        ("WORLD", "World", "In the world, seen by the camera only"),
+        (
+            "COMPOSITE",
+            "Compositor",
+            "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
+            "the clip's grain, and the clip in front of it all where a mask says so",
+        ),
+        (
+            "PROJECTION",
+            "Projection",
+            "On a card behind the smoke, projected from where the clip was filmed, so that it stays in its place "
+            "when the camera of the render moves",
+        ),
     )
     assumed_camera: link(
         "Assumed Camera", "Camera object that stands where the clip was assumed to be filmed from", bpy.types.Object

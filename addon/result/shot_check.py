@@ -145,10 +145,7 @@ def make_way() -> None:
 
 
 def check_soon(context: bpy.types.Context, smoke: bpy.types.Object) -> bool:
-    """Have the smoke in the tab checked once its settings rest, if no run is at work; whether it will be.
-
-    Drawing code may call this.
-    """
+    """Have the smoke in the tab checked once its settings rest, if no run is at work; whether it will be."""
     busy = any(not run.job.ended for run in runs)
     if busy or bpy.app.background or context.window != context.window_manager.windows[0]:
         return False
@@ -168,10 +165,7 @@ def _start_later() -> None:
 
 
 def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
-    """Start the engine on a shot, unless it is at work on it or it is known what it says.
-
-    Its result goes into the state of the session.
-    """
+    """Start the engine on a shot, unless it is at work on it or it is known what it says: that goes into the state."""
     try:
         take, words, tables = Take(Path(bpy.app.tempdir) / "smokelift_check"), options(smoke), shot_tables(smoke, True)
         take.write(tables, words)

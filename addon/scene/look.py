@@ -154,10 +154,7 @@ def controls(smoke: bpy.types.Object) -> list[bpy.types.NodeSocket]:
 
 
 def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> bool:
-    """Set the artist's inputs to a preset's; returns whether the material has them.
-
-    A material of another file is copied to the object first.
-    """
+    """Set the artist's inputs to a preset's, in a copy of another file's material; returns whether it has them."""
     if node_of(smoke) is None:
         return False
     if is_linked(smoke):

@@ -22,10 +22,7 @@ BACKGROUND = "Smokelift Background"
 
 
 def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
-    """The table; empty where the engine estimates the background.
-
-    ShotError if a picture is missing, or the clip does not have the frames.
-    """
+    """The table; empty where the engine estimates the background. ShotError if a picture or a frame is missing."""
     settings, table = smoke.smokelift, {}
     if settings.plate_mode == "FILE":
         table["image"] = str(_plate(settings.plate))

@@ -132,10 +132,7 @@ def _untouched(scene: bpy.types.Scene, name: str, kind: str) -> bpy.types.Object
 
 
 def hide_default_cube(scene: bpy.types.Scene) -> bool:
-    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place.
-
-    Returns whether it was seen.
-    """
+    """Hide the cube of a new file, which stands where smoke of an unknown place is put; returns whether it was seen."""
     cube = _untouched(scene, "Cube", "MESH")
     if cube is None or cube.matrix_basis != Matrix.Identity(4):
         return False
