@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-CACHED = 16
-"""Sequences that are kept in memory: the panel asks with every redraw."""
-
-LISTED = 3
-"""Names of missing pictures that are listed."""
+CACHED = 16  # sequences that are kept in memory: the panel asks with every redraw
+LISTED = 3  # names of missing pictures that are listed
 
 
 @dataclass(frozen=True)

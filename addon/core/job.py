@@ -27,20 +27,14 @@ from .sentences import REPLACED, advice, sentence, stopped
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 
-HOME = Path(__file__).parents[1]
-"""The extension; the one with Taichi for the GPU lies beside it."""
+HOME = Path(__file__).parents[1]  # the extension; the one with Taichi for the GPU lies beside it
 
 LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
 """Folder of an extension that the engine imports from: what is compiled is for one version of Python."""
 
-LINES_PER_POLL = 500
-"""Lines read in one poll, at most, so that many lines do not delay the caller."""
-
-LONGEST_LINE = 2**20
-"""Bytes."""
-
-GRACE_SECONDS = 8.0
-"""Time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm."""
+LINES_PER_POLL = 500  # lines read in one poll, at most, so that many lines do not delay the caller
+LONGEST_LINE = 2**20  # bytes
+GRACE_SECONDS = 8.0  # time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm
 
 DRAIN_SECONDS = 1.0
 """Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""

@@ -37,11 +37,8 @@ OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--dis
 TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
 """What a take is called that is made of another one."""
 
-CACHED = 128
-"""Takes whose files are kept in memory: more than a list shows at once."""
-
-_NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
-"""A number or a range of frames; never an option."""
+CACHED = 128  # takes whose files are kept in memory: more than a list shows at once
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")  # a number or a range of frames; never an option
 
 _NAME = re.compile(r"take_(\d{4,})")
 

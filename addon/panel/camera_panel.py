@@ -14,8 +14,7 @@ from .common import ChangesScene, Need, Needing, needs_clip, needs_smoke, operat
 from .layout import draw_automatic, draw_closed
 from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
-USUAL_DISTANCE = 2.0
-"""Meters from which a distance is given by hand where there is no box."""
+USUAL_DISTANCE = 2.0  # meters from which a distance is given by hand where there is no box
 
 
 def _box_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

@@ -20,8 +20,7 @@ from .editors import open_tab
 from .layout import draw_hint, draw_text
 from .settings import automatic_unless, choice, link, number, string, vector, whole
 
-UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
-"""Settings that a clip of the same frames keeps."""
+UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")  # settings that a clip of the same frames keeps
 
 
 def _clip_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:

@@ -11,11 +11,8 @@ from ..result.side_job import writing_job
 from ..scene import volume
 from ..scene.smoke import active_smoke
 
-EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
-"""The editors that have the tab in their sidebar."""
-
-HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-"""A text that a button gives its operator."""
+EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}  # the editors that have the tab in their sidebar
+HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
 
 Act = Callable[..., str | None]
 """Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""

@@ -16,8 +16,7 @@ from .settings import automatic_unless, choice, closed_sides, link, number, tick
 LINES = 11
 """Lines of the longest direction: the others are as high, or the panel's buttons would move under the pointer."""
 
-EFFECTORS = "Effectors"
-"""Name of a collection that the tab makes."""
+EFFECTORS = "Effectors"  # name of a collection that the tab makes
 
 
 def _start_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

@@ -12,11 +12,8 @@ from ..core.take import Take
 from ..result.shot_check import state
 from .common import HIDDEN, Need, needs_clip, needs_smoke, operator
 
-DRAWN_SECONDS = 0.3
-"""After which a new window has been drawn."""
-
-LONGEST_OPENING = 5.0
-"""Seconds in which a sidebar is drawn for the first time."""
+DRAWN_SECONDS = 0.3  # after which a new window has been drawn
+LONGEST_OPENING = 5.0  # seconds in which a sidebar is drawn for the first time
 
 LOG_TEXT = "Smokelift Log"
 

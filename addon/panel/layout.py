@@ -12,11 +12,8 @@ from ..core.job import Job
 from ..core.sentences import REMEDIES, advice, duration, repeats
 from ..result.side_job import writing_job
 
-POINTS_PER_LETTER = 6.5
-"""Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
-
-NEW_WIDTH = 258
-"""Points of the sidebar in a new window; those of a sidebar that is not drawn."""
+POINTS_PER_LETTER = 6.5  # mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels
+NEW_WIDTH = 258  # points of the sidebar in a new window; those of a sidebar that is not drawn
 
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:

@@ -10,8 +10,7 @@ from .common import ChangesScene, Need, needs_result, operator, panels
 from .layout import draw_text, draw_work
 from .settings import choice
 
-SHORT = {"Absorption Color": "Absorption"}
-"""Names of inputs that the sidebar would cut off."""
+SHORT = {"Absorption Color": "Absorption"}  # names of inputs that the sidebar would cut off
 
 
 # also a smoke that is linked from another file can be changed so

@@ -14,11 +14,8 @@ from .common import Need, Needing, operator
 from .layout import draw_automatic, draw_settings
 from .settings import automatic_unless, choice, string, whole
 
-MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
-"""The manual, which the extension brings along."""
-
-FOLDER = "smokelift"
-"""Below the user's folder of presets."""
+MANUAL = Path(__file__).parents[1] / "manual" / "index.html"  # the manual, which the extension brings along
+FOLDER = "smokelift"  # below the user's folder of presets
 
 SETTINGS = (
     *("quality", "detail", "light_mode", "closed", "longest_side", "transfer", "speed", "device"),

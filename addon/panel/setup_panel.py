@@ -10,8 +10,7 @@ from .common import ChangesScene, needs_clip, needs_result, operator, panels
 from .layout import draw_settings
 from .settings import choice, link, tick
 
-TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
-"""Names of the settings."""
+TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")  # names of the settings
 
 
 class SetUpSettings:

@@ -27,8 +27,7 @@ from ..scene.shot_setup import has_denoiser
 from ..scene.smoke import activate, active_smoke, new_smoke, smokes
 from . import smoke_takes
 
-POLL_SECONDS = 0.05
-"""Seconds between two checks of a run."""
+POLL_SECONDS = 0.05  # seconds between two checks of a run
 
 
 def main(words: Sequence[str]) -> int:

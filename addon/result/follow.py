@@ -18,8 +18,7 @@ from .smoke_takes import find_results_again, takes_of_file
 _NAMES = ("output", "results", "before", "plate", "mask")
 """Settings of a smoke that hold a path; the folder of its export is one more."""
 
-_OWN = ("results", "before")
-"""Paths that the add-on sets: an absolute one becomes relative with the first save."""
+_OWN = ("results", "before")  # paths that the add-on sets: an absolute one becomes relative with the first save
 
 _DATA = ("volumes", "images", "movieclips", "sounds", "fonts", "cache_files", "libraries")
 """Blender's own data that have a file."""
@@ -27,11 +26,8 @@ _DATA = ("volumes", "images", "movieclips", "sounds", "fonts", "cache_files", "l
 _places: list[tuple[bpy.types.PropertyGroup, str, Path]] = []
 """Where the relative paths lead while a file is saved: settings, name and absolute path."""
 
-_takes: list[Take] = []
-"""What belongs to the file while it is saved."""
-
-_folders: list[Path] = []
-"""Folders that the open .blend was in before it was saved elsewhere, the last one first."""
+_takes: list[Take] = []  # what belongs to the file while it is saved
+_folders: list[Path] = []  # folders that the open .blend was in before it was saved elsewhere, the last one first
 
 
 def _smokes() -> Iterator[bpy.types.Object]:

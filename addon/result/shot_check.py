@@ -76,8 +76,7 @@ class ShotCheck:
         self.done, self.of, self.details, self.doubts = True, smoke.session_uid, details, doubts
 
 
-state = ShotCheck()
-"""The check of this session, which is never saved."""
+state = ShotCheck()  # the check of this session, which is never saved
 
 
 NEUTRAL = {
@@ -100,8 +99,7 @@ def settings_text(smoke: bpy.types.Object) -> str:
     return repr((smoke.session_uid, values, size, place))
 
 
-check_job = SideJob()
-"""The check's own, beside which files may be written."""
+check_job = SideJob()  # the check's own, beside which files may be written
 
 
 def check(smoke: bpy.types.Object, needs_page: bool = True) -> None:

@@ -16,14 +16,9 @@ from ..core.job import Job, engine_command
 from ..scene.blender import call_later, redraw, thread_options
 from ..scene.smoke import find_smoke
 
-TICK_SECONDS = 0.1
-"""Between two readings of what the engine says."""
-
-REST_SECONDS = 0.4
-"""Time without a change of settings before the engine is asked what they come to."""
-
-End = Callable[[bpy.types.Object, Job], None]
-"""Called with the smoke and the job when that has ended."""
+TICK_SECONDS = 0.1  # between two readings of what the engine says
+REST_SECONDS = 0.4  # time without a change of settings before the engine is asked what they come to
+End = Callable[[bpy.types.Object, Job], None]  # called with the smoke and the job when that has ended
 
 
 class SideJob:
@@ -89,8 +84,7 @@ class SideJob:
         return None
 
 
-writing_job = SideJob()
-"""Writes files, or estimates how large they will be."""
+writing_job = SideJob()  # writes files, or estimates how large they will be
 
 
 def write_files(

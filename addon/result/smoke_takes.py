@@ -41,8 +41,7 @@ class Run:
     icon: int = 0  # of its thumbnail; 0 without one
 
 
-runs: list[Run] = []
-"""The runs of this session, in the order of the queue."""
+runs: list[Run] = []  # the runs of this session, in the order of the queue
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:

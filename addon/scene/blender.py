@@ -12,15 +12,13 @@ import bpy
 import numpy as np
 import numpy.typing as npt
 
-PACKAGE = __package__.rpartition(".")[0]
-"""The add-on's name, under which Blender keeps its preferences."""
+PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blender keeps its preferences
 
 # Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
 PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
 """Options of properties that hold a path."""
 
-TOLERANCE = 1e-5
-"""Difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make."""
+TOLERANCE = 1e-5  # difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make
 
 
 def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
@@ -45,11 +43,8 @@ def relative(path: Path, folder: Path | None = None) -> str:
         return str(path)
 
 
-REDRAW_SECONDS = 0.5
-"""Between two drawings of the tab while something counts in it."""
-
-_drawn_at = 0.0
-"""When the tab was drawn last because something counted in it (s)."""
+REDRAW_SECONDS = 0.5  # between two drawings of the tab while something counts in it
+_drawn_at = 0.0  # when the tab was drawn last because something counted in it (s)
 
 
 @contextmanager
@@ -125,8 +120,7 @@ def cancel_call(timer: Callable[[], float | None]) -> None:
         bpy.app.timers.unregister(timer)
 
 
-_called_later: set[Callable[[], float | None]] = set()
-"""What Blender was ever asked to call."""
+_called_later: set[Callable[[], float | None]] = set()  # what Blender was ever asked to call
 
 
 def register_modules(modules: Sequence[ModuleType]) -> None:

@@ -14,8 +14,7 @@ from .smoke import scene_of
 ROUNDING = 1e-5
 """Fraction of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
 
-BOX_FRACTION = 0.9
-"""Width and height of a new box over those of the picture."""
+BOX_FRACTION = 0.9  # width and height of a new box over those of the picture
 
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:

@@ -12,11 +12,8 @@ from .blender import at_frame
 from .clip import start_frame
 from .smoke import scene_of
 
-LENS = ("fx", "fy", "cx", "cy")
-"""Numbers of a camera's table that say its lens."""
-
-CAMERA_SAMPLES = 9
-"""Frames that decide whether the camera moves."""
+LENS = ("fx", "fy", "cx", "cy")  # numbers of a camera's table that say its lens
+CAMERA_SAMPLES = 9  # frames that decide whether the camera moves
 
 
 def camera_table(

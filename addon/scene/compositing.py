@@ -16,23 +16,12 @@ from .plate import plate_image, shown_background, synchronize_plate
 from .smoke import scene_of
 from .volume import shown_index
 
-GROUP = "Smokelift Composite"
-"""Name of the node group, and of its node in the scene's compositor."""
-
-MARK = "smokelift_composite"
-"""Custom property by which the group is known under any name."""
-
-FLOOR = "Smokelift Floor"
-"""Name of the plane that catches the shadow."""
-
-FLOOR_WIDTHS = 2.0
-"""Width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke."""
-
-_ENGINE = "smokelift_engine"
-"""Custom property of the scene: the render engine that it had before."""
-
-HOLDOUTS = "Smokelift Holdouts"
-"""Name of the collection whose objects hide the smoke, and show the plate."""
+GROUP = "Smokelift Composite"  # name of the node group, and of its node in the scene's compositor
+MARK = "smokelift_composite"  # custom property by which the group is known under any name
+FLOOR = "Smokelift Floor"  # name of the plane that catches the shadow
+FLOOR_WIDTHS = 2.0  # width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke
+_ENGINE = "smokelift_engine"  # custom property of the scene: the render engine that it had before
+HOLDOUTS = "Smokelift Holdouts"  # name of the collection whose objects hide the smoke, and show the plate
 
 GRAIN_PIXELS = 4
 """What is finer than this is grain: the blur that separates it (pixels of the clip). Sensor noise differs from pixel to

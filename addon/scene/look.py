@@ -11,20 +11,11 @@ import bpy
 from .blender import set_and_remember, set_unless_changed
 from .nodes import add_node, color, empty_material, file_group, math_node, number, scaled_vector, vector_node
 
-NODE = "Smokelift"
-"""Name of the node that holds the values; a material without it is the artist's own."""
-
-GROUP = "Smokelift Look"
-"""Name of the node group."""
-
-MARK = "smokelift_look"
-"""Custom property by which the group is known under any name."""
-
-BLACKBODY_KELVIN = 1000.0
-"""Temperature that a grid's value of 1 stands for; that of Blender's Principled Volume."""
-
-MIN_RATIO = 1e-3
-"""Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
+NODE = "Smokelift"  # name of the node that holds the values; a material without it is the artist's own
+GROUP = "Smokelift Look"  # name of the node group
+MARK = "smokelift_look"  # custom property by which the group is known under any name
+BLACKBODY_KELVIN = 1000.0  # temperature that a grid's value of 1 stands for; that of Blender's Principled Volume
+MIN_RATIO = 1e-3  # density over the edge's, below which edges do not change any more; keeps the power of it finite
 
 _INPUTS = (
     number("Density", "Times what was fitted to the clip", 1.0, 0.0, 1e6),

@@ -105,11 +105,8 @@ def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
         PROXY.remove(smoke)
 
 
-CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)
-"""Whether this Blender has nodes that move grids."""
-
-GRIDS = ("density", "flame")
-"""What is moved, where the files have it."""
+CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)  # whether this Blender has nodes that move grids
+GRIDS = ("density", "flame")  # what is moved, where the files have it
 
 _INTERPOLATION_INPUTS = (
     Input("Smoke", "NodeSocketGeometry", "The frame before"),

@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 import bpy
 
-SPACING = 200.0
-"""Distance from one column or row of nodes to the next."""
+SPACING = 200.0  # distance from one column or row of nodes to the next
 
 
 class Input(NamedTuple):

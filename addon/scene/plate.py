@@ -17,8 +17,7 @@ from .strokes import saved_strokes
 MARK = "smokelift_plate"
 """Custom property of pictures that a camera's view shows behind smoke, by which they are found again."""
 
-BACKGROUND = "Smokelift Background"
-"""Name of a picture of one color."""
+BACKGROUND = "Smokelift Background"  # name of a picture of one color
 
 
 def background_table(smoke: bpy.types.Object) -> dict[str, Any]:

@@ -16,17 +16,10 @@ from .plate import show_plate
 from .smoke import scene_of
 from .volume import frames_before, shown_index
 
-MATERIAL = "Smokelift Projection"
-"""Name of the material, and of the node group in it."""
-
-MARK = "smokelift_projection"
-"""Custom property by which material and group are known under any name."""
-
-PROJECTOR = "Smokelift Projector"
-"""Name of the camera that stands where the clip was filmed from."""
-
-CARD = "Smokelift Card"
-"""Name of the plane that the plate is projected on."""
+MATERIAL = "Smokelift Projection"  # name of the material, and of the node group in it
+MARK = "smokelift_projection"  # custom property by which material and group are known under any name
+PROJECTOR = "Smokelift Projector"  # name of the camera that stands where the clip was filmed from
+CARD = "Smokelift Card"  # name of the plane that the plate is projected on
 
 _INPUTS = (
     Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
@@ -35,11 +28,8 @@ _INPUTS = (
     number("Perspective", "1 for a perspective camera, 0 for an orthographic one"),
 )
 
-CARD_BEHIND = 1.1
-"""Distance of the card from the projector over that of the box's farthest corner."""
-
-CARD_WIDTHS = 2.0
-"""Width of the card over the picture's there: room for a camera that moves aside."""
+CARD_BEHIND = 1.1  # distance of the card from the projector over that of the box's farthest corner
+CARD_WIDTHS = 2.0  # width of the card over the picture's there: room for a camera that moves aside
 
 
 def project(smoke: bpy.types.Object) -> None:

@@ -21,17 +21,10 @@ from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
 NAME = "Smokelift"
 
-NEW_RANGE = (1, 250)
-"""Frames of a new file of Blender."""
-
-SENSOR_WIDTH = 36.0
-"""Millimeters; Blender's default."""
-
-BOUNCES = 128
-"""How often Cycles scatters light in smoke that was fitted with scattering of all orders."""
-
-NEW_SAMPLES = 4096
-"""Cycles' samples per pixel in a new file."""
+NEW_RANGE = (1, 250)  # frames of a new file of Blender
+SENSOR_WIDTH = 36.0  # millimeters; Blender's default
+BOUNCES = 128  # how often Cycles scatters light in smoke that was fitted with scattering of all orders
+NEW_SAMPLES = 4096  # Cycles' samples per pixel in a new file
 
 SAMPLES = 32
 """Samples per pixel of a set-up in a new file: marching through smoke and denoised, the example's 640 x 960 pixels take

@@ -14,17 +14,13 @@ import numpy.typing as npt
 from ..core import ShotError
 from .blender import absolute
 
-SATURATION = 0.25
-"""Fraction of the frame's saturation that is kept below the strokes."""
-
-MIN_STROKE = 0.5
-"""Smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below."""
+SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
+MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
 
 WRITTEN = "smokelift_written"
 """Custom property of an image that has a frame below: the time of its file when its strokes were written."""
 
-Pixels = npt.NDArray[np.float32]
-"""Red, green, blue and alpha of an image, (pixels, 4)."""
+Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pixels, 4)
 
 
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:

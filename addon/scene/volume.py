@@ -19,18 +19,14 @@ from .look import fit_look
 from .modifiers import FRAMES_BETWEEN, PROXY, drive_interpolation, fit_interpolation, fit_proxy
 from .smoke import scene_of, smokes
 
-BESIDE = 1.1
-"""Widths of the box between a smoke and another take beside it."""
-
-EARLY = 0.001
-"""Frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one."""
+BESIDE = 1.1  # widths of the box between a smoke and another take beside it
+EARLY = 0.001  # frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one
 
 GOOD_DEGREES = 30
 """Degrees beside its camera at which smoke of one camera still has what `sentences` calls good, about 28 dB: 29.0 at 20
 and 25.1 at 45 degrees, mean of four scenes, smooth (docs/accuracy.md)."""
 
-_FRAMES = re.compile(r"[Ff]rames? \d+(?: to \d+)?")
-"""Frames that a sentence of the engine names."""
+_FRAMES = re.compile(r"[Ff]rames? \d+(?: to \d+)?")  # frames that a sentence of the engine names
 
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
