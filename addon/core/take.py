@@ -170,10 +170,9 @@ class Take:
         known = self.read().files
         if known is not None and blend.resolve() not in known:
             folder = self.directory.parent.resolve()
+            files = [_relative_path(folder, file) for file in sorted({*known, blend.resolve()})]
             with suppress(OSError, ValueError, TypeError, RecursionError):
-                self._change_request(
-                    "files", [_relative_path(folder, file) for file in sorted({*known, blend.resolve()})]
-                )
+                self._change_request("files", files)
 
     def _change_request(self, key: str, value: Any) -> None:
         request = json.loads(self.request_file.read_text(encoding="utf-8"))

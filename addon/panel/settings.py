@@ -3,15 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from bpy.props import (
-    BoolProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy import props
 
 from ..core.contract import SIDES
 
@@ -21,19 +13,20 @@ def _named(kind: Callable[..., Any]) -> Callable[..., Any]:
 
 
 tick, number, whole, string, vector = map(
-    _named, (BoolProperty, FloatProperty, IntProperty, StringProperty, FloatVectorProperty)
+    _named,
+    (props.BoolProperty, props.FloatProperty, props.IntProperty, props.StringProperty, props.FloatVectorProperty),
 )
 """Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
 
 
 def choice(name: str, description: str, *items: tuple[Any, ...], **options: Any) -> Any:
     """One of some items, by default the first."""
-    return EnumProperty(name=name, description=description, items=items, **options)
+    return props.EnumProperty(name=name, description=description, items=items, **options)
 
 
 def link(name: str, description: str, kind: type, **options: Any) -> Any:
     """A data-block of a kind."""
-    return PointerProperty(name=name, description=description, type=kind, **options)
+    return props.PointerProperty(name=name, description=description, type=kind, **options)
 
 
 def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:

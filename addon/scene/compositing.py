@@ -11,7 +11,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .box import engine_to_world
-from .nodes import color, feed, file_group, number
+from .nodes import Socket, Tree, color, feed, file_group, number
 from .plate import plate_image, shown_background, synchronize_plate
 from .smoke import scene_of
 from .volume import shown_index
@@ -118,7 +118,7 @@ def _hold_out(scene: bpy.types.Scene) -> None:
         layer.layer_collection.children[name].holdout = True
 
 
-def compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.NodeSocket]:
+def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
     """The scene's compositor, made if there is none, and the socket of its output."""
     if SINCE_5:
         tree = scene.compositing_node_group
@@ -136,7 +136,7 @@ def compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.No
     return tree, output.inputs[0]
 
 
-def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.Node:
+def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:
     """Put our group between the output and what it showed, or the render if it showed nothing."""
     if shown.links:
         render = shown.links[0].from_socket
@@ -145,7 +145,7 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
         layers = layers or tree.nodes.new("CompositorNodeRLayers")
         render = layers.outputs["Image"]
     node = tree.nodes.new("CompositorNodeGroup")
-    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, [("Image", "NodeSocketColor")], _build)
+    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, {"Image": "NodeSocketColor"}, _build)
     node.name = node.label = GROUP
     node.width = 200.0
     node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
@@ -155,7 +155,7 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
     return node
 
 
-def _connect_plate(tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
+def _connect_plate(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
     """Feed the plate's socket, whose source has our name unless the artist put another there."""
     background = shown_background(smoke)
     source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
@@ -169,7 +169,7 @@ def _connect_plate(tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.ty
         node.inputs["Plate"].default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
 
 
-def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
+def _connect_clip(tree: Tree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
     for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
@@ -178,9 +178,7 @@ def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.type
         source.clip = clip
 
 
-def _source(
-    tree: bpy.types.NodeTree, kind: str, node: bpy.types.Node, socket: str, down: float
-) -> bpy.types.Node | None:
+def _source(tree: Tree, kind: str, node: bpy.types.Node, socket: str, down: float) -> bpy.types.Node | None:
     """Our node of pictures that feeds a socket of ours, made if need be; None where the artist put another there."""
     source = tree.nodes.get(f"{GROUP} {socket}")
     if source is None and not node.inputs[socket].links:
@@ -191,7 +189,7 @@ def _source(
     return source
 
 
-def _build(tree: bpy.types.NodeTree) -> None:
+def _build(tree: Tree) -> None:
     """Make the group's nodes: the render over the plate, with the clip's grain, and the clip's foreground over both."""
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     source = given.outputs
@@ -207,7 +205,7 @@ def _build(tree: bpy.types.NodeTree) -> None:
         node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
 
 
-def _grain(tree: bpy.types.NodeTree, source: bpy.types.bpy_prop_collection) -> bpy.types.NodeSocket:
+def _grain(tree: Tree, source: bpy.types.bpy_prop_collection) -> Socket:
     """The clip's own grain, frame by frame, at the clip's pixels.
 
     The plate has no grain, and the same edges as the clip: their difference less its blur is grain. Where the blurred
@@ -226,7 +224,7 @@ def _grain(tree: bpy.types.NodeTree, source: bpy.types.bpy_prop_collection) -> b
     return _mix(tree, "MULTIPLY", 1.0, fine, clear)
 
 
-def _scaled(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket, kind: str) -> bpy.types.NodeSocket:
+def _scaled(tree: Tree, picture: Socket, kind: str) -> Socket:
     """A picture at the render's size, or at an absolute one."""
     node = tree.nodes.new("CompositorNodeScale")
     if "Type" in node.inputs:  # since 5.0
@@ -237,9 +235,7 @@ def _scaled(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket, kind: str) 
     return node.outputs[0]
 
 
-def _mix(
-    tree: bpy.types.NodeTree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = False
-) -> bpy.types.NodeSocket:
+def _mix(tree: Tree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = False) -> Socket:
     """Two pictures in one; from 0 to 1 if it is clamped."""
     if SINCE_5:
         node = tree.nodes.new("ShaderNodeMix")
@@ -256,7 +252,7 @@ def _mix(
     return result
 
 
-def _blurred(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _blurred(tree: Tree, picture: Socket) -> Socket:
     node = tree.nodes.new("CompositorNodeBlur")
     if "Size" in node.inputs and node.inputs["Size"].type == "VECTOR":  # since 4.5
         node.inputs["Size"].default_value = [GRAIN_PIXELS] * len(node.inputs["Size"].default_value)

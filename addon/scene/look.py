@@ -167,7 +167,7 @@ def _new_material(name: str) -> bpy.types.Material:
     tree = material.node_tree
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")], _build)
+    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, {"Volume": "NodeSocketShader"}, _build)
     node.name = node.label = NODE
     node.width, node.location = 220.0, (-300.0, 0.0)
     tree.links.new(node.outputs[0], output.inputs["Volume"])

@@ -16,7 +16,7 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, add_node, file_group, get_input, input_path, math_node, number, set_input
+from .nodes import Input, Socket, Tree, add_node, file_group, get_input, input_path, math_node, number, set_input
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class SecondVolume:
     name: str  # of the modifier and its node group, as `file_group` has the next ones too
     mark: str
     inputs: tuple[Input, ...]
-    build: Callable[[bpy.types.NodeTree], None]
+    build: Callable[[Tree], None]
     socket: str  # input that is the second Volume's object, whose name ends so
 
     def modifier(self, smoke: bpy.types.Object) -> bpy.types.Modifier | None:
@@ -45,8 +45,8 @@ class SecondVolume:
         modifier = self.modifier(smoke)
         if modifier is None:
             modifier = smoke.modifiers.new(self.name, "NODES")
-            smoke_out = [("Smoke", "NodeSocketGeometry")]
-            group = file_group(self.name, "GeometryNodeTree", self.mark, self.inputs, smoke_out, self.build)
+            outputs = {"Smoke": "NodeSocketGeometry"}
+            group = file_group(self.name, "GeometryNodeTree", self.mark, self.inputs, outputs, self.build)
             modifier.node_group = group
             smoke.modifiers.move(len(smoke.modifiers) - 1, 0)  # those of the artist act on what it makes
         obj = get_input(modifier, self.socket)
@@ -71,7 +71,7 @@ class SecondVolume:
             bpy.data.volumes.remove(obj.data)  # takes the object with it
 
 
-def _build_proxy(tree: bpy.types.NodeTree) -> None:
+def _build_proxy(tree: Tree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0)
     shown = add_node(tree, "GeometryNodeObjectInfo", 1, 0, given.outputs["Proxy"])
     add_node(tree, "NodeGroupOutput", 2, 0, shown.outputs["Geometry"])
@@ -141,11 +141,11 @@ def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> 
     smoke.driver_add(path).driver.expression = f"fmod({place},1)"
 
 
-def _build_interpolation(tree: bpy.types.NodeTree) -> None:
+def _build_interpolation(tree: Tree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0).outputs
     later = add_node(tree, "GeometryNodeObjectInfo", 1, 3, given["Next Frame"]).outputs["Geometry"]
 
-    def moved(volume: bpy.types.NodeSocket, name: str, row: int, seconds: Any, weight: Any) -> bpy.types.NodeSocket:
+    def moved(volume: Socket, name: str, row: int, seconds: Any, weight: Any) -> Socket:
         """A grid that went on with its velocity for some seconds, times a number."""
         grid, velocity = (
             add_node(tree, "GeometryNodeGetNamedGrid", 2, place, volume, grid_name, False, data_type=kind)

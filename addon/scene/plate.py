@@ -12,6 +12,7 @@ from ..core import ShotError
 from . import volume
 from .blender import absolute, relative
 from .clip import frame_count, number_in_file
+from .nodes import Socket, Tree
 from .strokes import saved_strokes
 
 MARK = "smokelift_plate"
@@ -71,12 +72,7 @@ def plate_image(smoke: bpy.types.Object) -> bpy.types.Image:
     return image
 
 
-def show_plate(
-    smoke: bpy.types.Object,
-    tree: bpy.types.NodeTree,
-    shader: bpy.types.ShaderNode,
-    place: Callable[[], bpy.types.NodeSocket],
-) -> None:
+def show_plate(smoke: bpy.types.Object, tree: Tree, shader: bpy.types.ShaderNode, place: Callable[[], Socket]) -> None:
     """Have a shader show the clean plate of the result on show, or one color if the background is that.
 
     It has an input Color. If no texture is connected to that yet, ``place`` makes coordinates in the plate.

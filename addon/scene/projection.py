@@ -11,7 +11,7 @@ from mathutils import Matrix, Vector
 
 from .blender import set_unless_changed
 from .box import engine_to_world
-from .nodes import Input, add_node, empty_material, file_group, math_node, number, vector_node
+from .nodes import Input, Tree, add_node, empty_material, file_group, math_node, number, vector_node
 from .plate import show_plate
 from .smoke import scene_of
 from .volume import frames_before, shown_index
@@ -137,11 +137,10 @@ def _new_material() -> bpy.types.Material:
     output, mix = add_node(tree, "ShaderNodeOutputMaterial", 5, 0), add_node(tree, "ShaderNodeMixShader", 4, 0)
     rays, clear = add_node(tree, "ShaderNodeLightPath", 3, -2), add_node(tree, "ShaderNodeBsdfTransparent", 3, -1)
     shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL, label=MATERIAL)
-    outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
+    outputs = {"Vector": "NodeSocketVector", "In Front": "NodeSocketFloat"}
     group = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
-    place = add_node(
-        tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=f"{MATERIAL} Place", label=f"{MATERIAL} Place"
-    )
+    name = f"{MATERIAL} Place"
+    place = add_node(tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=name, label=name)
     place.width = 180.0
     projector = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR, label=PROJECTOR)
     tree.links.new(projector.outputs["Object"], place.inputs["Point"])
@@ -154,7 +153,7 @@ def _new_material() -> bpy.types.Material:
     return material
 
 
-def _build(tree: bpy.types.NodeTree) -> None:
+def _build(tree: Tree) -> None:
     """Make the nodes of center + focal length x (point / depth); a camera looks along its -Z axis."""
     source = add_node(tree, "NodeGroupInput", 0, 0).outputs
     z = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0, source["Point"]).outputs["Z"]
