@@ -46,12 +46,8 @@ DIRECTIONS = {
 
 SLOWEST, FASTEST = 0.01, 100.0  # speeds that retiming has
 SHORTEST = 4  # frames that a take has at least, if something is made of it
-
-ZIP_FILE = "smokelift-{version}-{blenders}-{platform}.zip"
-"""Name of the extension's zip; the platform is Blender's, with _ for -."""
-
-BLENDERS = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}
-"""What a zip is called by the version of Python that it is for."""
+ZIP_FILE = "smokelift-{version}-{blenders}-{platform}.zip"  # name of the extension's zip; the platform has _ for -
+BLENDERS = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}  # in a zip's name, by its version of Python
 
 PLATFORMS = {("linux", "x86_64"): "linux-x64", ("win32", "amd64"): "windows-x64", ("darwin", "arm64"): "macos-arm64"}
 """Blender's platforms that there are zips for, by Python's names of system and processor."""

@@ -35,9 +35,7 @@ LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
 LINES_PER_POLL = 500  # lines read in one poll, at most, so that many lines do not delay the caller
 LONGEST_LINE = 2**20  # bytes
 GRACE_SECONDS = 8.0  # time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm
-
-DRAIN_SECONDS = 1.0
-"""Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""
+DRAIN_SECONDS = 1.0  # time for the last lines after the engine's end; a child of its own may hold the pipe open
 
 _QUIET = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
 """Flags that give no console window and a low priority on Windows."""
@@ -80,7 +78,9 @@ def require_fitting_zip() -> None:
     except (OSError, ValueError):  # it runs without being installed
         manifest = {}
     own_python = LIBRARIES.removeprefix("python")
-    system = (sys.platform, _processor())
+    # what this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own
+    compiled = sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
+    system = (sys.platform, compiled)
     own_platform = PLATFORMS.get(system, "-".join(system))
     platforms = manifest.get("platforms", [own_platform])
     if own_python in (pythons or [own_python]) and own_platform in platforms:
@@ -92,11 +92,6 @@ def require_fitting_zip() -> None:
     names = {"blenders": BLENDERS[own_python], "platform": own_platform.replace("-", "_")}
     name = ZIP_FILE.format(version=manifest.get("version", "*"), **names)
     raise ShotError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
-
-
-def _processor() -> str:
-    """What this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own."""
-    return sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
 
 
 class Job:

@@ -69,8 +69,7 @@ all others."""
 REPLACED = {"not all may be smoke": ("not all is smoke", "hardly any smoke fitted")}
 """Doubts of a coarse fit, with those that say the same of the result."""
 
-FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
-"""Figures that the engine counts from 0, and the panel from 1."""
+FRAME_NUMBERS = ("before", "after", "first", "last", "frame")  # the engine counts them from 0, the panel from 1
 
 MATCHES = ((34.0, "very good"), (28.0, "good"), (22.0, "fair"))
 """Words for how well smoke matches its clip, by the least PSNR inside the smoke (dB), set by hand: the difference there

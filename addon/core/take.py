@@ -34,9 +34,7 @@ from .contract import DIRECTIONS, INDEX_FILE
 OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance")
 """The engine's options that a take may hold: those that decide the result."""
 
-TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
-"""What a take is called that is made of another one."""
-
+TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}  # what a take is called that is made of another
 CACHED = 128  # takes whose files are kept in memory: more than a list shows at once
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")  # a number or a range of frames; never an option
 
@@ -225,8 +223,7 @@ class Snapshot:
         return self.begun and not self.complete
 
 
-FileState = tuple[int, int, int] | None
-"""Time, number and size of a file, by which a change is seen; None of one that is missing."""
+FileState = tuple[int, int, int] | None  # time, number and size, by which a change is seen; None of a missing file
 
 
 def _file_state(file: Path) -> FileState:

@@ -1,6 +1,7 @@
 """The clip in the tab: its frames, its background, its mask and its lens."""
 
 import os
+from contextlib import suppress
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -117,14 +118,13 @@ class SMOKELIFT_OT_add(ChoosesFile, ChangesScene, bpy.types.Operator):
         return self.execute(context) if self.filepath else super().invoke(context, event)  # of a video that was dropped
 
     def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        unreadable = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
-        try:
+        clip = None
+        with suppress(RuntimeError):
             clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
-        except RuntimeError:
-            raise ShotError(unreadable.format(self.filepath)) from None
-        if clip.frame_duration < 1:  # Blender takes any file for a clip
-            if clip.users == 0:
+        if clip is None or clip.frame_duration < 1:  # Blender takes any file for a clip
+            if clip is not None and clip.users == 0:
                 bpy.data.movieclips.remove(clip)
+            unreadable = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
             raise ShotError(unreadable.format(self.filepath))
         new_smoke(context.scene, clip)
         if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":

@@ -112,8 +112,7 @@ class ChoosesFolder(_OpensFileBrowser):
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
 
 
-Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]
-"""Draws the tab or a part of it for the active smoke."""
+Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]  # draws the tab or a part of it
 
 
 def panels(name: str, label: str, draw: Draw, *needs: Need, **attributes: Any) -> tuple[type, ...]:

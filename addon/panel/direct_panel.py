@@ -13,9 +13,7 @@ from .common import ChangesScene, Need, needs_clip, needs_result, operator, pane
 from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
 from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
-LINES = 11
-"""Lines of the longest direction: the others are as high, or the panel's buttons would move under the pointer."""
-
+LINES = 11  # of the longest direction: the others are as high, or buttons would move under the pointer
 EFFECTORS = "Effectors"  # name of a collection that the tab makes
 
 

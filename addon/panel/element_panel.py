@@ -25,10 +25,7 @@ from .layout import draw_text, draw_work
 from .settings import choice
 
 STROKES_FILE = "strokes.png"  # name of the image in the folder of the smoke's results
-
-COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}
-"""What the engine takes the colors for."""
-
+COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}  # the engine's
 PICTURES = "element_####.exr"  # names of the pictures, numbered as the frames of the clip's file
 
 

@@ -11,9 +11,7 @@ from .layout import draw_doubts, draw_failure, draw_text
 from .settings import automatic_unless, choice, number, whole
 
 SEEDS = 2**31  # numbers of variations: as many as Blender's whole numbers have from 0
-
-CELLS = 0.245, 0.215, 0.18, 0.18
-"""Fractions of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
+CELLS = 0.245, 0.215, 0.18, 0.18  # fractions of a line: button, time, memory, disk; the rest is what is lost
 
 
 class QualitySettings:

@@ -15,13 +15,9 @@ from ..scene.blender import absolute, relative
 from ..scene.smoke import volume_objects
 from .smoke_takes import find_results_again, takes_of_file
 
-_NAMES = ("output", "results", "before", "plate", "mask")
-"""Settings of a smoke that hold a path; the folder of its export is one more."""
-
+_NAMES = ("output", "results", "before", "plate", "mask")  # settings that hold a path, as the folder of an export does
 _OWN = ("results", "before")  # paths that the add-on sets: an absolute one becomes relative with the first save
-
-_DATA = ("volumes", "images", "movieclips", "sounds", "fonts", "cache_files", "libraries")
-"""Blender's own data that have a file."""
+_DATA = ("volumes", "images", "movieclips", "sounds", "fonts", "cache_files", "libraries")  # Blender's own
 
 _places: list[tuple[bpy.types.PropertyGroup, str, Path]] = []
 """Where the relative paths lead while a file is saved: settings, name and absolute path."""

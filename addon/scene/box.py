@@ -11,9 +11,7 @@ from ..core import ShotError
 from ..core.contract import BOX_VOXELS, MIN_VOXELS
 from .smoke import scene_of
 
-ROUNDING = 1e-5
-"""Fraction of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
-
+ROUNDING = 1e-5  # error of Blender's 32-bit places over the box's longest side: a hundred of their steps
 BOX_FRACTION = 0.9  # width and height of a new box over those of the picture
 
 

@@ -30,8 +30,7 @@ pixel."""
 _CLIP_SIZE = ("Clip Width", "Clip Height")
 """Names of the group's inputs for the clip's size: grain is as wide as its pixels, whatever the render's size."""
 
-LARGEST_DIFFERENCE = 0.05
-"""Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
+LARGEST_DIFFERENCE = 0.05  # of clip and plate, blurred (linear): beyond it is smoke, whose detail is no grain
 
 _INPUTS = (
     color("Render", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
@@ -42,8 +41,7 @@ _INPUTS = (
     *(number(name, "Pixels of the clip, whatever the render's size", 1.0, 1.0) for name in _CLIP_SIZE),
 )
 
-SINCE_5 = bpy.app.version >= (5, 0, 0)
-"""Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
+SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
 
 
 def composite(smoke: bpy.types.Object) -> None:

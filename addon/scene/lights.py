@@ -75,12 +75,11 @@ def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, An
             )
         if not path.is_file():
             raise ShotError(f"The world's picture {path} is not there: choose it again, or unpack it.")
-        yaw, tilt = _yaw(_mapping(source) @ rotation)
-        if tilt > 1e-3:
+        turned, up = _mapping(source) @ rotation, Vector((0.0, 0.0, 1.0))
+        if up.angle(turned @ up) > 1e-3:
             raise ShotError("The box is tilted against the world's picture: stand it upright, or choose other lights.")
-        return [
-            {"type": "environment", "image": str(path), "rotation_degrees": math.degrees(yaw), "strength": strength}
-        ]
+        yaw = math.degrees(math.atan2(turned[1][0], turned[0][0]))
+        return [{"type": "environment", "image": str(path), "rotation_degrees": yaw, "strength": strength}]
     return []
 
 
@@ -92,12 +91,6 @@ def _mapping(texture: bpy.types.ShaderNode) -> Matrix:
         return Matrix.Identity(3)
     rotation = node.inputs["Rotation"].default_value.to_matrix()
     return rotation.inverted() if node.vector_type == "TEXTURE" else rotation
-
-
-def _yaw(rotation: Matrix) -> tuple[float, float]:
-    """Angle of a rotation about Z, and the tilt of Z (radians)."""
-    up = rotation @ Vector((0.0, 0.0, 1.0))
-    return math.atan2(rotation[1][0], rotation[0][0]), up.angle(Vector((0.0, 0.0, 1.0)))
 
 
 def require_lights_outside(tables: dict[str, Any]) -> None:

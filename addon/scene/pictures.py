@@ -13,8 +13,7 @@ import bpy
 from .compositing import SINCE_5, compositor
 from .nodes import Socket, Tree
 
-UNDISTORTED_BITS, FILMED_BITS = "16", "8"
-"""Bits per channel of a picture that is computed anew, and of one that is shown as it was filmed."""
+UNDISTORTED_BITS, FILMED_BITS = "16", "8"  # per channel of a picture that is computed anew, and as it was filmed
 
 COEFFICIENTS = {
     "POLYNOMIAL": ("k1", "k2", "k3"),

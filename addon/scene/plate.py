@@ -15,9 +15,7 @@ from .clip import frame_count, number_in_file
 from .nodes import Socket, Tree
 from .strokes import saved_strokes
 
-MARK = "smokelift_plate"
-"""Custom property of pictures that a camera's view shows behind smoke, by which they are found again."""
-
+MARK = "smokelift_plate"  # custom property of pictures that a camera's view shows behind smoke
 BACKGROUND = "Smokelift Background"  # name of a picture of one color
 
 

@@ -16,10 +16,7 @@ from .blender import absolute
 
 SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
 MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
-
-WRITTEN = "smokelift_written"
-"""Custom property of an image that has a frame below: the time of its file when its strokes were written."""
-
+WRITTEN = "smokelift_written"  # custom property of an image with a frame below: its file's time when written
 Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pixels, 4)
 
 
