@@ -108,7 +108,7 @@ class ClipSettings:
     )
 
 
-class SMOKELIFT_OT_add(ChoosesFile, ChangesScene, bpy.types.Operator):
+class SMOKELIFT_OT_add(ChoosesFile, bpy.types.Operator):
     """Add smoke that is made from a video or an image sequence"""
 
     bl_label = "Smoke from Video"
@@ -186,7 +186,7 @@ def plate_from_frame(_context: bpy.types.Context, smoke: bpy.types.Object) -> No
     settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
 
 
-class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, bpy.types.Operator):
+class SMOKELIFT_OT_choose_picture(ChoosesFile, bpy.types.Operator):
     """Choose a picture or a video; those of the clip's folder come first"""
 
     bl_label = "Choose Picture"

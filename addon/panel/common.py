@@ -12,6 +12,7 @@ from ..scene import volume
 from ..scene.smoke import active_smoke
 
 EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}  # the editors that have the tab in their sidebar
+FOLDER = StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
 HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
 
 Act = Callable[..., str | None]
@@ -90,7 +91,9 @@ def operator(
     return made
 
 
-class _OpensFileBrowser:
+class OpensBrowser(ActsOnSmoke):
+    """One that asks for a folder, or a file."""
+
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -98,18 +101,12 @@ class _OpensFileBrowser:
         return {"RUNNING_MODAL"}
 
 
-class ChoosesFile(_OpensFileBrowser):
-    """An operator that asks for a picture or a video."""
+class ChoosesFile(OpensBrowser, ChangesScene):
+    """One that asks for a picture or a video."""
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-
-
-class ChoosesFolder(_OpensFileBrowser):
-    """An operator that asks for a folder."""
-
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
 
 
 Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]  # draws the tab or a part of it

@@ -19,7 +19,7 @@ from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, panels
+from .common import FOLDER, ChangesScene, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work
 from .settings import choice
@@ -138,16 +138,11 @@ def extract(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     write_files(smoke, "smokelift.extract", words, show)
 
 
-class SMOKELIFT_OT_render_element(ChoosesFolder, ActsOnSmoke, bpy.types.Operator):
+@operator("Render Element", needs_rest, needs_clip, base=OpensBrowser, given={"directory": FOLDER})
+def render_element(_context: bpy.types.Context, smoke: bpy.types.Object, directory: str) -> None:
     """Write the smoke of all frames by itself, with alpha, as an image sequence (OpenEXR, linear, premultiplied)"""
-
-    bl_label = "Render Element"
-    needs = (needs_rest, needs_clip)
-
-    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        folder = Path(self.directory)
-        said = rpt_("The element is in {:s}.").format(str(folder))
-        write_files(smoke, self.bl_idname, _extract_request(smoke, folder), lambda _smoke: said)
+    said = rpt_("The element is in {:s}.").format(str(Path(directory)))
+    write_files(smoke, "smokelift.render_element", _extract_request(smoke, Path(directory)), lambda _smoke: said)
 
 
 def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
+from ..result.export import arguments, copy_of, folder_of, size_estimate, write_asset
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
@@ -102,7 +102,7 @@ class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = context.object
-        instance = copy_later(obj, obj.name, self.offset, self.repeat)
+        instance = copy_of(obj, self.offset, self.repeat)
         context.collection.objects.link(instance)
         for other in context.selected_objects:
             other.select_set(False)

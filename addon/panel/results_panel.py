@@ -14,7 +14,7 @@ from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import absolute, redraw
-from .common import HIDDEN, ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, operator, panels
+from .common import FOLDER, HIDDEN, ActsOnSmoke, ChangesScene, OpensBrowser, needs_clip, needs_result, operator, panels
 from .layout import draw_text
 
 
@@ -38,14 +38,16 @@ def show_beside(_context: bpy.types.Context, smoke: bpy.types.Object, take: str)
     volume.show_beside(smoke, _finished(take))
 
 
-class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, bpy.types.Operator):
+@operator(
+    "Choose Moved Folder",
+    needs_result,
+    base=OpensBrowser,
+    given={"directory": FOLDER},
+    bl_options=ChangesScene.bl_options,
+)
+def choose_results(_context: bpy.types.Context, smoke: bpy.types.Object, directory: str) -> None:
     """Choose the folder that the smoke's results were moved to"""
-
-    bl_label = "Choose Moved Folder"
-    needs = (needs_result,)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        smoke_takes.move_results(smoke, absolute(self.directory))
+    smoke_takes.move_results(smoke, absolute(directory))
 
 
 class SMOKELIFT_OT_name_take(ActsOnSmoke, bpy.types.Operator):
