@@ -124,7 +124,6 @@ def make_box(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
 class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
     """Click in the camera's picture on the floor of the box, right below the smoke: that gives its distance"""
 
-    bl_idname = "smokelift.place"
     bl_label = "Click Where the Smoke Stands"
     bl_options = {"UNDO"}
     needs = (needs_clip, _needs_floor, _needs_view)

@@ -33,9 +33,15 @@ needs_rest = Need("Other files are being written: wait for them, or cancel that"
 
 
 class Needing:
-    """What Blender offers only where nothing that it needs is missing; the first that is says so."""
+    """What Blender offers only where nothing that it needs is missing; the first that is says so.
+
+    Its identifier is that of its class.
+    """
 
     needs: Sequence[Need] = ()
+
+    def __init_subclass__(cls) -> None:
+        cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -47,14 +53,10 @@ class Needing:
 
 
 class ActsOnSmoke(Needing):
-    """An operator on the active smoke, which reports what is in the way. Its identifier is that of its class."""
+    """An operator on the active smoke, which reports what is in the way."""
 
-    bl_idname: str
     needs: Sequence[Need] = (needs_smoke,)
     act: Act
-
-    def __init_subclass__(cls) -> None:
-        cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:

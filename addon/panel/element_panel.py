@@ -57,24 +57,19 @@ def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
     return image
 
 
-class SMOKELIFT_OT_stroke(bpy.types.Operator):
+MEANS = choice(
+    "Means",
+    "What is painted",
+    ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
+    ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
+    ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
+)
+
+
+@operator("Stroke", given={"means": MEANS}, bl_options={"INTERNAL"})
+def stroke(context: bpy.types.Context, _smoke: bpy.types.Object | None, means: str) -> None:
     """Paint in the color that says this. With Ctrl, strokes are erased"""
-
-    bl_idname = "smokelift.stroke"
-    bl_label = "Stroke"
-    bl_options = {"INTERNAL"}
-
-    means: choice(
-        "Means",
-        "What is painted",
-        ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
-        ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
-        ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
-    )
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        _choose_color(context, self.means)
-        return {"FINISHED"}
+    _choose_color(context, means)
 
 
 def _choose_color(context: bpy.types.Context, means: str) -> None:

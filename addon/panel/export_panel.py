@@ -6,7 +6,7 @@ from ..result.export import arguments, copy_of, folder_of, size_estimate, write_
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import Need, Needing, needs_rest, needs_result, needs_smoke, operator, panels
+from .common import ChangesScene, Need, needs_rest, needs_result, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text, draw_work
 from .settings import choice, string, tick, whole
 
@@ -83,32 +83,26 @@ def _is_driven(obj: bpy.types.Object) -> bool:
     return obj.data.animation_data is not None and len(obj.data.animation_data.drivers) > 0
 
 
-class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
+_needs_sequence = Need(
+    "Select a Volume that plays a sequence",
+    lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
+)
+_needs_no_driver = Need("Set Speed to Frame by Frame first", lambda context, _: not _is_driven(context.object))
+IN_TIME = {
+    "offset": whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12),
+    "repeat": tick("Repeat", "Play the frames again and again, as for a loop"),
+}
+
+
+@operator("Instance in Time", _needs_sequence, _needs_no_driver, base=ChangesScene, given=IN_TIME)
+def add_instance(context: bpy.types.Context, _smoke: bpy.types.Object | None, offset: int, repeat: bool) -> None:
     """Add another object that plays the active Volume's files later or earlier. The material is shared"""
-
-    bl_idname = "smokelift.add_instance"
-    bl_label = "Instance in Time"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (
-        Need(
-            "Select a Volume that plays a sequence",
-            lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
-        ),
-        Need("Set Speed to Frame by Frame first", lambda context, _: not _is_driven(context.object)),
-    )
-
-    offset: whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12)
-    repeat: tick("Repeat", "Play the frames again and again, as for a loop")
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.object
-        instance = copy_of(obj, self.offset, self.repeat)
-        context.collection.objects.link(instance)
-        for other in context.selected_objects:
-            other.select_set(False)
-        instance.select_set(True)
-        context.view_layer.objects.active = instance
-        return {"FINISHED"}
+    instance = copy_of(context.object, offset, repeat)
+    context.collection.objects.link(instance)
+    for other in context.selected_objects:
+        other.select_set(False)
+    instance.select_set(True)
+    context.view_layer.objects.active = instance
 
 
 PANELS = panels("export", "Export", _draw_export, needs_result)

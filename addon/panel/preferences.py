@@ -74,7 +74,6 @@ class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):
 class SMOKELIFT_OT_add_preset(Needing, AddPresetBase, bpy.types.Operator):
     """Keep the settings of the active smoke as a preset, or remove one"""
 
-    bl_idname = "smokelift.add_preset"
     bl_label = "Add Smoke Preset"
     needs = (Need("Select the smoke first", lambda context, _: is_smoke(context.object)),)
     preset_menu = "SMOKELIFT_PT_presets"

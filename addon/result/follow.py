@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..core.take import Take
 from ..scene.blender import absolute, relative
@@ -40,7 +39,6 @@ def _settings() -> Iterator[tuple[bpy.types.PropertyGroup, str, str]]:
                     yield owner, name, path
 
 
-@persistent
 def _before_save(file: str) -> None:
     """Write the relative paths as the new file needs them."""
     _places.clear()
@@ -59,7 +57,6 @@ def _before_save(file: str) -> None:
         _folders.insert(0, here)
 
 
-@persistent
 def _after_save(file: str) -> None:
     """Write them as the open file needs them, which is the old one where a copy was saved; its takes are the new's."""
     _stay()
@@ -68,7 +65,6 @@ def _after_save(file: str) -> None:
     _takes.clear()
 
 
-@persistent
 def _stay(_file: str = "") -> None:
     """Write them as the open file needs them."""
     for owner, name, place in _places:
@@ -77,7 +73,6 @@ def _stay(_file: str = "") -> None:
     _set_saved_as(bpy.data.filepath)
 
 
-@persistent
 def _after_load(_file: str) -> None:
     """A file that was copied or renamed has the takes of the one that it was."""
     _folders.clear()
@@ -87,7 +82,6 @@ def _after_load(_file: str) -> None:
     _set_saved_as(bpy.data.filepath)
 
 
-@persistent
 def _after_undo(_scene: bpy.types.Scene) -> None:
     """Lead relative paths that were meant for an earlier folder to where they led."""
     here = Path(bpy.data.filepath).parent

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
@@ -213,7 +212,6 @@ def _fingerprint(smoke: bpy.types.Object, tables: Mapping[str, Any]) -> str:
     return hashlib.sha256(parts.encode()).hexdigest()[:16]
 
 
-@persistent
 def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Forget the last check where the mask of a smoke was drawn on; the tab begins another when it is drawn."""
     if not state.settings or not depsgraph.id_type_updated("MASK"):

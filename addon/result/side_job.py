@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import ClassVar
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..core import ShotError
 from ..core.job import Job, engine_command
@@ -109,7 +108,6 @@ def write_files(
             raise ShotError(job.sentence)
 
 
-@persistent
 def _stop_all(_file: str = "") -> None:
     """End the engine, as another file is loaded."""
     for job in SideJob.all:

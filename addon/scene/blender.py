@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 import numpy.typing as npt
+from bpy.app.handlers import persistent
 
 PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blender keeps its preferences
 
@@ -129,7 +130,7 @@ def register_modules(modules: Sequence[ModuleType]) -> None:
         for cls in _classes(module):
             bpy.utils.register_class(cls)
         for handlers, handler in getattr(module, "HANDLERS", ()):
-            handlers.append(handler)
+            handlers.append(persistent(handler))
         if hasattr(module, "register"):
             module.register()
 

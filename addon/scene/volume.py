@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
@@ -205,7 +204,6 @@ def _renumbered(words: str, before: int) -> str:
     return _FRAMES.sub(lambda named: re.sub(r"\d+", lambda number: str(int(number[0]) + before), named[0]), words)
 
 
-@persistent
 def correct_positions(_file: str = "") -> None:
     """Correct all smokes, since another version of Blender may have saved the file."""
     for smoke, index in _shown():
@@ -321,23 +319,17 @@ def frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> i
     return settings.first - 1 if frames is None or settings.clip is None else frames[0] - settings.clip.frame_offset
 
 
-@persistent
 def _listen(_file: str = "") -> None:
     """Have Blender say when the time or rate of a clip or scene changes; loading a file ends that."""
     bpy.msgbus.clear_by_owner(_LISTENER)
-    for owner, name in _TIMES:
-        key = (getattr(bpy.types, owner), name)
-        bpy.msgbus.subscribe_rna(key=key, owner=_LISTENER, args=(), notify=synchronize_playback)
+    for owner, names in _TIMES.items():
+        for name in names:
+            key = (getattr(bpy.types, owner), name)
+            bpy.msgbus.subscribe_rna(key=key, owner=_LISTENER, args=(), notify=synchronize_playback)
 
 
 _LISTENER = object()
-
-_TIMES = (
-    ("MovieClip", "frame_start"),
-    ("MovieClip", "frame_offset"),
-    ("RenderSettings", "fps"),
-    ("RenderSettings", "fps_base"),
-)
+_TIMES = {"MovieClip": ("frame_start", "frame_offset"), "RenderSettings": ("fps", "fps_base")}
 
 HANDLERS = ((bpy.app.handlers.load_post, correct_positions), (bpy.app.handlers.load_post, _listen))
 
