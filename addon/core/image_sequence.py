@@ -27,10 +27,7 @@ class ImageSequence:
 
 
 def image_sequence_from(first: Path) -> ImageSequence | None:
-    """The sequence that begins with a picture; None where there is none, or most of it is missing.
-
-    The name of the picture ends with its number, not below zero.
-    """
+    """The sequence that begins with a numbered picture; None where there is none, or most of it is missing."""
     try:
         return _image_sequence_at(first, first.parent.stat().st_mtime_ns)
     except OSError:

@@ -51,10 +51,7 @@ runpy.run_module("smokelift_command.tethered", run_name="__main__", alter_sys=Tr
 
 
 def engine_command(arguments: Sequence[str]) -> list[str]:
-    """The command that runs the engine with this Python, isolated from the user's Python environment.
-
-    ShotError if the engine is not installed, or another Python's.
-    """
+    """The command that runs the engine with this Python alone; ShotError if it is missing, or another Python's."""
     require_fitting_zip()
     shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
     found = importlib.util.find_spec("smokelift")

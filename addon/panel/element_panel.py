@@ -103,10 +103,7 @@ class SMOKELIFT_PT_strokes(bpy.types.Panel):
 
 
 def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
-    """The engine's arguments for the element of all used frames; its scene file lies among Blender's own.
-
-    ShotError if the folder cannot be written to.
-    """
+    """The engine's arguments for the element of all used frames; ShotError if the folder cannot be written to."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

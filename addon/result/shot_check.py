@@ -198,10 +198,7 @@ def _page(shot: str) -> Path:
 
 
 def _fingerprint(smoke: bpy.types.Object, tables: Mapping[str, Any]) -> str:
-    """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads.
-
-    Options that are `NEUTRAL` do not.
-    """
+    """What tells a shot from others: its scene file, options that are not `NEUTRAL`, and the state of its files."""
     settings, words = smoke.smokelift, options(smoke) + thread_options()
     neutral = (settings.quality, f"--seed={settings.seed}")
     paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]

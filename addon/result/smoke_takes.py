@@ -106,10 +106,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
 
 
 def write_directed(smoke: bpy.types.Object) -> Take:
-    """Write the files of a new take that is made of the one on show.
-
-    ShotError if a setting or an object cannot be used, or the folder cannot be written to.
-    """
+    """Write the files of a new take that is made of the one on show; ShotError if something is in the way."""
     source = volume.shown_take(smoke)
     if source is None:
         raise ShotError("Make smoke first: there is none yet to direct.")
@@ -169,10 +166,7 @@ def _note_file(*used: Take) -> None:
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
-    """Write today's paths of clip, mask, plate and strokes into a resumed take's scene file, if the project was moved.
-
-    ShotError if its files are damaged.
-    """
+    """Write today's paths into a resumed take's scene file, if the project was moved; ShotError if it is damaged."""
     settings = smoke.smokelift
     if take.read().direction is None:
         files = {("clip", "path"): clip_path(settings.clip)}
@@ -195,10 +189,7 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
 
 
 def present(smoke: bpy.types.Object, take: Take) -> str:
-    """Show a take's finished frames, and the camera that the engine assumed if it did.
-
-    Returns what else was changed in the scene, as a sentence; empty if nothing was.
-    """
+    """Show a take's finished frames, and the camera that was assumed; returns a sentence on what else has changed."""
     index, first = take.read().index, volume.shown_take(smoke) is None
     if not volume.show(smoke, take) or index is None:
         return ""

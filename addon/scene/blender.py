@@ -32,10 +32,7 @@ def absolute(path: str, library: bpy.types.Library | None = None, folder: Path |
 
 
 def relative(path: Path, folder: Path | None = None) -> str:
-    """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute.
-
-    The folder is that of the .blend, by default of the open one.
-    """
+    """The path as Blender keeps it: relative to a .blend's folder, by default the open one's, where that can be."""
     if folder is None and not bpy.data.filepath:
         return str(path)
     try:

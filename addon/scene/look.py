@@ -90,10 +90,7 @@ PRESETS: dict[str, tuple[str, str, dict[str, Any]]] = {
 
 
 def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
-    """Give a smoke a material, if it has none, of what was fitted to the clip: medium and domain of a take's scene.
-
-    In a material without our node nothing is changed.
-    """
+    """Give a smoke a material, if it has none, and our node in it what was fitted to the clip, by a take's scene."""
     volume = smoke.data
     if not volume.materials or volume.materials[0] is None:
         volume.materials.clear()

@@ -61,10 +61,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
 
 
 def set_up(smoke: bpy.types.Object) -> list[str]:
-    """Make a render of the result on show match the clip from the camera, in the parts that are ticked.
-
-    Returns what an artist should know of it, a sentence each.
-    """
+    """Make renders match the clip from the camera, in the ticked parts; returns what to know of it, a sentence each."""
     settings, scene, index = smoke.smokelift, scene_of(smoke), volume.shown_index(smoke)
     said = []
     if settings.set_up_plate:
@@ -119,10 +116,7 @@ def _disable_other_plates(smoke: bpy.types.Object) -> None:
 
 
 def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
-    """The camera that the engine assumed, made or moved; None if the engine used the scene's own.
-
-    Its place and its lens stay where the artist changed them.
-    """
+    """The camera that the engine assumed, made or moved unless the artist did that; None if it used the scene's own."""
     settings, scene = smoke.smokelift, scene_of(smoke)
     if settings.camera_mode != "ESTIMATE":
         return None

@@ -32,10 +32,7 @@ PROVENANCE = "smokelift_provenance"
 
 
 def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
-    """Show a take's finished frames in a smoke, which is returned; None while there are none.
-
-    What the artist changed of its place and material stays.
-    """
+    """Show a take's finished frames in a smoke, whose place and material stay the artist's; None if there are none."""
     index = take.read().index
     if not index or not index["frames"]:
         return None
@@ -139,10 +136,7 @@ def take_before(smoke: bpy.types.Object) -> Take | None:
 
 
 def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
-    """Show a take in a copy of a smoke, on its right, which is returned; None if no frame is finished.
-
-    It is no smoke itself, and can be deleted like any object.
-    """
+    """Show a take in a copy of a smoke, on its right, which is no smoke itself; None if no frame is finished."""
     index = take.read().index
     if not index or not index["frames"]:
         return None
