@@ -27,6 +27,7 @@ class PlaybackSettings:
     )
 
 
+@panels("advanced", "Advanced", needs_clip)
 def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
     row = layout.row()
@@ -41,6 +42,3 @@ def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smok
             layout.label(text=line, translate=False)
     layout.operator("smokelift.show_page", icon="IMAGE_DATA")
     layout.operator("smokelift.check", icon="VIEWZOOM")
-
-
-PANELS = panels("advanced", "Advanced", _draw_advanced, needs_clip)

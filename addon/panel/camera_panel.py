@@ -10,7 +10,7 @@ from ..scene.floor import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ChangesScene, Need, Needing, needs_clip, needs_smoke, operator
+from .common import UNDO, Need, Needing, needs_clip, needs_smoke, operator
 from .layout import draw_automatic, draw_closed
 from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
@@ -107,7 +107,7 @@ _needs_view = Need(
 )
 
 
-@operator("Frame Box", needs_smoke, _needs_camera, base=ChangesScene)
+@operator("Frame Box", needs_smoke, _needs_camera, bl_options=UNDO)
 def make_box(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
     low, high = framed_box(context.scene)

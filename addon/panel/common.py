@@ -1,7 +1,7 @@
 """What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -12,7 +12,9 @@ from ..scene import volume
 from ..scene.smoke import active_smoke
 
 EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}  # the editors that have the tab in their sidebar
-FOLDER = StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
+UNDO = {"REGISTER", "UNDO"}  # options of an operator that can be undone, and adjusted
+FILE = StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
+FOLDER = StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
 HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
 
 Act = Callable[..., str | None]
@@ -52,31 +54,8 @@ class Needing:
         return not why
 
 
-class ActsOnSmoke(Needing):
-    """An operator on the active smoke, which reports what is in the way."""
-
-    needs: Sequence[Need] = (needs_smoke,)
-    act: Act
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            said = self.act(context, active_smoke(context.scene))
-        except ShotError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        if said:
-            self.report({"INFO"}, said)
-        return {"FINISHED"}
-
-
-class ChangesScene(ActsOnSmoke):
-    """One that can be undone, and adjusted."""
-
-    bl_options: ClassVar = {"REGISTER", "UNDO"}
-
-
 def operator(
-    label: str, *needs: Need, base: type = ActsOnSmoke, given: Mapping[str, Any] | None = None, **attributes: Any
+    label: str, *needs: Need, base: type = Needing, given: Mapping[str, Any] | None = None, **attributes: Any
 ) -> Callable[[Act], type]:
     """Make an operator of what it does: the class SMOKELIFT_OT_NAME, with the function's name and docstring.
 
@@ -85,15 +64,25 @@ def operator(
     """
 
     def made(act: Act) -> type:
-        own = {"__module__": act.__module__, "__doc__": act.__doc__, "bl_label": label, "needs": needs, **attributes}
-        own["__annotations__"] = given or {}
-        own["act"] = lambda this, *acted_on: act(*acted_on, **{name: getattr(this, name) for name in given or ()})
+        def execute(this: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+            values = {name: getattr(this, name) for name in given or ()}
+            try:
+                said = act(context, active_smoke(context.scene), **values)
+            except ShotError as error:
+                this.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            if said:
+                this.report({"INFO"}, said)
+            return {"FINISHED"}
+
+        own = {"__module__": act.__module__, "__doc__": act.__doc__, "__annotations__": given or {}, **attributes}
+        own |= {"bl_label": label, "needs": needs, "execute": execute}
         return type(f"SMOKELIFT_OT_{act.__name__}", (base, bpy.types.Operator), own)
 
     return made
 
 
-class OpensBrowser(ActsOnSmoke):
+class OpensBrowser(Needing):
     """One that asks for a folder, or a file."""
 
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
@@ -103,10 +92,9 @@ class OpensBrowser(ActsOnSmoke):
         return {"RUNNING_MODAL"}
 
 
-class ChoosesFile(OpensBrowser, ChangesScene):
+class ChoosesFile(OpensBrowser):
     """One that asks for a picture or a video."""
 
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
@@ -114,28 +102,31 @@ class ChoosesFile(OpensBrowser, ChangesScene):
 Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]  # draws the tab or a part of it
 
 
-def panels(name: str, label: str, draw: Draw, *needs: Need, **attributes: Any) -> tuple[type, ...]:
-    """The panels of the tab in both editors, whose classes have further attributes.
+def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[Draw], tuple[type, ...]]:
+    """Make of what draws it a panel of the tab in both editors, whose classes have further attributes.
 
     Blender knows them as SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME. Without a name it is the tab itself,
     with one a part of it, closed at first. Names of settings are drawn on their left. It is shown where nothing is
     missing that it needs.
     """
 
-    def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
-        panel.layout.use_property_split = True
-        panel.layout.use_property_decorate = False
-        draw(panel.layout, context, active_smoke(context.scene))
+    def made(draw: Draw) -> tuple[type, ...]:
+        def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
+            panel.layout.use_property_split = True
+            panel.layout.use_property_decorate = False
+            draw(panel.layout, context, active_smoke(context.scene))
 
-    made = []
-    for editor, space in EDITORS.items():
-        tab = f"SMOKELIFT_PT_{editor}"
-        own = {"__module__": draw.__module__, "draw": draw_panel, "needs": needs, **attributes}
-        own |= {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "Smokelift", "bl_label": label}
-        if name:
-            own |= {"bl_parent_id": tab, "bl_options": {"DEFAULT_CLOSED"}}
-        made.append(type(f"{tab}_{name}" if name else tab, (Needing, bpy.types.Panel), own))
-    return tuple(made)
+        classes = []
+        for editor, space in EDITORS.items():
+            tab = f"SMOKELIFT_PT_{editor}"
+            own = {"__module__": draw.__module__, "draw": draw_panel, "needs": needs, **attributes}
+            own |= {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "Smokelift", "bl_label": label}
+            if name:
+                own |= {"bl_parent_id": tab, "bl_options": {"DEFAULT_CLOSED"}}
+            classes.append(type(f"{tab}_{name}" if name else tab, (Needing, bpy.types.Panel), own))
+        return tuple(classes)
+
+    return made
 
 
 def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

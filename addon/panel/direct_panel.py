@@ -9,7 +9,7 @@ from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import ChangesScene, Need, needs_clip, needs_result, operator, panels, speed_changed
+from .common import UNDO, Need, needs_clip, needs_result, operator, panels, speed_changed
 from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
 from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
@@ -133,7 +133,7 @@ def _may_act(context: bpy.types.Context, smoke: bpy.types.Object) -> list[bpy.ty
 _needs_effector = Need("Select a mesh, a Wind or Turbulence force field, or an Empty", _may_act)
 
 
-@operator("Add Selected to Effectors", needs_result, _needs_effector, base=ChangesScene)
+@operator("Add Selected to Effectors", needs_result, _needs_effector, bl_options=UNDO)
 def add_effectors(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
     settings = smoke.smokelift.directing
@@ -145,6 +145,7 @@ def add_effectors(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
             settings.effectors.objects.link(obj)
 
 
+@panels("direct", "Direct", needs_result)
 def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift.directing
     row = layout.row()
@@ -192,6 +193,3 @@ def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 
 
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
-
-
-PANELS = panels("direct", "Direct", _draw_direct, needs_result)

@@ -56,7 +56,6 @@ def show_image(image: bpy.types.Image, mode: str = "VIEW") -> None:
     space = area.spaces.active
     space.mode, space.image = mode, image
     space.display_channels = "COLOR" if mode == "PAINT" else "COLOR_ALPHA"
-    bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     if mode == "PAINT":
         open_tab(area)
 
@@ -70,7 +69,6 @@ def show_clip(clip: bpy.types.MovieClip, mask: bpy.types.Mask | None = None) -> 
     space.clip, space.mode = clip, "TRACKING" if mask is None else "MASK"
     if mask is not None:
         space.mask = mask
-    bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     open_tab(area)
 
 
@@ -79,7 +77,7 @@ def _windows_and_areas() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
 
 
 def _fit(area_pointer: int) -> None:
-    """Show the whole of what an editor has; a timer, as a window has no size before it is drawn."""
+    """Show the whole of a picture or clip in an editor; a timer, as a window has no size before it is drawn."""
     for window, area in _windows_and_areas():
         if area.as_pointer() == area_pointer and area.type in ("IMAGE_EDITOR", "CLIP_EDITOR"):
             region = next(region for region in area.regions if region.type == "WINDOW")
@@ -89,7 +87,7 @@ def _fit(area_pointer: int) -> None:
 
 
 def _editor(kind: str, mode: str = "") -> bpy.types.Area:
-    """An editor of a kind, and of a mode if it has some; in a window of its own if there is none."""
+    """An editor of a kind, and of a mode if it has some; in a window of its own if there is none. All is shown soon."""
     manager = bpy.context.window_manager
     areas = (area for _, area in _windows_and_areas() if area.type == kind)
     found = next((area for area in areas if mode in ("", area.spaces.active.mode)), None)
@@ -98,6 +96,7 @@ def _editor(kind: str, mode: str = "") -> bpy.types.Area:
             bpy.ops.wm.window_new()
         found = manager.windows[-1].screen.areas[0]
         found.type = kind
+    bpy.app.timers.register(functools.partial(_fit, found.as_pointer()), first_interval=DRAWN_SECONDS)
     return found
 
 

@@ -19,7 +19,7 @@ from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
-from .common import FOLDER, ChangesScene, OpensBrowser, needs_clip, needs_rest, operator, panels
+from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work
 from .settings import choice
@@ -29,7 +29,7 @@ COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0
 PICTURES = "element_####.exr"  # names of the pictures, numbered as the frames of the clip's file
 
 
-@operator("Paint Strokes", needs_clip, base=ChangesScene)
+@operator("Paint Strokes", needs_clip, bl_options=UNDO)
 def paint_strokes(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
     now, settings = context.scene.frame_current, smoke.smokelift
@@ -137,6 +137,7 @@ def render_element(_context: bpy.types.Context, smoke: bpy.types.Object, directo
     write_files(smoke, "smokelift.render_element", _extract_request(smoke, Path(directory)), lambda _smoke: said)
 
 
+@panels("element", "Element", needs_clip)
 def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     layout.use_property_split = False
     row = layout.row(align=True)
@@ -144,6 +145,3 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
     draw_work(layout, smoke, "smokelift.extract", "IMAGE_RGB_ALPHA")
     draw_work(layout, smoke, "smokelift.render_element", "RENDER_ANIMATION")
-
-
-PANELS = panels("element", "Element", _draw_element, needs_clip)

@@ -6,7 +6,8 @@ from ..result.export import arguments, copy_of, folder_of, size_estimate, write_
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import ChangesScene, Need, needs_rest, needs_result, needs_smoke, operator, panels
+from ..scene.smoke import activate
+from .common import UNDO, Need, needs_rest, needs_result, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text, draw_work
 from .settings import choice, string, tick, whole
 
@@ -70,6 +71,7 @@ def stop_writing(_context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
     writing_job.stop()
 
 
+@panels("export", "Export", needs_result)
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift_export
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
@@ -94,15 +96,9 @@ IN_TIME = {
 }
 
 
-@operator("Instance in Time", _needs_sequence, _needs_no_driver, base=ChangesScene, given=IN_TIME)
+@operator("Instance in Time", _needs_sequence, _needs_no_driver, bl_options=UNDO, given=IN_TIME)
 def add_instance(context: bpy.types.Context, _smoke: bpy.types.Object | None, offset: int, repeat: bool) -> None:
     """Add another object that plays the active Volume's files later or earlier. The material is shared"""
     instance = copy_of(context.object, offset, repeat)
     context.collection.objects.link(instance)
-    for other in context.selected_objects:
-        other.select_set(False)
-    instance.select_set(True)
-    context.view_layer.objects.active = instance
-
-
-PANELS = panels("export", "Export", _draw_export, needs_result)
+    activate(instance, context.scene)

@@ -6,7 +6,7 @@ from ..core import ShotError
 from ..scene import look, volume
 from ..scene.modifiers import PROXY, in_viewport
 from ..scene.smoke import is_override, smoke_with_look
-from .common import ChangesScene, Need, needs_result, operator, panels
+from .common import UNDO, Need, needs_result, operator, panels
 from .layout import draw_text, draw_work
 from .settings import choice
 
@@ -21,7 +21,7 @@ _needs_look = Need(
 PRESETS = [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
 
 
-@operator("Use Look", _needs_look, base=ChangesScene, given={"preset": choice("Preset", "Kind of smoke", *PRESETS)})
+@operator("Use Look", _needs_look, bl_options=UNDO, given={"preset": choice("Preset", "Kind of smoke", *PRESETS)})
 def use_look(context: bpy.types.Context, _smoke: bpy.types.Object, preset: str) -> None:
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
     smoke = smoke_with_look(context.scene)
@@ -32,6 +32,7 @@ def use_look(context: bpy.types.Context, _smoke: bpy.types.Object, preset: str) 
         raise ShotError("The smoke's material is your own: remove it and show the result again for presets.")
 
 
+@panels("look", "Look", _needs_look)
 def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     smoke = smoke_with_look(context.scene)
     layout.use_property_decorate = True  # the look may be animated
@@ -72,6 +73,3 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.prop(smoke.data.render, "step_size", text="Render Step")
     if may_choose and not cycles.volume_biased:
         draw_text(column, "Marching has less noise per sample, but its steps make an error.", "INFO")
-
-
-PANELS = panels("look", "Look", _draw_look, _needs_look)

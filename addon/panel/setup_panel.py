@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core import ShotError
 from ..scene import shot_setup, volume
 from ..scene.plate import clip_behind
-from .common import ChangesScene, needs_clip, needs_result, operator, panels
+from .common import UNDO, needs_clip, needs_result, operator, panels
 from .layout import draw_settings
 from .settings import choice, link, tick
 
@@ -65,7 +65,7 @@ DESCRIPTION = (
 )
 
 
-@operator("Set Up Shot", needs_clip, needs_result, base=ChangesScene, bl_description=DESCRIPTION)
+@operator("Set Up Shot", needs_clip, needs_result, bl_options=UNDO, bl_description=DESCRIPTION)
 def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
     """Make a render from the camera match the clip."""
     take, settings = volume.shown_take(smoke), smoke.smokelift
@@ -81,6 +81,7 @@ def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
     return " ".join([rpt_("The shot is set up: press F12 for a render that matches the clip."), *said])
 
 
+@panels("set_up", "Shot Set-Up", needs_clip)
 def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     layout.use_property_split = False
     settings = smoke.smokelift
@@ -94,6 +95,3 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     if clip is not None:
         layout.prop(clip, "show_background_image", text="Clip in View", icon="NONE")
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")
-
-
-PANELS = panels("set_up", "Shot Set-Up", _draw_set_up, needs_clip)

@@ -8,14 +8,14 @@ from ..result import smoke_takes
 from ..scene.smoke import activate, smokes
 from .camera_panel import draw_shot
 from .clip_panel import draw_clip
-from .common import HIDDEN, ChangesScene, needs_smoke, operator, panels
+from .common import HIDDEN, UNDO, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text
 from .preferences import draw_header
 from .quality_panel import draw_qualities
 from .run_panel import draw_run
 
 
-@operator("Select Smoke", needs_smoke, base=ChangesScene, given={"smoke": HIDDEN})
+@operator("Select Smoke", needs_smoke, bl_options=UNDO, given={"smoke": HIDDEN})
 def show_smoke(context: bpy.types.Context, _active: bpy.types.Object, smoke: str) -> None:
     """Select this smoke, and show its settings in the tab"""
     found = next((obj for obj in smokes(context.scene) if obj.name == smoke), None)
@@ -24,6 +24,7 @@ def show_smoke(context: bpy.types.Context, _active: bpy.types.Object, smoke: str
     activate(found, context.scene)
 
 
+@panels("", "Smokelift", draw_header_preset=draw_header)
 def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object | None) -> None:
     _draw_smokes(layout, context, smoke)
     if smoke is None:
@@ -51,6 +52,3 @@ def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active:
             row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
             row.smoke = smoke.name
     column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
-
-
-PANELS = panels("", "Smokelift", _draw_tab, draw_header_preset=draw_header)

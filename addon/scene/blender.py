@@ -122,7 +122,7 @@ _called_later: set[Callable[[], float | None]] = set()  # what Blender was ever 
 
 
 def register_modules(modules: Sequence[ModuleType]) -> None:
-    """Register the classes of modules, their ``HANDLERS``, each after the list that it is for, and whatever else."""
+    """Register the classes of modules, their ``HANDLERS``, each after the list or menu that it is for, and more."""
     for module in modules:
         for cls in _classes(module):
             bpy.utils.register_class(cls)
