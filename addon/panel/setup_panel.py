@@ -10,8 +10,6 @@ from .common import UNDO, needs_clip, needs_result, operator, panels
 from .layout import draw_settings
 from .settings import choice, link, tick
 
-TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")  # names of the settings
-
 
 class SetUpSettings:
     """What Set Up Shot sets up."""
@@ -85,7 +83,7 @@ def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
 def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     layout.use_property_split = False
     settings = smoke.smokelift
-    draw_settings(layout, settings, *TICKS)
+    draw_settings(layout, settings, "set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
     row = layout.row()
     row.use_property_split = True
     row.active = settings.set_up_plate

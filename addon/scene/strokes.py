@@ -21,10 +21,7 @@ Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pix
 
 
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
-    """The file of the strokes on a clip, with what was painted last.
-
-    ShotError if there is no file, it cannot be written, or it is of another size than the clip.
-    """
+    """The file of the strokes on a clip, with what was painted last; ShotError if it is missing or of another size."""
     file = absolute(image.filepath, image.library)
     try:
         if WRITTEN in image:
