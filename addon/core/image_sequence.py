@@ -8,27 +8,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-CACHED = 16
-"""Sequences that are kept in memory: the panel asks with every redraw."""
-
-LISTED = 3
-"""Names of missing pictures that are listed."""
+CACHED = 16  # sequences that are kept in memory: the panel asks with every redraw
+LISTED = 3  # names of missing pictures that are listed
 
 
 @dataclass(frozen=True)
 class ImageSequence:
-    """A sequence of numbered pictures.
+    """A sequence of numbered pictures."""
 
-    Attributes
-    ----------
-    count
-        From the first to the last, with those that are missing in between.
-    missing
-        Names of these.
-    """
-
-    count: int
-    missing: tuple[str, ...]
+    count: int  # from the first to the last, with those that are missing in between
+    missing: tuple[str, ...]  # names of these
 
     def missing_names(self) -> str:
         """The first names of those that are missing, and how many there are more."""
@@ -38,10 +27,7 @@ class ImageSequence:
 
 
 def image_sequence_from(first: Path) -> ImageSequence | None:
-    """The sequence that begins with a picture; None where there is none, or most of it is missing.
-
-    The name of the picture ends with its number, not below zero.
-    """
+    """The sequence that begins with a numbered picture; None where there is none, or most of it is missing."""
     try:
         return _image_sequence_at(first, first.parent.stat().st_mtime_ns)
     except OSError:

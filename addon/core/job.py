@@ -27,23 +27,18 @@ from .sentences import REPLACED, advice, sentence, stopped
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 
-HOME = Path(__file__).parents[1]
-"""The extension; the one with Taichi for the GPU lies beside it."""
+HOME = Path(__file__).parents[1]  # the extension; the one with Taichi for the GPU lies beside it
 
 LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
 """Folder of an extension that the engine imports from: what is compiled is for one version of Python."""
 
-LINES_PER_POLL = 500
-"""Lines read in one poll, at most, so that many lines do not delay the caller."""
+LINES_PER_POLL = 500  # lines read in one poll, at most, so that many lines do not delay the caller
+LONGEST_LINE = 2**20  # bytes
+GRACE_SECONDS = 8.0  # time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm
+DRAIN_SECONDS = 1.0  # time for the last lines after the engine's end; a child of its own may hold the pipe open
 
-LONGEST_LINE = 2**20
-"""Bytes."""
-
-GRACE_SECONDS = 8.0
-"""Time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm."""
-
-DRAIN_SECONDS = 1.0
-"""Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""
+_QUIET = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+"""Flags that give no console window and a low priority on Windows."""
 
 _START = """
 import os, runpy, sys
@@ -56,10 +51,7 @@ runpy.run_module("smokelift_command.tethered", run_name="__main__", alter_sys=Tr
 
 
 def engine_command(arguments: Sequence[str]) -> list[str]:
-    """The command that runs the engine with this Python, isolated from the user's Python environment.
-
-    ShotError if the engine is not installed, or another Python's.
-    """
+    """The command that runs the engine with this Python alone; ShotError if it is missing, or another Python's."""
     require_fitting_zip()
     shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
     found = importlib.util.find_spec("smokelift")
@@ -83,7 +75,9 @@ def require_fitting_zip() -> None:
     except (OSError, ValueError):  # it runs without being installed
         manifest = {}
     own_python = LIBRARIES.removeprefix("python")
-    system = (sys.platform, _processor())
+    # what this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own
+    compiled = sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
+    system = (sys.platform, compiled)
     own_platform = PLATFORMS.get(system, "-".join(system))
     platforms = manifest.get("platforms", [own_platform])
     if own_python in (pythons or [own_python]) and own_platform in platforms:
@@ -97,57 +91,24 @@ def require_fitting_zip() -> None:
     raise ShotError(f"This zip is for {zip_is}, and this Blender is {this}: install {name}.")
 
 
-def _processor() -> str:
-    """What this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own."""
-    return sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
-
-
 class Job:
-    """One run of the engine.
+    """One run of the engine by a command, all of whose messages are appended to a log.
 
-    Parameters
-    ----------
-    command
-        What to start.
-    log
-        File to which all messages are appended.
-    before
-        Number of the clip's frames before the first of the result.
-    done
-        Frames that are finished already, which a run that is resumed counts too.
-
-    Attributes
-    ----------
-    outcome
-        Its state.
-    done, total
-        Finished frames and all frames; 0 of 0 while unknown.
-    seconds_left
-        The engine's estimate; None while unknown.
-    notes
-        The engine's assumptions and warnings, a sentence each.
-    doubts
-        Why the result may be nothing, or wrong, each after the engine's name for it; what helps is left out.
-    forecast
-        What a run says of its shot before its first frame, with the doubts of then; None before it does.
-    sentence
-        The result, or the reason of a failure.
-    details
-        The fields of the engine's "done" message.
-    status
-        The engine's exit status; None before it ends.
+    So many frames of the clip lie ``before`` the first of the result. A run that is resumed has ``done`` some already.
     """
 
     def __init__(self, command: Sequence[str], log: Path, before: int = 0, done: int = 0) -> None:
         self.outcome: Outcome = "waiting"
-        self.done, self.total = done, 0
-        self.seconds_left: float | None = None
-        self.notes: list[str] = []
+        self.done, self.total = done, 0  # finished frames and all frames; 0 of 0 while unknown
+        self.seconds_left: float | None = None  # the engine's estimate; None while unknown
+        self.notes: list[str] = []  # the engine's assumptions and warnings, a sentence each
+        # why the result may be nothing, or wrong, each after the engine's name for it; what helps is left out
         self.doubts: list[tuple[str, str]] = []
+        # what a run says of its shot before its first frame, with the doubts of then; None before it does
         self.forecast: tuple[Mapping[str, Any], list[tuple[str, str]]] | None = None
-        self.sentence = ""
-        self.details: Mapping[str, Any] = {}
-        self.status: int | None = None
+        self.sentence = ""  # the result, or the reason of a failure
+        self.details: Mapping[str, Any] = {}  # the fields of the engine's "done" message
+        self.status: int | None = None  # the engine's exit status; None before it ends
         self._command = list(command)
         self._log_path = log
         self._before = before
@@ -175,11 +136,7 @@ class Job:
             self._log_path.parent.mkdir(parents=True, exist_ok=True)
             self._log = self._log_path.open("ab", buffering=0)
             self._process = subprocess.Popen(
-                self._command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._log,
-                creationflags=_quiet_flags(),
+                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, creationflags=_QUIET
             )
         except OSError as error:
             self._close()
@@ -195,15 +152,13 @@ class Job:
             return False
         assert self._process is not None
         changed = False
-        for _ in range(LINES_PER_POLL):
-            try:
+        with suppress(queue.Empty):
+            for _ in range(LINES_PER_POLL):
                 line = self._lines.get_nowait()
-            except queue.Empty:
-                break
-            if line is None:
-                self._output_ended = True
-                break
-            changed = self._read_line(line) or changed
+                if line is None:
+                    self._output_ended = True
+                    break
+                changed = self._read_line(line) or changed
         if self._kill_at is not None and time.monotonic() > self._kill_at:
             self._process.kill()
         if self._process.poll() is not None:
@@ -237,13 +192,8 @@ class Job:
         text = line.decode("utf-8", "replace").rstrip()
         try:
             message = json.loads(text)
-            event = message.pop("event")
-        except (ValueError, AttributeError, LookupError, TypeError):
-            self._write_log(text)
-            return False
-        try:
-            return self._handle(event, message)
-        except (LookupError, TypeError, ValueError):
+            return self._handle(message.pop("event"), message)
+        except (AttributeError, LookupError, TypeError, ValueError):
             self._write_log(text)
             return False
 
@@ -326,10 +276,3 @@ def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
         for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
             lines.put(line)
     lines.put(None)
-
-
-def _quiet_flags() -> int:
-    """Flags that give no console window and a low priority on Windows."""
-    if sys.platform == "win32":
-        return subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS
-    return 0

@@ -12,18 +12,11 @@ from itertools import pairwise
 
 @dataclass(frozen=True)
 class Retiming:
-    """How a take is passed through.
+    """How a take is passed through."""
 
-    Attributes
-    ----------
-    ramps
-        When each ramp begins; first place, speed there, and change of the speed for each frame.
-    duration
-        Until the last frame has been shown for its time, in frames.
-    """
-
+    # when each begins; first place, speed there, and change of the speed for each frame
     ramps: tuple[tuple[float, float, float, float], ...]
-    duration: float
+    duration: float  # until the last frame has been shown for its time, in frames
 
     def place(self, time: str) -> str:
         """The place in the take, from 0, as an expression for a driver, of an expression for the time."""

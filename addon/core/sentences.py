@@ -69,21 +69,18 @@ all others."""
 REPLACED = {"not all may be smoke": ("not all is smoke", "hardly any smoke fitted")}
 """Doubts of a coarse fit, with those that say the same of the result."""
 
-FRAME_NUMBERS = ("before", "after", "first", "last", "frame")
-"""Figures that the engine counts from 0, and the panel from 1."""
+FRAME_NUMBERS = ("before", "after", "first", "last", "frame")  # the engine counts them from 0, the panel from 1
 
 MATCHES = ((34.0, "very good"), (28.0, "good"), (22.0, "fair"))
 """Words for how well smoke matches its clip, by the least PSNR inside the smoke (dB), set by hand: the difference there
 is at most 2, 4 and 8 % of the range."""
 
-POOR = "poor"
-"""The word for a PSNR below these."""
+POOR = "poor"  # the word for a PSNR below these
 
 UNRATED = ("smoke in the background", "background never seen")
 """Doubts with which smoke may match its clip well and still be wrong: a part of it is in the background."""
 
-OF_RESULT = ("dissolving smoke",)
-"""Sentences whose frames are counted from the first of the result, from 1."""
+OF_RESULT = ("dissolving smoke",)  # sentences whose frames are counted from the first of the result, from 1
 
 
 def sentence(message: Mapping[str, Any], before: int = 0, doubts: Collection[str] = ()) -> str:

@@ -34,14 +34,9 @@ from .contract import DIRECTIONS, INDEX_FILE
 OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance")
 """The engine's options that a take may hold: those that decide the result."""
 
-TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
-"""What a take is called that is made of another one."""
-
-CACHED = 128
-"""Takes whose files are kept in memory: more than a list shows at once."""
-
-_NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
-"""A number or a range of frames; never an option."""
+TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}  # what a take is called that is made of another
+CACHED = 128  # takes whose files are kept in memory: more than a list shows at once
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")  # a number or a range of frames; never an option
 
 _NAME = re.compile(r"take_(\d{4,})")
 
@@ -84,10 +79,7 @@ class Take:
         return f"{beside}_{drawn.name}"
 
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
-        """Write the scene file from its tables, and the engine's further options.
-
-        ShotError if the folder cannot be written to.
-        """
+        """Write the scene file from its tables, and the engine's further options; ShotError if that fails."""
         self._write({self.scene_file: toml_text(tables).encode(), self.request_file: _request(options)})
 
     def write_directed(
@@ -176,10 +168,9 @@ class Take:
         known = self.read().files
         if known is not None and blend.resolve() not in known:
             folder = self.directory.parent.resolve()
+            files = [_relative_path(folder, file) for file in sorted({*known, blend.resolve()})]
             with suppress(OSError, ValueError, TypeError, RecursionError):
-                self._change_request(
-                    "files", [_relative_path(folder, file) for file in sorted({*known, blend.resolve()})]
-                )
+                self._change_request("files", files)
 
     def _change_request(self, key: str, value: Any) -> None:
         request = json.loads(self.request_file.read_text(encoding="utf-8"))
@@ -206,33 +197,15 @@ class Take:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """What the files of a take say at one time.
+    """What the files of a take say at one time."""
 
-    Attributes
-    ----------
-    direction
-        What is done to another take, a key of `DIRECTIONS`; None of one that is made from a clip, or damaged.
-    source
-        The other take; None of one that is made from a clip, or damaged.
-    options
-        The engine's further options; None where the request is missing or damaged.
-    title
-        The name that the artist gave it, or its number.
-    index
-        The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one.
-    begun
-        Whether it has what a run needs.
-    files
-        The .blend files that may show it, without links; None of one that an earlier version made, which kept no list.
-    """
-
-    direction: str | None
-    source: Take | None
-    options: list[str] | None
-    title: str
-    index: dict[str, Any] | None
-    begun: bool
-    files: frozenset[Path] | None
+    direction: str | None  # what is done to another take, by `DIRECTIONS`; None of one of a clip, or damaged
+    source: Take | None  # the other take; None likewise
+    options: list[str] | None  # the engine's further options; None where the request is missing or damaged
+    title: str  # the name that the artist gave it, or its number
+    index: dict[str, Any] | None  # `sequence.json`, not to be changed; None before there is one, or of a foreign one
+    begun: bool  # whether it has what a run needs
+    files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
     @property
     def frames(self) -> int:
@@ -250,8 +223,7 @@ class Snapshot:
         return self.begun and not self.complete
 
 
-FileState = tuple[int, int, int] | None
-"""Time, number and size of a file, by which a change is seen; None of one that is missing."""
+FileState = tuple[int, int, int] | None  # time, number and size, by which a change is seen; None of a missing file
 
 
 def _file_state(file: Path) -> FileState:
@@ -317,16 +289,12 @@ def _size_at(directory: Path, _time: int) -> float:
 
 def takes(folder: Path) -> list[Take]:
     """The takes in a folder, oldest first."""
-    return [_take(folder, number) for number in sorted(_numbers(folder))]
+    return [Take(folder / f"take_{number:04d}") for number in sorted(_numbers(folder))]
 
 
 def new_take(folder: Path) -> Take:
     """The take with the next free number in a folder."""
-    return _take(folder, max(_numbers(folder), default=0) + 1)
-
-
-def _take(folder: Path, number: int) -> Take:
-    return Take(folder / f"take_{number:04d}")
+    return Take(folder / f"take_{max(_numbers(folder), default=0) + 1:04d}")
 
 
 def _numbers(folder: Path) -> set[int]:
@@ -339,15 +307,11 @@ def toml_text(tables: Mapping[str, Any]) -> str:
     """The text of a TOML file, whose tables, and lists of them, hold numbers, texts, or nested lists of those."""
     parts = []
     for name, content in tables.items():
-        if isinstance(content, list):
-            parts += [_toml_table(f"[[{name}]]", table) for table in content]
-        else:
-            parts.append(_toml_table(f"[{name}]", content))
+        header, listed = (f"[[{name}]]", content) if isinstance(content, list) else (f"[{name}]", [content])
+        for table in listed:
+            lines = [header, *(f"{key} = {_toml_value(value)}" for key, value in table.items())]
+            parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)
-
-
-def _toml_table(header: str, table: Mapping[str, Any]) -> str:
-    return "\n".join([header, *(f"{key} = {_toml_value(value)}" for key, value in table.items())]) + "\n"
 
 
 def _toml_value(value: Any) -> str:

@@ -15,10 +15,8 @@ class PlaybackSettings:
     speed: choice(
         "Speed",
         "Speed of the smoke if clip and scene differ in frame rate",
-        [
-            ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
-            ("REAL", "Real Time", "As fast as in reality"),
-        ],
+        ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
+        ("REAL", "Real Time", "As fast as in reality"),
         update=speed_changed,
     )
     between: tick(
@@ -29,6 +27,7 @@ class PlaybackSettings:
     )
 
 
+@panels("advanced", "Advanced", needs_clip)
 def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
     row = layout.row()
@@ -43,6 +42,3 @@ def _draw_advanced(layout: bpy.types.UILayout, _context: bpy.types.Context, smok
             layout.label(text=line, translate=False)
     layout.operator("smokelift.show_page", icon="IMAGE_DATA")
     layout.operator("smokelift.check", icon="VIEWZOOM")
-
-
-PANELS = panels("advanced", "Advanced", _draw_advanced, needs_clip)

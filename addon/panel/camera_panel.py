@@ -3,7 +3,6 @@
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras import view3d_utils
-from mathutils import Vector
 
 from ..core import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
@@ -11,12 +10,11 @@ from ..scene.floor import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import ChangesScene, Needing, needs_clip, needs_smoke, operator
+from .common import UNDO, Need, Needing, needs_clip, needs_smoke, operator
 from .layout import draw_automatic, draw_closed
 from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
-USUAL_DISTANCE = 2.0
-"""Meters from which a distance is given by hand where there is no box."""
+USUAL_DISTANCE = 2.0  # meters from which a distance is given by hand where there is no box
 
 
 def _box_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -40,14 +38,12 @@ class ShotSettings:
     camera_mode: choice(
         "Camera",
         "Where the clip was filmed from",
-        [
-            (
-                "ESTIMATE",
-                "From the Clip",
-                "Assume a level camera with an ordinary lens and a box around the smoke, and add it",
-            ),
-            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
-        ],
+        (
+            "ESTIMATE",
+            "From the Clip",
+            "Assume a level camera with an ordinary lens and a box around the smoke, and add it",
+        ),
+        ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
     )
     box: link(
         "Box",
@@ -71,15 +67,13 @@ class ShotSettings:
     )
     use_distance: automatic_unless("distance", "Distance", _middle_of_box)
     closed: closed_sides(
-        "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
+        "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor"
     )
     light_mode: choice(
         "Light",
         "What lights the smoke in the clip",
-        [
-            ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
-            ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
-        ],
+        ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
+        ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
     )
     use_medium: tick("Smoke Material", "Set the smoke's optical properties")
     extinction: number(
@@ -100,11 +94,20 @@ class ShotSettings:
     anisotropy: number("Anisotropy", "Forward scattering above 0, backward scattering below", min=-0.95, max=0.95)
 
 
-def _needs_camera(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:
-    return "" if context.scene.camera else "The scene has no camera: add one where the clip was filmed from"
+_needs_camera = Need(
+    "The scene has no camera: add one where the clip was filmed from", lambda context, _: context.scene.camera
+)
+_needs_floor = Need(
+    "Choose Scene Camera and make a Box first: its bottom is the floor",
+    lambda _, smoke: smoke.smokelift.camera_mode == "SCENE" and box_of(smoke),
+)
+_needs_view = Need(
+    "Use the tab in a 3D View: the click is made there",
+    lambda context, _: context.area is not None and context.area.type == "VIEW_3D",
+)
 
 
-@operator("Frame Box", needs_smoke, _needs_camera, base=ChangesScene)
+@operator("Frame Box", needs_smoke, _needs_camera, bl_options=UNDO)
 def make_box(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
     low, high = framed_box(context.scene)
@@ -118,20 +121,9 @@ def make_box(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     box.scale = (high - low) / 2
 
 
-def _needs_floor(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    known = smoke.smokelift.camera_mode == "SCENE" and box_of(smoke) is not None
-    return "" if known else "Choose Scene Camera and make a Box first: its bottom is the floor"
-
-
-def _needs_view(context: bpy.types.Context, _smoke: bpy.types.Object) -> str:
-    in_view = context.area is not None and context.area.type == "VIEW_3D"
-    return "" if in_view else "Use the tab in a 3D View: the click is made there"
-
-
 class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
     """Click in the camera's picture on the floor of the box, right below the smoke: that gives its distance"""
 
-    bl_idname = "smokelift.place"
     bl_label = "Click Where the Smoke Stands"
     bl_options = {"UNDO"}
     needs = (needs_clip, _needs_floor, _needs_view)
@@ -155,43 +147,35 @@ class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
         if event.type in ("ESC", "RIGHTMOUSE"):
             self._view.view_perspective = self._before
             return self._end(context, {"CANCELLED"})
-        if event.type == "MOUSEMOVE":
-            context.workspace.status_text_set(self._said(context, event))
-            return {"RUNNING_MODAL"}
-        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+        clicked = event.type == "LEFTMOUSE" and event.value == "PRESS"
+        if not clicked and event.type != "MOUSEMOVE":
             return {"PASS_THROUGH"}  # so that the view can be zoomed
         try:
-            active_smoke(context.scene).smokelift.distance = self._distance(context, event)
+            distance, why = self._distance(context, event), ""
         except ShotError as error:
-            self.report({"ERROR"}, str(error))
+            distance, why = 0.0, str(error)
+        if not clicked:
+            context.workspace.status_text_set(why or rpt_("Distance: {:.3g} m").format(distance))
+            return {"RUNNING_MODAL"}
+        if why:
+            self.report({"ERROR"}, why)
             return self._end(context, {"CANCELLED"})
+        active_smoke(context.scene).smokelift.distance = distance
         return self._end(context, {"FINISHED"})
-
-    def _said(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
-        """What a click would mean there, for the status bar."""
-        try:
-            return rpt_("Distance: {:.3g} m").format(self._distance(context, event))
-        except ShotError as error:
-            return str(error)
 
     def _distance(self, context: bpy.types.Context, event: bpy.types.Event) -> float:
         """The distance of what is under the mouse; ShotError if that is not known."""
         region = next(region for region in context.area.regions if region.type == "WINDOW")
-        x, y = event.mouse_x - region.x, event.mouse_y - region.y
-        return self._floor.clicked([_pixel_ray(region, self._view, (x, y)), _pixel_ray(region, self._view, (x, y - 1))])
+        rays = []
+        for down in (0, 1):
+            seen = region, self._view, (event.mouse_x - region.x, event.mouse_y - region.y - down)
+            rays.append((view3d_utils.region_2d_to_origin_3d(*seen), view3d_utils.region_2d_to_vector_3d(*seen)))
+        return self._floor.clicked(rays)
 
     def _end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
         return outcome
-
-
-def _pixel_ray(region: bpy.types.Region, view: bpy.types.RegionView3D, pixel: tuple[int, int]) -> tuple[Vector, Vector]:
-    """Origin and direction of what a pixel of a view shows."""
-    return (
-        view3d_utils.region_2d_to_origin_3d(region, view, pixel),
-        view3d_utils.region_2d_to_vector_3d(region, view, pixel),
-    )
 
 
 def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

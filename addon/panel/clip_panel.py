@@ -1,11 +1,11 @@
 """The clip in the tab: its frames, its background, its mask and its lens."""
 
 import os
+from contextlib import suppress
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..result import smoke_takes
@@ -16,13 +16,12 @@ from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, u
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
-from .common import ChangesScene, ChoosesFile, needs_clip, operator
+from .common import FILE, HIDDEN, UNDO, ChoosesFile, Need, needs_clip, operator
 from .editors import open_tab
 from .layout import draw_hint, draw_text
 from .settings import automatic_unless, choice, link, number, string, vector, whole
 
-UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")
-"""Settings that a clip of the same frames keeps."""
+UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")  # settings that a clip of the same frames keeps
 
 
 def _clip_chosen(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -61,12 +60,10 @@ class ClipSettings:
     plate_mode: choice(
         "Background",
         "The picture without smoke",
-        [
-            ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
-            ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
-            ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
-            ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
-        ],
+        ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
+        ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
+        ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
+        ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
         update=_background_chosen,
     )
     plate_color: vector(
@@ -105,60 +102,54 @@ class ClipSettings:
     transfer: choice(
         "Color Space",
         "Color space of the clip",
-        [
-            ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
-            ("srgb", "sRGB", "Ordinary video and pictures"),
-            ("linear", "Linear Rec.709", "Proportional to light"),
-        ],
+        ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
+        ("srgb", "sRGB", "Ordinary video and pictures"),
+        ("linear", "Linear Rec.709", "Proportional to light"),
     )
 
 
-class SMOKELIFT_OT_add(ChoosesFile, ChangesScene, bpy.types.Operator):
+def _add_dropped(this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    return this.execute(context) if this.filepath else ChoosesFile.invoke(this, context, event)
+
+
+@operator("Smoke from Video", base=ChoosesFile, given={"filepath": FILE}, bl_options=UNDO, invoke=_add_dropped)
+def add(context: bpy.types.Context, _smoke: bpy.types.Object | None, filepath: str) -> None:
     """Add smoke that is made from a video or an image sequence"""
-
-    bl_label = "Smoke from Video"
-    needs = ()
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self.execute(context) if self.filepath else super().invoke(context, event)  # of a video that was dropped
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        unreadable = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
-        try:
-            clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
-        except RuntimeError:
-            raise ShotError(unreadable.format(self.filepath)) from None
-        if clip.frame_duration < 1:  # Blender takes any file for a clip
-            if clip.users == 0:
-                bpy.data.movieclips.remove(clip)
-            raise ShotError(unreadable.format(self.filepath))
-        new_smoke(context.scene, clip)
-        if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
-            open_tab(context.area)
+    clip = None
+    with suppress(RuntimeError):
+        clip = bpy.data.movieclips.load(filepath, check_existing=True)
+    if clip is None or clip.frame_duration < 1:  # Blender takes any file for a clip
+        if clip is not None and clip.users == 0:
+            bpy.data.movieclips.remove(clip)
+        raise ShotError(rpt_("{:s} is no video and no picture that Blender can read: choose another.").format(filepath))
+    new_smoke(context.scene, clip)
+    if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
+        open_tab(context.area)
 
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(SMOKELIFT_OT_add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
+    menu.layout.operator(add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
 
 
-@operator("Use All Files", needs_clip, base=ChangesScene)
+@operator("Use All Files", needs_clip, bl_options=UNDO)
 def use_all_files(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
     smoke.smokelift.last = frame_count(smoke.smokelift.clip)
 
 
-@operator("Match Scene to Clip", needs_clip, base=ChangesScene)
+@operator("Match Scene to Clip", needs_clip, bl_options=UNDO)
 def match_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Set the scene's resolution and frame rate to the clip's, and its length to the result's or its part in use"""
     shot_setup.match_clip(smoke)
 
 
-def _needs_distortion(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    distorted = is_distorted(smoke.smokelift.clip)
-    return "" if distorted else "The clip's lens has no distortion: calibrate it in the Movie Clip Editor"
+_needs_distortion = Need(
+    "The clip's lens has no distortion: calibrate it in the Movie Clip Editor",
+    lambda _, smoke: is_distorted(smoke.smokelift.clip),
+)
 
 
-@operator("Undistort Clip", needs_clip, _needs_distortion, base=ChangesScene)
+@operator("Undistort Clip", needs_clip, _needs_distortion, bl_options=UNDO)
 def undistort(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Write the clip without its lens's distortion, and use that. Blender waits meanwhile"""
     settings = smoke.smokelift
@@ -180,7 +171,7 @@ def undistort(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
         setattr(settings, name, value)
 
 
-@operator("Plate from This Frame", needs_clip, base=ChangesScene)
+@operator("Plate from This Frame", needs_clip, bl_options=UNDO)
 def plate_from_frame(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Take this frame of the clip, in which there is no smoke, as the clean plate. More frames lessen the noise"""
     settings = smoke.smokelift
@@ -191,31 +182,29 @@ def plate_from_frame(_context: bpy.types.Context, smoke: bpy.types.Object) -> No
     settings.plate_frames, settings.plate_mode = ", ".join(chosen), "FRAMES"
 
 
-class SMOKELIFT_OT_choose_picture(ChoosesFile, ChangesScene, bpy.types.Operator):
+def _ask_beside_clip(this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    settings = active_smoke(context.scene).smokelift
+    chosen = getattr(settings, this.setting)
+    this.filepath = str(absolute(chosen)) if chosen else f"{clip_path(settings.clip).parent}{os.sep}"
+    return ChoosesFile.invoke(this, context, event)
+
+
+PICTURE = {"filepath": FILE, "setting": HIDDEN}
+
+
+@operator("Choose Picture", needs_clip, base=ChoosesFile, given=PICTURE, bl_options=UNDO, invoke=_ask_beside_clip)
+def choose_picture(_context: bpy.types.Context, smoke: bpy.types.Object, filepath: str, setting: str) -> None:
     """Choose a picture or a video; those of the clip's folder come first"""
-
-    bl_label = "Choose Picture"
-    needs = (needs_clip,)
-
-    setting: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        settings = active_smoke(context.scene).smokelift
-        chosen = getattr(settings, self.setting)
-        self.filepath = str(absolute(chosen)) if chosen else f"{clip_path(settings.clip).parent}{os.sep}"
-        return super().invoke(context, event)
-
-    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        setattr(smoke.smokelift, self.setting, relative(absolute(self.filepath)))
+    setattr(smoke.smokelift, setting, relative(absolute(filepath)))
 
 
-@operator("Clear Frames", needs_clip, base=ChangesScene)
+@operator("Clear Frames", needs_clip, bl_options=UNDO)
 def clear_plate_frames(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Take none of these frames as the clean plate"""
     smoke.smokelift.plate_frames, smoke.smokelift.plate_mode = "", "ESTIMATE"
 
 
-@operator("New Mask", needs_clip, base=ChangesScene)
+@operator("New Mask", needs_clip, bl_options=UNDO)
 def new_mask(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Draw over the clip, in the Clip Editor, where smoke may be. Where the mask is black there is none"""
     settings = smoke.smokelift
@@ -240,8 +229,7 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
     if not clip_path(clip).is_file():
-        text = iface_("{:s} is not there: choose the clip again.")
-        draw_text(layout, text.format(str(clip_path(clip))), "ERROR")
+        draw_text(layout, "{:s} is not there: choose the clip again.", "ERROR", str(clip_path(clip)))
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
@@ -267,10 +255,10 @@ def _draw_gaps(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
         return
     column = layout.column(align=True)
     if found.missing:
-        draw_text(column, iface_("Missing: {:s}.").format(found.missing_names()), "ERROR")
+        draw_text(column, "Missing: {:s}.", "ERROR", found.missing_names())
     if settings.last < found.count:
-        text = iface_("Blender sees {:d} of {:d} frames.").format(settings.clip.frame_duration, found.count)
-        draw_text(column, text, "BLANK1" if found.missing else "INFO")
+        frames, icon = (settings.clip.frame_duration, found.count), "BLANK1" if found.missing else "INFO"
+        draw_text(column, "Blender sees {:d} of {:d} frames.", icon, *frames)
         column.operator("smokelift.use_all_files")
     else:
         draw_text(column, "A neighboring picture stands in for each.", "BLANK1")
@@ -295,10 +283,4 @@ def draw_picture(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
     row.operator("smokelift.choose_picture", text="", icon="FILEBROWSER").setting = name
 
 
-def register() -> None:
-    """Add the entry to Blender's menu."""
-    bpy.types.VIEW3D_MT_volume_add.append(_draw_add)
-
-
-def unregister() -> None:
-    bpy.types.VIEW3D_MT_volume_add.remove(_draw_add)
+HANDLERS = ((bpy.types.VIEW3D_MT_volume_add, _draw_add),)

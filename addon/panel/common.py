@@ -1,7 +1,7 @@
 """What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -11,91 +11,80 @@ from ..result.side_job import writing_job
 from ..scene import volume
 from ..scene.smoke import active_smoke
 
-EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}
-"""The editors that have the tab in their sidebar."""
+EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}  # the editors that have the tab in their sidebar
+UNDO = {"REGISTER", "UNDO"}  # options of an operator that can be undone, and adjusted
+FILE = StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
+FOLDER = StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
+
+Act = Callable[..., str | None]
+"""Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""
 
 
-Act = Callable[[bpy.types.Context, bpy.types.Object], None]
-"""Does something with the active smoke; ShotError if something is in the way."""
+class Need(NamedTuple):
+    """What something needs that is done with the active smoke, or without one."""
 
-Need = Callable[[bpy.types.Context, bpy.types.Object | None], str]
-"""Why something cannot be done now with the active smoke, or without one; empty where it can."""
-
-
-def needs_smoke(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    return "" if smoke is not None else "Add smoke first"
+    why: str  # it cannot be done otherwise
+    is_there: Callable[[bpy.types.Context, bpy.types.Object | None], Any]
 
 
-def needs_clip(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    return "" if smoke is not None and smoke.smokelift.clip is not None else "Choose a clip first"
-
-
-def needs_result(_context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    return "" if smoke is not None and volume.shown_take(smoke) is not None else "Make smoke first"
-
-
-def needs_rest(_context: bpy.types.Context, _smoke: bpy.types.Object | None) -> str:
-    return "Other files are being written: wait for them, or cancel that" if writing_job.writing else ""
+needs_smoke = Need("Add smoke first", lambda _, smoke: smoke)
+needs_clip = Need("Choose a clip first", lambda _, smoke: smoke and smoke.smokelift.clip)
+needs_result = Need("Make smoke first", lambda _, smoke: smoke and volume.shown_take(smoke))
+needs_rest = Need("Other files are being written: wait for them, or cancel that", lambda *_: not writing_job.writing)
 
 
 class Needing:
-    """What Blender offers only where nothing that it needs is missing; the first that is says so."""
+    """What Blender offers only where nothing that it needs is missing; the first that is says so.
+
+    Its identifier is that of its class.
+    """
 
     needs: Sequence[Need] = ()
+
+    def __init_subclass__(cls) -> None:
+        cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         smoke = active_smoke(context.scene)
-        why = next((why for need in cls.needs if (why := need(context, smoke))), "")
+        why = next((need.why for need in cls.needs if not need.is_there(context, smoke)), "")
         if why and issubclass(cls, bpy.types.Operator):  # a panel is left out in silence
             cls.poll_message_set(why)
         return not why
 
 
-class ActsOnSmoke(Needing):
-    """An operator on the active smoke, which reports what is in the way. Its identifier is that of its class."""
-
-    bl_idname: str
-    needs: Sequence[Need] = (needs_smoke,)
-
-    def __init_subclass__(cls) -> None:
-        cls.bl_idname = cls.__name__.replace("SMOKELIFT_OT_", "smokelift.")
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        """Do it; ShotError if something is in the way."""
-        raise NotImplementedError
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            self.act(context, active_smoke(context.scene))
-        except ShotError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
-
-
-class ChangesScene(ActsOnSmoke):
-    """One that can be undone, and adjusted."""
-
-    bl_options: ClassVar = {"REGISTER", "UNDO"}
-
-
-def operator(label: str, *needs: Need, base: type = ActsOnSmoke, **attributes: Any) -> Callable[[Act], type]:
+def operator(
+    label: str, *needs: Need, base: type = Needing, given: Mapping[str, Any] | None = None, **attributes: Any
+) -> Callable[[Act], type]:
     """Make an operator of what it does: the class SMOKELIFT_OT_NAME, with the function's name and docstring.
 
     Its button says the label, and it can be used where nothing is missing that it needs. It has the base and
-    further attributes.
+    further attributes. What it is ``given``, Blender's properties, the function gets by their names.
     """
 
     def made(act: Act) -> type:
-        own = {"__module__": act.__module__, "__doc__": act.__doc__, "bl_label": label, "needs": needs, **attributes}
-        own["act"] = lambda _operator, context, smoke: act(context, smoke)
+        def execute(this: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+            values = {name: getattr(this, name) for name in given or ()}
+            try:
+                said = act(context, active_smoke(context.scene), **values)
+            except ShotError as error:
+                this.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            if said:
+                this.report({"INFO"}, said)
+            return {"FINISHED"}
+
+        own = {"__module__": act.__module__, "__doc__": act.__doc__, "__annotations__": given or {}, **attributes}
+        own |= {"bl_label": label, "needs": needs, "execute": execute}
         return type(f"SMOKELIFT_OT_{act.__name__}", (base, bpy.types.Operator), own)
 
     return made
 
 
-class _OpensFileBrowser:
+class OpensBrowser(Needing):
+    """One that asks for a folder, or a file."""
+
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -103,46 +92,41 @@ class _OpensFileBrowser:
         return {"RUNNING_MODAL"}
 
 
-class ChoosesFile(_OpensFileBrowser):
-    """An operator that asks for a picture or a video."""
+class ChoosesFile(OpensBrowser):
+    """One that asks for a picture or a video."""
 
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
 
-class ChoosesFolder(_OpensFileBrowser):
-    """An operator that asks for a folder."""
-
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]  # draws the tab or a part of it
 
 
-Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]
-"""Draws the tab or a part of it for the active smoke."""
-
-
-def panels(name: str, label: str, draw: Draw, *needs: Need, **attributes: Any) -> tuple[type, ...]:
-    """The panels of the tab in both editors, whose classes have further attributes.
+def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[Draw], tuple[type, ...]]:
+    """Make of what draws it a panel of the tab in both editors, whose classes have further attributes.
 
     Blender knows them as SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME. Without a name it is the tab itself,
     with one a part of it, closed at first. Names of settings are drawn on their left. It is shown where nothing is
     missing that it needs.
     """
 
-    def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
-        panel.layout.use_property_split = True
-        panel.layout.use_property_decorate = False
-        draw(panel.layout, context, active_smoke(context.scene))
+    def made(draw: Draw) -> tuple[type, ...]:
+        def draw_panel(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
+            panel.layout.use_property_split = True
+            panel.layout.use_property_decorate = False
+            draw(panel.layout, context, active_smoke(context.scene))
 
-    made = []
-    for editor, space in EDITORS.items():
-        tab = f"SMOKELIFT_PT_{editor}"
-        own = {"__module__": draw.__module__, "draw": draw_panel, "needs": needs, **attributes}
-        own |= {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "Smokelift", "bl_label": label}
-        if name:
-            own |= {"bl_parent_id": tab, "bl_options": {"DEFAULT_CLOSED"}}
-        made.append(type(f"{tab}_{name}" if name else tab, (Needing, bpy.types.Panel), own))
-    return tuple(made)
+        classes = []
+        for editor, space in EDITORS.items():
+            tab = f"SMOKELIFT_PT_{editor}"
+            own = {"__module__": draw.__module__, "draw": draw_panel, "needs": needs, **attributes}
+            own |= {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "Smokelift", "bl_label": label}
+            if name:
+                own |= {"bl_parent_id": tab, "bl_options": {"DEFAULT_CLOSED"}}
+            classes.append(type(f"{tab}_{name}" if name else tab, (Needing, bpy.types.Panel), own))
+        return tuple(classes)
+
+    return made
 
 
 def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

@@ -9,15 +9,12 @@ from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import ChangesScene, needs_clip, needs_result, operator, panels, speed_changed
+from .common import UNDO, Need, needs_clip, needs_result, operator, panels, speed_changed
 from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
 from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
-LINES = 11
-"""Lines of the longest direction: the others are as high, or the panel's buttons would move under the pointer."""
-
-EFFECTORS = "Effectors"
-"""Name of a collection that the tab makes."""
+LINES = 11  # of the longest direction: the others are as high, or buttons would move under the pointer
+EFFECTORS = "Effectors"  # name of a collection that the tab makes
 
 
 def _start_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -46,11 +43,9 @@ class DirectSettings:
     direction: choice(
         "Direction",
         "What is made of the result on show",
-        [
-            ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
-            ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
-            ("loop", "Loop", "Repeat the smoke without a seam"),
-        ],
+        ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
+        ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
+        ("loop", "Loop", "Repeat the smoke without a seam"),
     )
     frames: whole("Frames", "Number of frames to add", default=48, min=1, max=100_000)
     fade: whole("Fade", "Frames at the end in which the smoke fades to nothing", min=0)
@@ -135,11 +130,10 @@ def _may_act(context: bpy.types.Context, smoke: bpy.types.Object) -> list[bpy.ty
     return [obj for obj in context.selected_objects if obj != box and obj.type in {*MESHES, "EMPTY"}]
 
 
-def _needs_effector(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    return "" if _may_act(context, smoke) else "Select a mesh, a Wind or Turbulence force field, or an Empty"
+_needs_effector = Need("Select a mesh, a Wind or Turbulence force field, or an Empty", _may_act)
 
 
-@operator("Add Selected to Effectors", needs_result, _needs_effector, base=ChangesScene)
+@operator("Add Selected to Effectors", needs_result, _needs_effector, bl_options=UNDO)
 def add_effectors(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
     settings = smoke.smokelift.directing
@@ -151,6 +145,7 @@ def add_effectors(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
             settings.effectors.objects.link(obj)
 
 
+@panels("direct", "Direct", needs_result)
 def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift.directing
     row = layout.row()
@@ -198,6 +193,3 @@ def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 
 
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
-
-
-PANELS = panels("direct", "Direct", _draw_direct, needs_result)

@@ -6,42 +6,34 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..core.take import Take
 from ..result.shot_check import state
-from .common import ActsOnSmoke, needs_clip, operator
+from .common import HIDDEN, Need, needs_clip, needs_smoke, operator
 
-DRAWN_SECONDS = 0.3
-"""After which a new window has been drawn."""
-
-LONGEST_OPENING = 5.0
-"""Seconds in which a sidebar is drawn for the first time."""
+DRAWN_SECONDS = 0.3  # after which a new window has been drawn
+LONGEST_OPENING = 5.0  # seconds in which a sidebar is drawn for the first time
 
 LOG_TEXT = "Smokelift Log"
 
 
-class SMOKELIFT_OT_open_log(ActsOnSmoke, bpy.types.Operator):
+@operator("Open Log", needs_smoke, given={"take": HIDDEN})
+def open_log(_context: bpy.types.Context, _smoke: bpy.types.Object, take: str) -> None:
     """Show the log of the run in a text editor"""
-
-    bl_label = "Open Log"
-
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def act(self, _context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
-        log = Take(Path(self.take)).log_file
-        if not log.is_file():
-            raise ShotError(rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
-        text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
-        text.from_string(log.read_text(encoding="utf-8", errors="replace"))
-        if not bpy.app.background:
-            space = _editor("TEXT_EDITOR").spaces.active
-            space.text, space.top = text, 0
+    log = Take(Path(take)).log_file
+    if not log.is_file():
+        raise ShotError(rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
+    text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
+    text.from_string(log.read_text(encoding="utf-8", errors="replace"))
+    if not bpy.app.background:
+        space = _editor("TEXT_EDITOR").spaces.active
+        space.text, space.top = text, 0
 
 
-def _needs_page(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    return "" if state.fits(smoke) and state.done and Path(state.page).is_file() else "Check the shot first"
+_needs_page = Need(
+    "Check the shot first", lambda _, smoke: state.fits(smoke) and state.done and Path(state.page).is_file()
+)
 
 
 @operator("Report", needs_clip, _needs_page)
@@ -64,7 +56,6 @@ def show_image(image: bpy.types.Image, mode: str = "VIEW") -> None:
     space = area.spaces.active
     space.mode, space.image = mode, image
     space.display_channels = "COLOR" if mode == "PAINT" else "COLOR_ALPHA"
-    bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     if mode == "PAINT":
         open_tab(area)
 
@@ -78,7 +69,6 @@ def show_clip(clip: bpy.types.MovieClip, mask: bpy.types.Mask | None = None) -> 
     space.clip, space.mode = clip, "TRACKING" if mask is None else "MASK"
     if mask is not None:
         space.mask = mask
-    bpy.app.timers.register(functools.partial(_fit, area.as_pointer()), first_interval=DRAWN_SECONDS)
     open_tab(area)
 
 
@@ -87,7 +77,7 @@ def _windows_and_areas() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
 
 
 def _fit(area_pointer: int) -> None:
-    """Show the whole of what an editor has; a timer, as a window has no size before it is drawn."""
+    """Show the whole of a picture or clip in an editor; a timer, as a window has no size before it is drawn."""
     for window, area in _windows_and_areas():
         if area.as_pointer() == area_pointer and area.type in ("IMAGE_EDITOR", "CLIP_EDITOR"):
             region = next(region for region in area.regions if region.type == "WINDOW")
@@ -97,7 +87,7 @@ def _fit(area_pointer: int) -> None:
 
 
 def _editor(kind: str, mode: str = "") -> bpy.types.Area:
-    """An editor of a kind, and of a mode if it has some; in a window of its own if there is none."""
+    """An editor of a kind, and of a mode if it has some; in a window of its own if there is none. All is shown soon."""
     manager = bpy.context.window_manager
     areas = (area for _, area in _windows_and_areas() if area.type == kind)
     found = next((area for area in areas if mode in ("", area.spaces.active.mode)), None)
@@ -106,6 +96,7 @@ def _editor(kind: str, mode: str = "") -> bpy.types.Area:
             bpy.ops.wm.window_new()
         found = manager.windows[-1].screen.areas[0]
         found.type = kind
+    bpy.app.timers.register(functools.partial(_fit, found.as_pointer()), first_interval=DRAWN_SECONDS)
     return found
 
 

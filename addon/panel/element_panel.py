@@ -19,22 +19,17 @@ from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
 from ..scene.strokes import lay_below, new_strokes, saved_strokes
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_rest, operator, panels
+from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work
 from .settings import choice
 
-STROKES_FILE = "strokes.png"
-"""Name of the image in the folder of the smoke's results."""
-
-COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}
-"""What the engine takes the colors for."""
-
-PICTURES = "element_####.exr"
-"""Names of the pictures, numbered as the frames of the clip's file."""
+STROKES_FILE = "strokes.png"  # name of the image in the folder of the smoke's results
+COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}  # the engine's
+PICTURES = "element_####.exr"  # names of the pictures, numbered as the frames of the clip's file
 
 
-@operator("Paint Strokes", needs_clip, base=ChangesScene)
+@operator("Paint Strokes", needs_clip, bl_options=UNDO)
 def paint_strokes(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Paint on this frame of the clip where smoke is, where none is, and where the background is seen"""
     now, settings = context.scene.frame_current, smoke.smokelift
@@ -62,26 +57,19 @@ def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
     return image
 
 
-class SMOKELIFT_OT_stroke(bpy.types.Operator):
+MEANS = choice(
+    "Means",
+    "What is painted",
+    ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
+    ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
+    ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
+)
+
+
+@operator("Stroke", given={"means": MEANS}, bl_options={"INTERNAL"})
+def stroke(context: bpy.types.Context, _smoke: bpy.types.Object | None, means: str) -> None:
     """Paint in the color that says this. With Ctrl, strokes are erased"""
-
-    bl_idname = "smokelift.stroke"
-    bl_label = "Stroke"
-    bl_options = {"INTERNAL"}
-
-    means: choice(
-        "Means",
-        "What is painted",
-        [
-            ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
-            ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),
-            ("BEHIND", "Behind", "The background is seen here as it is", "COLORSET_04_VEC", 2),
-        ],
-    )
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        _choose_color(context, self.means)
-        return {"FINISHED"}
+    _choose_color(context, means)
 
 
 def _choose_color(context: bpy.types.Context, means: str) -> None:
@@ -115,10 +103,7 @@ class SMOKELIFT_PT_strokes(bpy.types.Panel):
 
 
 def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
-    """The engine's arguments for the element of all used frames; its scene file lies among Blender's own.
-
-    ShotError if the folder cannot be written to.
-    """
+    """The engine's arguments for the element of all used frames; ShotError if the folder cannot be written to."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -145,18 +130,14 @@ def extract(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     write_files(smoke, "smokelift.extract", words, show)
 
 
-class SMOKELIFT_OT_render_element(ChoosesFolder, ActsOnSmoke, bpy.types.Operator):
+@operator("Render Element", needs_rest, needs_clip, base=OpensBrowser, given={"directory": FOLDER})
+def render_element(_context: bpy.types.Context, smoke: bpy.types.Object, directory: str) -> None:
     """Write the smoke of all frames by itself, with alpha, as an image sequence (OpenEXR, linear, premultiplied)"""
-
-    bl_label = "Render Element"
-    needs = (needs_rest, needs_clip)
-
-    def act(self, _context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        folder = Path(self.directory)
-        said = rpt_("The element is in {:s}.").format(str(folder))
-        write_files(smoke, self.bl_idname, _extract_request(smoke, folder), lambda _smoke: said)
+    said = rpt_("The element is in {:s}.").format(str(Path(directory)))
+    write_files(smoke, "smokelift.render_element", _extract_request(smoke, Path(directory)), lambda _smoke: said)
 
 
+@panels("element", "Element", needs_clip)
 def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     layout.use_property_split = False
     row = layout.row(align=True)
@@ -164,6 +145,3 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
     draw_work(layout, smoke, "smokelift.extract", "IMAGE_RGB_ALPHA")
     draw_work(layout, smoke, "smokelift.render_element", "RENDER_ANIMATION")
-
-
-PANELS = panels("element", "Element", _draw_element, needs_clip)

@@ -2,11 +2,12 @@
 
 import bpy
 
-from ..result.export import arguments, copy_later, folder_of, size_estimate, write_asset
+from ..result.export import arguments, copy_of, folder_of, size_estimate, write_asset
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
-from .common import Needing, needs_rest, needs_result, needs_smoke, operator, panels
+from ..scene.smoke import activate
+from .common import UNDO, Need, needs_rest, needs_result, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text, draw_work
 from .settings import choice, string, tick, whole
 
@@ -23,29 +24,23 @@ class ExportSettings:
     host: choice(
         "For",
         "Program that reads the files",
-        [
-            ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
-            ("houdini", "Houdini", "Y up, grids density and vel"),
-            ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
-        ],
+        ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
+        ("houdini", "Houdini", "Y up, grids density and vel"),
+        ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
     )
     precision: choice(
         "Precision",
         "Bits of each value. Smoke too thin to be seen is left out either way",
-        [
-            ("half", "Half", "Floats of 16 bits"),
-            ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
-        ],
+        ("half", "Half", "Floats of 16 bits"),
+        ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
     )
     use_velocity: tick("Velocity", "Export the velocity, which motion blur needs", default=True)
     proxy: choice(
         "Proxy",
         "Second, coarser sequence for the viewports of those who get the export",
-        [
-            ("1", "None", "No proxy"),
-            ("2", "1/2", "Half the resolution, an eighth of the voxels"),
-            ("4", "1/4", "A quarter of the resolution"),
-        ],
+        ("1", "None", "No proxy"),
+        ("2", "1/2", "Half the resolution, an eighth of the voxels"),
+        ("4", "1/4", "A quarter of the resolution"),
     )
 
 
@@ -76,6 +71,7 @@ def stop_writing(_context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
     writing_job.stop()
 
 
+@panels("export", "Export", needs_result)
 def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift_export
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
@@ -85,34 +81,24 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 
-def _needs_sequence(context: bpy.types.Context, _smoke: bpy.types.Object | None) -> str:
-    obj = context.object
-    if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
-        return "Select a Volume that plays a sequence"
-    driven = obj.data.animation_data is not None and obj.data.animation_data.drivers
-    return "Set Speed to Frame by Frame first" if driven else ""
+def _is_driven(obj: bpy.types.Object) -> bool:
+    return obj.data.animation_data is not None and len(obj.data.animation_data.drivers) > 0
 
 
-class SMOKELIFT_OT_add_instance(Needing, bpy.types.Operator):
+_needs_sequence = Need(
+    "Select a Volume that plays a sequence",
+    lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
+)
+_needs_no_driver = Need("Set Speed to Frame by Frame first", lambda context, _: not _is_driven(context.object))
+IN_TIME = {
+    "offset": whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12),
+    "repeat": tick("Repeat", "Play the frames again and again, as for a loop"),
+}
+
+
+@operator("Instance in Time", _needs_sequence, _needs_no_driver, bl_options=UNDO, given=IN_TIME)
+def add_instance(context: bpy.types.Context, _smoke: bpy.types.Object | None, offset: int, repeat: bool) -> None:
     """Add another object that plays the active Volume's files later or earlier. The material is shared"""
-
-    bl_idname = "smokelift.add_instance"
-    bl_label = "Instance in Time"
-    bl_options = {"REGISTER", "UNDO"}
-    needs = (_needs_sequence,)
-
-    offset: whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12)
-    repeat: tick("Repeat", "Play the frames again and again, as for a loop")
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.object
-        instance = copy_later(obj, obj.name, self.offset, self.repeat)
-        context.collection.objects.link(instance)
-        for other in context.selected_objects:
-            other.select_set(False)
-        instance.select_set(True)
-        context.view_layer.objects.active = instance
-        return {"FINISHED"}
-
-
-PANELS = panels("export", "Export", _draw_export, needs_result)
+    instance = copy_of(context.object, offset, repeat)
+    context.collection.objects.link(instance)
+    activate(instance, context.scene)

@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -11,11 +12,8 @@ from ..core.job import Job
 from ..core.sentences import REMEDIES, advice, duration, repeats
 from ..result.side_job import writing_job
 
-POINTS_PER_LETTER = 6.5
-"""Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
-
-NEW_WIDTH = 258
-"""Points of the sidebar in a new window; those of a sidebar that is not drawn."""
+POINTS_PER_LETTER = 6.5  # mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels
+NEW_WIDTH = 258  # points of the sidebar in a new window; those of a sidebar that is not drawn
 
 
 def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
@@ -59,10 +57,7 @@ def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.t
 
 
 def draw_doubts(
-    layout: bpy.types.UILayout,
-    smoke: bpy.types.Object,
-    doubts: Iterable[tuple[str, str]],
-    said: set[str],
+    layout: bpy.types.UILayout, smoke: bpy.types.Object, doubts: Iterable[tuple[str, str]], said: set[str]
 ) -> None:
     """Why a result may be wrong, what is left to do about it, and the button that does it.
 
@@ -103,9 +98,9 @@ def draw_hint(layout: bpy.types.UILayout, words: str, operator: str, icon: str =
     column.operator(operator, icon=icon)
 
 
-def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
-    """A label in the user's language, wrapped to the sidebar's width."""
-    text = iface_(text)
+def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", *figures: Any) -> None:
+    """A label in the user's language, into which the figures are put, wrapped to the sidebar's width."""
+    text = iface_(text).format(*figures) if figures else iface_(text)
     region = bpy.context.region
     width = NEW_WIDTH if region is None else region.width / bpy.context.preferences.system.ui_scale
     lines = textwrap.wrap(text, max(16, int((width - (50.0 if icon == "NONE" else 70.0)) / POINTS_PER_LETTER)))

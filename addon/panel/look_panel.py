@@ -6,38 +6,33 @@ from ..core import ShotError
 from ..scene import look, volume
 from ..scene.modifiers import PROXY, in_viewport
 from ..scene.smoke import is_override, smoke_with_look
-from .common import ChangesScene, needs_result, panels
+from .common import UNDO, Need, needs_result, operator, panels
 from .layout import draw_text, draw_work
 from .settings import choice
 
-SHORT = {"Absorption Color": "Absorption"}
-"""Names of inputs that the sidebar would cut off."""
+SHORT = {"Absorption Color": "Absorption"}  # names of inputs that the sidebar would cut off
 
 
-def _needs_look(context: bpy.types.Context, smoke: bpy.types.Object | None) -> str:
-    """Also a smoke that is linked from another file can be changed so."""
-    return "" if is_override(smoke_with_look(context.scene)) else needs_result(context, smoke)
+# also a smoke that is linked from another file can be changed so
+_needs_look = Need(
+    needs_result.why,
+    lambda context, smoke: is_override(smoke_with_look(context.scene)) or needs_result.is_there(context, smoke),
+)
+PRESETS = [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
 
 
-class SMOKELIFT_OT_use_look(ChangesScene, bpy.types.Operator):
+@operator("Use Look", _needs_look, bl_options=UNDO, given={"preset": choice("Preset", "Kind of smoke", *PRESETS)})
+def use_look(context: bpy.types.Context, _smoke: bpy.types.Object, preset: str) -> None:
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
-
-    bl_label = "Use Look"
-    needs = (_needs_look,)
-
-    preset: choice(
-        "Preset", "Kind of smoke", [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
-    )
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        smoke = smoke_with_look(context.scene)
-        index = volume.shown_take(smoke).read().index
-        if index is None:
-            raise ShotError("The smoke's files are missing: make it again.")
-        if not look.use_preset(smoke, self.preset, index["scene"]["medium"]["anisotropy"]):
-            raise ShotError("The smoke's material is your own: remove it and show the result again for presets.")
+    smoke = smoke_with_look(context.scene)
+    index = volume.shown_take(smoke).read().index
+    if index is None:
+        raise ShotError("The smoke's files are missing: make it again.")
+    if not look.use_preset(smoke, preset, index["scene"]["medium"]["anisotropy"]):
+        raise ShotError("The smoke's material is your own: remove it and show the result again for presets.")
 
 
+@panels("look", "Look", _needs_look)
 def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     smoke = smoke_with_look(context.scene)
     layout.use_property_decorate = True  # the look may be animated
@@ -77,8 +72,4 @@ def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.active = not may_choose or cycles.volume_biased
     row.prop(smoke.data.render, "step_size", text="Render Step")
     if may_choose and not cycles.volume_biased:
-        text = "Marching has less noise per sample, but its steps make an error."
-        draw_text(column, text, "INFO")
-
-
-PANELS = panels("look", "Look", _draw_look, _needs_look)
+        draw_text(column, "Marching has less noise per sample, but its steps make an error.", "INFO")

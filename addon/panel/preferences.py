@@ -10,29 +10,16 @@ from ..core import ShotError
 from ..core.contract import QUALITIES
 from ..scene.blender import PACKAGE
 from ..scene.smoke import is_smoke
-from .common import Needing, operator
+from .common import Need, Needing, operator
 from .layout import draw_automatic, draw_settings
 from .settings import automatic_unless, choice, string, whole
 
-MANUAL = Path(__file__).parents[1] / "manual" / "index.html"
-"""The manual, which the extension brings along."""
-
-FOLDER = "smokelift"
-"""Below the user's folder of presets."""
+MANUAL = Path(__file__).parents[1] / "manual" / "index.html"  # the manual, which the extension brings along
+FOLDER = "smokelift"  # below the user's folder of presets
 
 SETTINGS = (
-    "quality",
-    "detail",
-    "light_mode",
-    "closed",
-    "longest_side",
-    "transfer",
-    "speed",
-    "device",
-    "use_medium",
-    "extinction",
-    "albedo",
-    "anisotropy",
+    *("quality", "detail", "light_mode", "closed", "longest_side", "transfer", "speed", "device"),
+    *("use_medium", "extinction", "albedo", "anisotropy"),
 )
 """What does not belong to one clip: no paths, no objects, no frames."""
 
@@ -48,7 +35,7 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
     quality: choice(
-        "Quality", "Quality of new smokes", [(name, name.capitalize(), "") for name in QUALITIES], default="balanced"
+        "Quality", "Quality of new smokes", *[(name, name.capitalize(), "") for name in QUALITIES], default="balanced"
     )
     threads: whole(
         "Threads",
@@ -87,9 +74,8 @@ class SMOKELIFT_PT_presets(PresetPanel, bpy.types.Panel):
 class SMOKELIFT_OT_add_preset(Needing, AddPresetBase, bpy.types.Operator):
     """Keep the settings of the active smoke as a preset, or remove one"""
 
-    bl_idname = "smokelift.add_preset"
     bl_label = "Add Smoke Preset"
-    needs = (lambda context, _smoke: "" if is_smoke(context.object) else "Select the smoke first",)
+    needs = (Need("Select the smoke first", lambda context, _: is_smoke(context.object)),)
     preset_menu = "SMOKELIFT_PT_presets"
     preset_subdir = FOLDER
     # a preset is a script of Blender's, which knows the active object but not this add-on

@@ -10,11 +10,8 @@ from .common import needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_text
 from .settings import automatic_unless, choice, number, whole
 
-SEEDS = 2**31
-"""Numbers of variations: as many as Blender's whole numbers have from 0."""
-
-CELLS = 0.245, 0.215, 0.18, 0.18
-"""Fractions of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
+SEEDS = 2**31  # numbers of variations: as many as Blender's whole numbers have from 0
+CELLS = 0.245, 0.215, 0.18, 0.18  # fractions of a line: button, time, memory, disk; the rest is what is lost
 
 
 class QualitySettings:
@@ -24,16 +21,10 @@ class QualitySettings:
         "Quality",
         "More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the fraction of the contrast of the "
         "clip's smoke that is finer than the voxels",
-        [
-            ("draft", "Draft", "A quick preview"),
-            ("balanced", "Balanced", "Good for most shots"),
-            ("fine", "Fine", "More of the clip's detail, several times slower"),
-            (
-                "final",
-                "Final",
-                "All of the clip's detail, one voxel per pixel: much memory, seconds to minutes per frame",
-            ),
-        ],
+        ("draft", "Draft", "A quick preview"),
+        ("balanced", "Balanced", "Good for most shots"),
+        ("fine", "Fine", "More of the clip's detail, several times slower"),
+        ("final", "Final", "All of the clip's detail, one voxel per pixel: much memory, seconds to minutes per frame"),
         default="balanced",
     )
     detail: number(
@@ -61,11 +52,9 @@ class QualitySettings:
     device: choice(
         "Device",
         "Device that renders",
-        [
-            ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
-            ("cpu", "CPU", "The CPU only"),
-            ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
-        ],
+        ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
+        ("cpu", "CPU", "The CPU only"),
+        ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
     )
 
 
@@ -135,8 +124,8 @@ def draw_check(layout: bpy.types.UILayout, smoke: bpy.types.Object, said: set[st
     elif state.done:
         cost = state.costs(smoke)[smoke.smokelift.quality]
         if cost["memory"] > cost["memory_free"]:
-            text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(layout, text.format(cost["memory_free"] / 2**30), "ERROR")
+            gigabytes = cost["memory_free"] / 2**30
+            draw_text(layout, "Only {:.1f} GiB are free: choose a lower quality.", "ERROR", gigabytes)
         draw_doubts(layout, smoke, state.doubts, said)
 
 

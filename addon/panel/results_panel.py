@@ -14,122 +14,100 @@ from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
 from ..scene.blender import absolute, redraw
-from .common import ActsOnSmoke, ChangesScene, ChoosesFolder, needs_clip, needs_result, panels
+from .common import FOLDER, HIDDEN, UNDO, OpensBrowser, needs_clip, needs_result, needs_smoke, operator, panels
 from .layout import draw_text
 
 
-class _OnResult:
-    """An operator on one result."""
-
-    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def result(self) -> Take:
-        """The result; ShotError if it has no finished frame."""
-        take = Take(Path(self.take))
-        if not take.read().frames:
-            raise ShotError(rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
-        return take
+def _finished(directory: str) -> Take:
+    """The result in a directory; ShotError if it has no finished frame."""
+    take = Take(Path(directory))
+    if not take.read().frames:
+        raise ShotError(rpt_("There is no finished frame in {:s}.").format(directory))
+    return take
 
 
-class SMOKELIFT_OT_show_take(_OnResult, ChangesScene, bpy.types.Operator):
+@operator("Show Result", needs_clip, bl_options=UNDO, given={"take": HIDDEN})
+def show_take(_context: bpy.types.Context, smoke: bpy.types.Object, take: str) -> None:
     """Show this result in the smoke. Its place and its material stay as they are"""
-
-    bl_label = "Show Result"
-    needs = (needs_clip,)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        smoke_takes.choose(smoke, self.result())
+    smoke_takes.choose(smoke, _finished(take))
 
 
-class SMOKELIFT_OT_show_beside(_OnResult, ChangesScene, bpy.types.Operator):
+@operator("Show Beside", needs_result, bl_options=UNDO, given={"take": HIDDEN})
+def show_beside(_context: bpy.types.Context, smoke: bpy.types.Object, take: str) -> None:
     """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
-
-    bl_label = "Show Beside"
-    needs = (needs_result,)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        volume.show_beside(smoke, self.result())
+    volume.show_beside(smoke, _finished(take))
 
 
-class SMOKELIFT_OT_choose_results(ChoosesFolder, ChangesScene, bpy.types.Operator):
+@operator("Choose Moved Folder", needs_result, base=OpensBrowser, given={"directory": FOLDER}, bl_options=UNDO)
+def choose_results(_context: bpy.types.Context, smoke: bpy.types.Object, directory: str) -> None:
     """Choose the folder that the smoke's results were moved to"""
-
-    bl_label = "Choose Moved Folder"
-    needs = (needs_result,)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        smoke_takes.move_results(smoke, absolute(self.directory))
+    smoke_takes.move_results(smoke, absolute(directory))
 
 
-class SMOKELIFT_OT_name_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
+def _ask_name(this: bpy.types.Operator, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+    this.title = Take(Path(this.take)).read().title
+    return context.window_manager.invoke_props_dialog(this)
+
+
+NAMED = {"take": HIDDEN, "title": StringProperty(name="Name", options={"SKIP_SAVE"})}
+
+
+@operator("Name Result", needs_smoke, given=NAMED, invoke=_ask_name)
+def name_take(_context: bpy.types.Context, _smoke: bpy.types.Object, take: str, title: str) -> None:
     """Give this result a name"""
-
-    bl_label = "Name Result"
-
-    title: StringProperty(name="Name", options={"SKIP_SAVE"})
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        self.title = Take(Path(self.take)).read().title
-        return context.window_manager.invoke_props_dialog(self)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        Take(Path(self.take)).give_title(self.title)
-        redraw()
-
-
-class SMOKELIFT_OT_remove_take(_OnResult, ActsOnSmoke, bpy.types.Operator):
-    """Delete the files of this result"""
-
-    bl_label = "Delete Result?"
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        take = Take(Path(self.take))
-        return _confirm(self, context, event, [take], *consequences(context, take))
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = Take(Path(self.take))
-        if take.directory.resolve() in directories_in_use():
-            raise ShotError("A Volume shows this result, or a run needs it: show another one first.")
-        take.remove()
-
-
-class SMOKELIFT_OT_remove_takes(ActsOnSmoke, bpy.types.Operator):
-    """Delete results that nothing needs."""
-
-    bl_description = (
-        "Delete the files of the results before the one on show. What a Volume of this file shows, what another result "
-        "was made of and what other files may show stays"
-    )
-    bl_label = "Delete Earlier Results?"
-    needs = (needs_clip,)
-
-    asked: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        removable = earlier_takes(context)
-        self.asked = "\n".join(str(take.directory) for take in removable)
-        return _confirm(self, context, event, removable)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        for take in earlier_takes(context):
-            if not self.asked or str(take.directory) in self.asked.split("\n"):
-                take.remove()
+    Take(Path(take)).give_title(title)
+    redraw()
 
 
 def _confirm(
-    operator: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event, removable: list[Take], *said: str
+    this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event, removable: list[Take], *said: str
 ) -> set[str]:
     """Ask before takes are deleted: their names, how large they are, and what else there is to be said."""
     named = rpt_("{:s}: {:s}.").format(", ".join(take.read().title for take in removable), _size(removable))
     options = {"message": " ".join([named, *said]), "confirm_text": "Delete", "icon": "WARNING"}
-    return context.window_manager.invoke_confirm(operator, event, **options)
+    return context.window_manager.invoke_confirm(this, event, **options)
+
+
+def _confirm_one(this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    take = Take(Path(this.take))
+    return _confirm(this, context, event, [take], *consequences(context, take))
+
+
+@operator("Delete Result?", needs_smoke, given={"take": HIDDEN}, invoke=_confirm_one)
+def remove_take(_context: bpy.types.Context, _smoke: bpy.types.Object, take: str) -> None:
+    """Delete the files of this result"""
+    if Take(Path(take)).directory.resolve() in directories_in_use():
+        raise ShotError("A Volume shows this result, or a run needs it: show another one first.")
+    Take(Path(take)).remove()
+
+
+def _confirm_earlier(this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    removable = earlier_takes(context)
+    this.asked = "\n".join(str(take.directory) for take in removable)
+    return _confirm(this, context, event, removable)
+
+
+DESCRIPTION = (
+    "Delete the files of the results before the one on show. What a Volume of this file shows, what another result "
+    "was made of and what other files may show stays"
+)
+
+
+@operator(
+    "Delete Earlier Results?", needs_clip, given={"asked": HIDDEN}, invoke=_confirm_earlier, bl_description=DESCRIPTION
+)
+def remove_takes(context: bpy.types.Context, _smoke: bpy.types.Object, asked: str) -> None:
+    """Delete results that nothing needs."""
+    for take in earlier_takes(context):
+        if not asked or str(take.directory) in asked.split("\n"):
+            take.remove()
 
 
 def _size(takes: list[Take]) -> str:
-    """How much disk takes occupy, in words."""
     return disk_size(sum(take.size() for take in takes))
 
 
+@panels("results", "Results", needs_clip)
 def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     shown = volume.shown_take(smoke)
     found = [take for take in smoke_takes.own_takes(smoke) if take.read().frames]
@@ -147,12 +125,9 @@ def _draw_results(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
         text = iface_("Show {:s} Beside").format(other.read().title)
         column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = name
     if found:
-        draw_text(layout, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
+        draw_text(layout, "In {:s}", "FILE_FOLDER", str(smoke_takes.output_folder(smoke)))
     removable = earlier_takes(context)
     row = layout.row()
     row.enabled = bool(removable)
     text = iface_("Delete Earlier Results: {:s}").format(_size(removable))
     row.operator("smokelift.remove_takes", text=text, translate=False)
-
-
-PANELS = panels("results", "Results", _draw_results, needs_clip)

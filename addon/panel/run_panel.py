@@ -13,7 +13,7 @@ from ..result.smoke_takes import Run, runs
 from ..scene import volume
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import find_smoke
-from .common import needs_clip, operator
+from .common import Need, needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_hint, draw_progress, draw_text
 from .quality_panel import SEEDS, draw_check
 
@@ -24,9 +24,10 @@ def run(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     run_queue.enqueue(smoke, smoke_takes.write_take(smoke), settings_text(smoke))
 
 
-def _needs_detail(_context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    only_one = smoke.smokelift.detail == 0.0
-    return "Without detail in depth there is only one smoke: raise Depth Detail first" if only_one else ""
+_needs_detail = Need(
+    "Without detail in depth there is only one smoke: raise Depth Detail first",
+    lambda _, smoke: smoke.smokelift.detail > 0.0,
+)
 
 
 @operator("Another Variation", needs_clip, _needs_detail, bl_options={"UNDO"})
@@ -78,8 +79,8 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
     if index is not None:
         _draw_shown(layout, context, smoke, index)
     elif (take := volume.shown_take(smoke)) is not None:
-        text = iface_("The files of the smoke in {:s} are missing: make it again, or choose their folder.")
-        draw_text(layout, text.format(str(take.directory)), "ERROR")
+        text = "The files of the smoke in {:s} are missing: make it again, or choose their folder."
+        draw_text(layout, text, "ERROR", str(take.directory))
         layout.operator("smokelift.choose_results", icon="FILE_FOLDER")
 
 
@@ -87,8 +88,8 @@ def _draw_begun(layout: bpy.types.UILayout, smoke: bpy.types.Object, take: Take,
     """A run that can go on; one that this session does not know was interrupted by the end of another."""
     frames = take.read().frames
     if not known:
-        text = iface_("{:s} was interrupted.") if frames else iface_("{:s} was interrupted before its first frame.")
-        draw_text(layout, text.format(take.read().title), "ERROR")
+        text = "{:s} was interrupted." if frames else "{:s} was interrupted before its first frame."
+        draw_text(layout, text, "ERROR", take.read().title)
     if frames:
         last = volume.frames_before_take(smoke, take) + frames
         text = iface_("Resume {:s} after Frame {:d}").format(take.read().title, last)
@@ -101,10 +102,8 @@ def _draw_shown(
     """When the result on show is seen, what of it is measured, and a proxy where it is large."""
     seen = volume.shown_range(smoke)
     if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
-        text = iface_("The smoke is seen in frames {:d} to {:d}.")
-        draw_text(layout, text.format(*seen), "INFO")
-    known = volume.provenance_note(smoke)
-    if known:
+        draw_text(layout, "The smoke is seen in frames {:d} to {:d}.", "INFO", *seen)
+    if known := volume.provenance_note(smoke):
         draw_text(layout, known, "INFO")
     if index["complete"] and lacks_proxy(smoke, index):
         text = "This smoke is large: a proxy keeps the viewport fast."

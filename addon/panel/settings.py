@@ -3,15 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from bpy.props import (
-    BoolProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy import props
 
 from ..core.contract import SIDES
 
@@ -21,19 +13,20 @@ def _named(kind: Callable[..., Any]) -> Callable[..., Any]:
 
 
 tick, number, whole, string, vector = map(
-    _named, (BoolProperty, FloatProperty, IntProperty, StringProperty, FloatVectorProperty)
+    _named,
+    (props.BoolProperty, props.FloatProperty, props.IntProperty, props.StringProperty, props.FloatVectorProperty),
 )
 """Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
 
 
-def choice(name: str, description: str, items: list[tuple[Any, ...]], **options: Any) -> Any:
+def choice(name: str, description: str, *items: tuple[Any, ...], **options: Any) -> Any:
     """One of some items, by default the first."""
-    return EnumProperty(name=name, description=description, items=items, **options)
+    return props.EnumProperty(name=name, description=description, items=items, **options)
 
 
 def link(name: str, description: str, kind: type, **options: Any) -> Any:
     """A data-block of a kind."""
-    return PointerProperty(name=name, description=description, type=kind, **options)
+    return props.PointerProperty(name=name, description=description, type=kind, **options)
 
 
 def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
@@ -52,4 +45,4 @@ def automatic_unless(name: str, label: str, start: float | Callable[[Any], float
 def closed_sides(description: str) -> Any:
     """A row of buttons, one for each side of the box."""
     items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
-    return choice("Closed Sides", description, items, options={"ANIMATABLE", "ENUM_FLAG"})
+    return choice("Closed Sides", description, *items, options={"ANIMATABLE", "ENUM_FLAG"})

@@ -6,12 +6,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core import ShotError
 from ..scene import shot_setup, volume
 from ..scene.plate import clip_behind
-from .common import ChangesScene, needs_clip, needs_result, panels
+from .common import UNDO, needs_clip, needs_result, operator, panels
 from .layout import draw_settings
 from .settings import choice, link, tick
-
-TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
-"""Names of the settings."""
 
 
 class SetUpSettings:
@@ -41,57 +38,52 @@ class SetUpSettings:
     plate_place: choice(
         "Place",
         "Where the background is put behind the smoke",
-        [
-            ("WORLD", "World", "In the world, seen by the camera only"),
-            (
-                "COMPOSITE",
-                "Compositor",
-                "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
-                "the clip's grain, and the clip in front of it all where a mask says so",
-            ),
-            (
-                "PROJECTION",
-                "Projection",
-                "On a card behind the smoke, projected from where the clip was filmed, so that it stays in its place "
-                "when the camera of the render moves",
-            ),
-        ],
+        ("WORLD", "World", "In the world, seen by the camera only"),
+        (
+            "COMPOSITE",
+            "Compositor",
+            "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
+            "the clip's grain, and the clip in front of it all where a mask says so",
+        ),
+        (
+            "PROJECTION",
+            "Projection",
+            "On a card behind the smoke, projected from where the clip was filmed, so that it stays in its place "
+            "when the camera of the render moves",
+        ),
     )
     assumed_camera: link(
         "Assumed Camera", "Camera object that stands where the clip was assumed to be filmed from", bpy.types.Object
     )
 
 
-class SMOKELIFT_OT_set_up(ChangesScene, bpy.types.Operator):
+DESCRIPTION = (
+    "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
+    "and colors, with samples for about a minute in a new file. The old world stays in the file"
+)
+
+
+@operator("Set Up Shot", needs_clip, needs_result, bl_options=UNDO, bl_description=DESCRIPTION)
+def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
     """Make a render from the camera match the clip."""
-
-    bl_description = (
-        "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
-        "and colors, with samples for about a minute in a new file. The old world stays in the file"
-    )
-    bl_label = "Set Up Shot"
-    needs = (needs_clip, needs_result)
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        take = volume.shown_take(smoke)
-        if volume.shown_index(smoke) is None:
-            text = rpt_("The files of the smoke in {:s} are missing: make it again.")
-            raise ShotError(text.format(str(take.directory)))
-        settings = smoke.smokelift
-        if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
-            raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
-        said = shot_setup.set_up(smoke)
-        if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
-            context.space_data.region_3d.view_perspective = "CAMERA"
-        volume.show(smoke, take)  # the frame rate may have changed
-        done = rpt_("The shot is set up: press F12 for a render that matches the clip.")
-        self.report({"INFO"}, " ".join([done, *said]))
+    take, settings = volume.shown_take(smoke), smoke.smokelift
+    if volume.shown_index(smoke) is None:
+        text = rpt_("The files of the smoke in {:s} are missing: make it again.")
+        raise ShotError(text.format(str(take.directory)))
+    if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
+        raise ShotError("The scene has no camera: choose the one that the smoke was made for.")
+    said = shot_setup.set_up(smoke)
+    if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
+        context.space_data.region_3d.view_perspective = "CAMERA"
+    volume.show(smoke, take)  # the frame rate may have changed
+    return " ".join([rpt_("The shot is set up: press F12 for a render that matches the clip."), *said])
 
 
+@panels("set_up", "Shot Set-Up", needs_clip)
 def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     layout.use_property_split = False
     settings = smoke.smokelift
-    draw_settings(layout, settings, *TICKS)
+    draw_settings(layout, settings, "set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
     row = layout.row()
     row.use_property_split = True
     row.active = settings.set_up_plate
@@ -101,6 +93,3 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     if clip is not None:
         layout.prop(clip, "show_background_image", text="Clip in View", icon="NONE")
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")
-
-
-PANELS = panels("set_up", "Shot Set-Up", _draw_set_up, needs_clip)

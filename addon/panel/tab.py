@@ -2,34 +2,29 @@
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import StringProperty
 
 from ..core import ShotError
 from ..result import smoke_takes
 from ..scene.smoke import activate, smokes
 from .camera_panel import draw_shot
 from .clip_panel import draw_clip
-from .common import ChangesScene, panels
+from .common import HIDDEN, UNDO, needs_smoke, operator, panels
 from .layout import draw_settings, draw_text
 from .preferences import draw_header
 from .quality_panel import draw_qualities
 from .run_panel import draw_run
 
 
-class SMOKELIFT_OT_show_smoke(ChangesScene, bpy.types.Operator):
+@operator("Select Smoke", needs_smoke, bl_options=UNDO, given={"smoke": HIDDEN})
+def show_smoke(context: bpy.types.Context, _active: bpy.types.Object, smoke: str) -> None:
     """Select this smoke, and show its settings in the tab"""
-
-    bl_label = "Select Smoke"
-
-    smoke: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
-
-    def act(self, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-        found = next((obj for obj in smokes(context.scene) if obj.name == self.smoke), None)
-        if found is None:
-            raise ShotError(rpt_("The scene has no smoke of the name {:s}.").format(self.smoke))
-        activate(found, context.scene)
+    found = next((obj for obj in smokes(context.scene) if obj.name == smoke), None)
+    if found is None:
+        raise ShotError(rpt_("The scene has no smoke of the name {:s}.").format(smoke))
+    activate(found, context.scene)
 
 
+@panels("", "Smokelift", draw_header_preset=draw_header)
 def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object | None) -> None:
     _draw_smokes(layout, context, smoke)
     if smoke is None:
@@ -57,6 +52,3 @@ def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active:
             row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
             row.smoke = smoke.name
     column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
-
-
-PANELS = panels("", "Smokelift", _draw_tab, draw_header_preset=draw_header)

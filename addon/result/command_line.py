@@ -27,8 +27,7 @@ from ..scene.shot_setup import has_denoiser
 from ..scene.smoke import activate, active_smoke, new_smoke, smokes
 from . import smoke_takes
 
-POLL_SECONDS = 0.05
-"""Seconds between two checks of a run."""
+POLL_SECONDS = 0.05  # seconds between two checks of a run
 
 
 def main(words: Sequence[str]) -> int:
@@ -156,33 +155,26 @@ def _render(smoke: bpy.types.Object, path: Path) -> None:
 def _parser() -> argparse.ArgumentParser:
     known = bpy.types.Object.bl_rna.properties["smokelift"].fixed_type.properties
     parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
-    parser.add_argument("--smoke", metavar="NAME", help="smoke to make, if the scene has several (default: the active)")
-    parser.add_argument("--clip", type=Path, help="clip to use in place of the smoke's")
-    parser.add_argument(
-        "--frames", type=_frames, metavar="A:B", help="first and last frame of the clip to use, counted from 0"
-    )
-    parser.add_argument(
-        "--quality", choices=known["quality"].enum_items.keys(), help="how much of the clip's detail is kept"
-    )
-    parser.add_argument(
-        "--detail", type=_within(known["detail"], float), metavar="0..1", help="Depth Detail: 0 (smooth) to 1"
-    )
-    parser.add_argument(
+    add = parser.add_argument
+    add("--smoke", metavar="NAME", help="smoke to make, if the scene has several (default: the active)")
+    add("--clip", type=Path, help="clip to use in place of the smoke's")
+    add("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip to use, counted from 0")
+    add("--quality", choices=known["quality"].enum_items.keys(), help="how much of the clip's detail is kept")
+    add("--detail", type=_within(known["detail"], float), metavar="0..1", help="Depth Detail: 0 (smooth) to 1")
+    add(
         "--seed", type=_within(known["seed"], int), metavar="N", help="Variation: number of the plausible smoke, from 0"
     )
-    parser.add_argument(
+    add(
         "--distance",
         type=_within(known["distance"], float),
         metavar="METERS",
         help="Distance: from the camera to the lower end of the smoke, level and straight ahead; 0: estimated",
     )
-    parser.add_argument("--output", type=Path, help="folder for the results")
-    parser.add_argument("--resume", action="store_true", help="resume the last unfinished run")
-    parser.add_argument("--set-up", action="store_true", help="make renders match the clip, as Set Up Shot does")
-    parser.add_argument("--save", action="store_true", help="save the .blend with the result")
-    parser.add_argument(
-        "--render", type=Path, metavar="PICTURE", help="render the current frame, or all if the name has ####"
-    )
+    add("--output", type=Path, help="folder for the results")
+    add("--resume", action="store_true", help="resume the last unfinished run")
+    add("--set-up", action="store_true", help="make renders match the clip, as Set Up Shot does")
+    add("--save", action="store_true", help="save the .blend with the result")
+    add("--render", type=Path, metavar="PICTURE", help="render the current frame, or all if the name has ####")
     return parser
 
 

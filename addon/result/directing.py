@@ -19,17 +19,10 @@ from ..scene import volume
 from ..scene.blender import at_frame
 from ..scene.smoke import scene_of
 
-BLOWING = ("WIND", "FORCE")
-"""Force fields that blow along their Z axis."""
-
-UNSIZED = 1.0
-"""What Blender takes for the size of turbulence that has none."""
-
-MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
-"""Objects that have a surface."""
-
-STL_HEADER = 80
-"""Bytes before the number of triangles."""
+BLOWING = ("WIND", "FORCE")  # force fields that blow along their Z axis
+UNSIZED = 1.0  # what Blender takes for the size of turbulence that has none
+MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}  # objects that have a surface
+STL_HEADER = 80  # bytes before the number of triangles
 
 
 def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:

@@ -73,7 +73,7 @@ def arguments(smoke: bpy.types.Object) -> list[str]:
 
 def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
     """Write a .blend beside an export with paths to the files there: the smoke as an asset."""
-    copy = copy_of(smoke, smoke.name)
+    copy = copy_of(smoke)
     copy.delta_location = (0.0, 0.0, 0.0)
     first = json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0]
     copy.data.filepath = str(folder / FRAME_FILE.format(int(first)))
@@ -87,21 +87,19 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
         bpy.data.volumes.remove(copy.data)  # takes the object with it
 
 
-def copy_of(obj: bpy.types.Object, name: str) -> bpy.types.Object:
-    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made."""
-    copy = bpy.data.objects.new(name, obj.data.copy())
+def copy_of(obj: bpy.types.Object, offset: int = 0, repeat: bool = False) -> bpy.types.Object:
+    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made.
+
+    It plays some frames later, and again and again if it repeats or the original does.
+    """
+    copy = bpy.data.objects.new(obj.name, obj.data.copy())
     copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
     copy.matrix_basis = obj.matrix_basis
-    return copy
-
-
-def copy_later(obj: bpy.types.Object, name: str, offset: int, repeat: bool) -> bpy.types.Object:
-    """A copy of a Volume object that plays some frames later; again and again if it repeats or the original does."""
-    copy = copy_of(obj, name)
     if obj.data.library is not None:
         copy.data.filepath = relative(absolute(obj.data.filepath, obj.data.library))
     copy.data.frame_start += offset
-    copy.data.sequence_mode = "REPEAT" if repeat else obj.data.sequence_mode
+    if repeat:
+        copy.data.sequence_mode = "REPEAT"
     return copy
 
 
@@ -119,25 +117,16 @@ def complete_import(folder: Path) -> None:
             obj.data.velocity_grid = next((name for name in grids if name.startswith("vel")), "velocity")
 
 
-class SMOKELIFT_USD_import(getattr(bpy.types, "USDHook", object)):
-    """Completes what is imported."""
+# without USD's module Blender ends when it calls a hook
+if hasattr(bpy.types, "USDHook") and importlib.util.find_spec("pxr") is not None:
 
-    bl_idname = "smokelift.usd_import"
-    bl_label = "Smokelift"
+    class SMOKELIFT_USD_import(bpy.types.USDHook):
+        """Completes what is imported."""
 
-    @staticmethod
-    def on_import(context: object) -> bool:
-        complete_import(Path(context.get_stage().GetRootLayer().realPath).parent)
-        return True
+        bl_idname = "smokelift.usd_import"
+        bl_label = "Smokelift"
 
-
-def register() -> None:
-    """Register the hook, unless USD or its module is missing: without that Blender ends when it calls a hook."""
-    if hasattr(bpy.types, "USDHook") and importlib.util.find_spec("pxr") is not None:
-        bpy.utils.register_class(SMOKELIFT_USD_import)
-
-
-def unregister() -> None:
-    """Unregister it."""
-    if getattr(SMOKELIFT_USD_import, "is_registered", False):
-        bpy.utils.unregister_class(SMOKELIFT_USD_import)
+        @staticmethod
+        def on_import(context: object) -> bool:
+            complete_import(Path(context.get_stage().GetRootLayer().realPath).parent)
+            return True

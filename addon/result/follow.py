@@ -8,30 +8,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..core.take import Take
 from ..scene.blender import absolute, relative
 from ..scene.smoke import volume_objects
 from .smoke_takes import find_results_again, takes_of_file
 
-_NAMES = ("output", "results", "before", "plate", "mask")
-"""Settings of a smoke that hold a path; the folder of its export is one more."""
-
-_OWN = ("results", "before")
-"""Paths that the add-on sets: an absolute one becomes relative with the first save."""
-
-_DATA = ("volumes", "images", "movieclips", "sounds", "fonts", "cache_files", "libraries")
-"""Blender's own data that have a file."""
+_NAMES = ("output", "results", "before", "plate", "mask")  # settings that hold a path, as the folder of an export does
+_OWN = ("results", "before")  # paths that the add-on sets: an absolute one becomes relative with the first save
+_DATA = ("volumes", "images", "movieclips", "sounds", "fonts", "cache_files", "libraries")  # Blender's own
 
 _places: list[tuple[bpy.types.PropertyGroup, str, Path]] = []
 """Where the relative paths lead while a file is saved: settings, name and absolute path."""
 
-_takes: list[Take] = []
-"""What belongs to the file while it is saved."""
-
-_folders: list[Path] = []
-"""Folders that the open .blend was in before it was saved elsewhere, the last one first."""
+_takes: list[Take] = []  # what belongs to the file while it is saved
+_folders: list[Path] = []  # folders that the open .blend was in before it was saved elsewhere, the last one first
 
 
 def _smokes() -> Iterator[bpy.types.Object]:
@@ -48,7 +39,6 @@ def _settings() -> Iterator[tuple[bpy.types.PropertyGroup, str, str]]:
                     yield owner, name, path
 
 
-@persistent
 def _before_save(file: str) -> None:
     """Write the relative paths as the new file needs them."""
     _places.clear()
@@ -67,7 +57,6 @@ def _before_save(file: str) -> None:
         _folders.insert(0, here)
 
 
-@persistent
 def _after_save(file: str) -> None:
     """Write them as the open file needs them, which is the old one where a copy was saved; its takes are the new's."""
     _stay()
@@ -76,7 +65,6 @@ def _after_save(file: str) -> None:
     _takes.clear()
 
 
-@persistent
 def _stay(_file: str = "") -> None:
     """Write them as the open file needs them."""
     for owner, name, place in _places:
@@ -85,7 +73,6 @@ def _stay(_file: str = "") -> None:
     _set_saved_as(bpy.data.filepath)
 
 
-@persistent
 def _after_load(_file: str) -> None:
     """A file that was copied or renamed has the takes of the one that it was."""
     _folders.clear()
@@ -95,7 +82,6 @@ def _after_load(_file: str) -> None:
     _set_saved_as(bpy.data.filepath)
 
 
-@persistent
 def _after_undo(_scene: bpy.types.Scene) -> None:
     """Lead relative paths that were meant for an earlier folder to where they led."""
     here = Path(bpy.data.filepath).parent

@@ -4,7 +4,6 @@ import time
 
 import bpy
 import bpy.utils.previews
-from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import ShotError
@@ -163,7 +162,6 @@ def _playing(context: bpy.types.Context) -> bool:
     return context.screen is not None and context.screen.is_animation_playing
 
 
-@persistent
 def _stop_all(_file: str = "") -> None:
     """End the engine, as another file is loaded; finished frames stay."""
     cancel_call(_timer)

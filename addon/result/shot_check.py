@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
@@ -47,32 +46,16 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
 
 @dataclass
 class ShotCheck:
-    """The last check, of which the newest figures are shown until there are others.
+    """The last check, of which the newest figures are shown until there are others."""
 
-    Attributes
-    ----------
-    settings
-        Those of the smoke that was checked, as `settings_text` has them; empty where something else has changed.
-    page
-        Picture of what was found.
-    done, error
-        Whether the engine has said what it found, or why it could not.
-    of, details
-        The number of the smoke that the engine spoke of last, and what it said at its end.
-    doubts
-        Why the result may be wrong, as `Job` has them.
-    awaited
-        Those of the smoke that is checked soon.
-    """
-
-    settings: str = ""
-    page: str = ""
-    done: bool = False
-    error: str = ""
-    of: int = 0
-    details: Mapping[str, Any] = field(default_factory=dict)
-    doubts: list[tuple[str, str]] = field(default_factory=list)
-    awaited: str = ""
+    settings: str = ""  # of the smoke that was checked, by `settings_text`; empty where something else has changed
+    page: str = ""  # picture of what was found
+    done: bool = False  # whether the engine has said what it found
+    error: str = ""  # why it could not
+    of: int = 0  # number of the smoke that the engine spoke of last
+    details: Mapping[str, Any] = field(default_factory=dict)  # what it said at its end
+    doubts: list[tuple[str, str]] = field(default_factory=list)  # why the result may be wrong, as `Job` has them
+    awaited: str = ""  # settings of the smoke that is checked soon
 
     def fits(self, smoke: bpy.types.Object) -> bool:
         """Whether it is of this smoke as it is."""
@@ -92,8 +75,7 @@ class ShotCheck:
         self.done, self.of, self.details, self.doubts = True, smoke.session_uid, details, doubts
 
 
-state = ShotCheck()
-"""The check of this session, which is never saved."""
+state = ShotCheck()  # the check of this session, which is never saved
 
 
 NEUTRAL = {
@@ -116,8 +98,7 @@ def settings_text(smoke: bpy.types.Object) -> str:
     return repr((smoke.session_uid, values, size, place))
 
 
-check_job = SideJob()
-"""The check's own, beside which files may be written."""
+check_job = SideJob()  # the check's own, beside which files may be written
 
 
 def check(smoke: bpy.types.Object, needs_page: bool = True) -> None:
@@ -161,10 +142,7 @@ def make_way() -> None:
 
 
 def check_soon(context: bpy.types.Context, smoke: bpy.types.Object) -> bool:
-    """Have the smoke in the tab checked once its settings rest, if no run is at work; whether it will be.
-
-    Drawing code may call this.
-    """
+    """Have the smoke in the tab checked once its settings rest, if no run is at work; whether it will be."""
     busy = any(not run.job.ended for run in runs)
     if busy or bpy.app.background or context.window != context.window_manager.windows[0]:
         return False
@@ -184,10 +162,7 @@ def _start_later() -> None:
 
 
 def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
-    """Start the engine on a shot, unless it is at work on it or it is known what it says.
-
-    Its result goes into the state of the session.
-    """
+    """Start the engine on a shot, unless it is at work on it or it is known what it says: that goes into the state."""
     try:
         take, words, tables = Take(Path(bpy.app.tempdir) / "smokelift_check"), options(smoke), shot_tables(smoke, True)
         take.write(tables, words)
@@ -223,10 +198,7 @@ def _page(shot: str) -> Path:
 
 
 def _fingerprint(smoke: bpy.types.Object, tables: Mapping[str, Any]) -> str:
-    """What tells a shot from others: its scene file, the engine's options, and the state of the files that it reads.
-
-    Options that are `NEUTRAL` do not.
-    """
+    """What tells a shot from others: its scene file, options that are not `NEUTRAL`, and the state of its files."""
     settings, words = smoke.smokelift, options(smoke) + thread_options()
     neutral = (settings.quality, f"--seed={settings.seed}")
     paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]
@@ -237,7 +209,6 @@ def _fingerprint(smoke: bpy.types.Object, tables: Mapping[str, Any]) -> str:
     return hashlib.sha256(parts.encode()).hexdigest()[:16]
 
 
-@persistent
 def _when_drawn_on(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Forget the last check where the mask of a smoke was drawn on; the tab begins another when it is drawn."""
     if not state.settings or not depsgraph.id_type_updated("MASK"):

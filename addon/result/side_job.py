@@ -9,51 +9,29 @@ from pathlib import Path
 from typing import ClassVar
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..core import ShotError
 from ..core.job import Job, engine_command
 from ..scene.blender import call_later, redraw, thread_options
 from ..scene.smoke import find_smoke
 
-TICK_SECONDS = 0.1
-"""Between two readings of what the engine says."""
-
-REST_SECONDS = 0.4
-"""Time without a change of settings before the engine is asked what they come to."""
-
-End = Callable[[bpy.types.Object, Job], None]
-"""Called with the smoke and the job when that has ended."""
+TICK_SECONDS = 0.1  # between two readings of what the engine says
+REST_SECONDS = 0.4  # time without a change of settings before the engine is asked what they come to
+End = Callable[[bpy.types.Object, Job], None]  # called with the smoke and the job when that has ended
 
 
 class SideJob:
-    """One such job at a time, and after its end what it said; never saved.
-
-    Attributes
-    ----------
-    job
-        The one that runs.
-    smoke
-        Number of the smoke that it is for.
-    operator
-        Identifier of the operator that has files written; empty for an estimate.
-    seconds
-        Whole seconds since its start.
-    sentence
-        The result, or the reason of a failure; empty for an estimate.
-    doubts
-        Why the result may be wrong, as `Job` has them.
-    """
+    """One such job at a time, and after its end what it said; never saved."""
 
     all: ClassVar[list["SideJob"]] = []
 
     def __init__(self) -> None:
-        self.job: Job | None = None
-        self.smoke = 0
-        self.operator = ""
-        self.seconds = 0
-        self.sentence = ""
-        self.doubts: list[tuple[str, str]] = []
+        self.job: Job | None = None  # the one that runs
+        self.smoke = 0  # number of the smoke that it is for
+        self.operator = ""  # identifier of the operator that has files written; empty for an estimate
+        self.seconds = 0  # whole seconds since its start
+        self.sentence = ""  # the result, or the reason of a failure; empty for an estimate
+        self.doubts: list[tuple[str, str]] = []  # why the result may be wrong, as `Job` has them
         self._end: End | None = None
         self._began = 0.0
         self._timer = self.poll  # Blender knows a timer by the object, and each `self.poll` is another
@@ -105,8 +83,7 @@ class SideJob:
         return None
 
 
-writing_job = SideJob()
-"""Writes files, or estimates how large they will be."""
+writing_job = SideJob()  # writes files, or estimates how large they will be
 
 
 def write_files(
@@ -131,16 +108,12 @@ def write_files(
             raise ShotError(job.sentence)
 
 
-@persistent
 def _stop_all(_file: str = "") -> None:
-    """End the engine: another file is loaded."""
+    """End the engine, as another file is loaded."""
     for job in SideJob.all:
         job.stop()
 
 
 HANDLERS = ((bpy.app.handlers.load_pre, _stop_all),)
 
-
-def unregister() -> None:
-    """End the engine."""
-    _stop_all()
+unregister = _stop_all

@@ -27,44 +27,21 @@ _written_to: dict[int, tuple[str, Path]] = {}
 
 @dataclass(eq=False)
 class Run:
-    """A run of this session in the panel, which is never saved.
+    """A run of this session in the panel, which is never saved."""
 
-    Attributes
-    ----------
-    take, smoke
-        What is made, and the number of its smoke.
-    job
-        The engine's process, which may wait.
-    shown
-        How many frames of it are on show, and whether its end is.
-    settings
-        Those that it was begun with, until its forecast is taken for a check of them; empty without one.
-    first
-        Whether nothing of it was shown yet.
-    before
-        What was on show when its first frame came.
-    seen
-        Whether the playhead went to its first smoke.
-    left
-        Whether the artist chose another result while it runs.
-    icon
-        Of its thumbnail; 0 without one.
-    """
-
-    take: Take
-    smoke: int
-    job: Job
-    shown: tuple[int, bool]
-    settings: str = ""
-    first: bool = True
-    before: Take | None = None
-    seen: bool = False
-    left: bool = False
-    icon: int = 0
+    take: Take  # what is made
+    smoke: int  # number of its smoke
+    job: Job  # the engine's process, which may wait
+    shown: tuple[int, bool]  # how many frames of it are on show, and whether its end is
+    settings: str = ""  # what it was begun with, until its forecast is taken for a check of that; empty without one
+    first: bool = True  # whether nothing of it was shown yet
+    before: Take | None = None  # what was on show when its first frame came
+    seen: bool = False  # whether the playhead went to its first smoke
+    left: bool = False  # whether the artist chose another result while it runs
+    icon: int = 0  # of its thumbnail; 0 without one
 
 
-runs: list[Run] = []
-"""The runs of this session, in the order of the queue."""
+runs: list[Run] = []  # the runs of this session, in the order of the queue
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:
@@ -129,10 +106,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
 
 
 def write_directed(smoke: bpy.types.Object) -> Take:
-    """Write the files of a new take that is made of the one on show.
-
-    ShotError if a setting or an object cannot be used, or the folder cannot be written to.
-    """
+    """Write the files of a new take that is made of the one on show; ShotError if something is in the way."""
     source = volume.shown_take(smoke)
     if source is None:
         raise ShotError("Make smoke first: there is none yet to direct.")
@@ -192,10 +166,7 @@ def _note_file(*used: Take) -> None:
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
-    """Write today's paths of clip, mask, plate and strokes into a resumed take's scene file, if the project was moved.
-
-    ShotError if its files are damaged.
-    """
+    """Write today's paths into a resumed take's scene file, if the project was moved; ShotError if it is damaged."""
     settings = smoke.smokelift
     if take.read().direction is None:
         files = {("clip", "path"): clip_path(settings.clip)}
@@ -218,10 +189,7 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
 
 
 def present(smoke: bpy.types.Object, take: Take) -> str:
-    """Show a take's finished frames, and the camera that the engine assumed if it did.
-
-    Returns what else was changed in the scene, as a sentence; empty if nothing was.
-    """
+    """Show a take's finished frames, and the camera that was assumed; returns a sentence on what else has changed."""
     index, first = take.read().index, volume.shown_take(smoke) is None
     if not volume.show(smoke, take) or index is None:
         return ""

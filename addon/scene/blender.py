@@ -9,17 +9,17 @@ from types import ModuleType
 from typing import Any
 
 import bpy
-from mathutils import Matrix
+import numpy as np
+import numpy.typing as npt
+from bpy.app.handlers import persistent
 
-PACKAGE = __package__.rpartition(".")[0]
-"""The add-on's name, under which Blender keeps its preferences."""
+PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blender keeps its preferences
 
 # Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
 PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
 """Options of properties that hold a path."""
 
-TOLERANCE = 1e-5
-"""Difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make."""
+TOLERANCE = 1e-5  # difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make
 
 
 def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
@@ -32,10 +32,7 @@ def absolute(path: str, library: bpy.types.Library | None = None, folder: Path |
 
 
 def relative(path: Path, folder: Path | None = None) -> str:
-    """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute.
-
-    The folder is that of the .blend, by default of the open one.
-    """
+    """The path as Blender keeps it: relative to a .blend's folder, by default the open one's, where that can be."""
     if folder is None and not bpy.data.filepath:
         return str(path)
     try:
@@ -44,11 +41,8 @@ def relative(path: Path, folder: Path | None = None) -> str:
         return str(path)
 
 
-REDRAW_SECONDS = 0.5
-"""Between two drawings of the tab while something counts in it."""
-
-_drawn_at = 0.0
-"""When the tab was drawn last because something counted in it (s)."""
+REDRAW_SECONDS = 0.5  # between two drawings of the tab while something counts in it
+_drawn_at = 0.0  # when the tab was drawn last because something counted in it (s)
 
 
 @contextmanager
@@ -90,30 +84,25 @@ def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: s
     a vector or a matrix, in an attribute of the holder.
     """
     before = owner.get(_property_name(name))
-    if before is None or _equal(_numbers(getattr(holder, attribute)), list(before)):
-        set_and_remember(owner, name, holder, attribute, value)
+    if before is not None:
+        found, last = _numbers(getattr(holder, attribute)), np.array(before)
+        if found.shape != last.shape or not np.all(abs(found - last) <= TOLERANCE * np.maximum(1.0, abs(last))):
+            return
+    set_and_remember(owner, name, holder, attribute, value)
 
 
 def set_and_remember(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
     """Set a value, whatever it is, so that it follows the newest result from now on; parameters as above."""
     setattr(holder, attribute, value)
-    owner[_property_name(name)] = _numbers(getattr(holder, attribute))
+    owner[_property_name(name)] = _numbers(getattr(holder, attribute)).tolist()
 
 
 def _property_name(name: str) -> str:
-    return f"smokelift_{name}"
+    return f"smokelift_{name.lower().replace(' ', '_')}"
 
 
-def _numbers(value: Any) -> list[float]:
-    if isinstance(value, Matrix):
-        return [number for row in value for number in row]
-    return [float(number) for number in value] if hasattr(value, "__len__") else [float(value)]
-
-
-def _equal(found: list[float], set_last: list[float]) -> bool:
-    return len(found) == len(set_last) and all(
-        abs(a - b) <= TOLERANCE * max(1.0, abs(b)) for a, b in zip(found, set_last, strict=True)
-    )
+def _numbers(value: Any) -> npt.NDArray[np.float64]:
+    return np.ravel(value).astype(np.float64)
 
 
 def call_later(timer: Callable[[], float | None], seconds: float) -> None:
@@ -129,17 +118,16 @@ def cancel_call(timer: Callable[[], float | None]) -> None:
         bpy.app.timers.unregister(timer)
 
 
-_called_later: set[Callable[[], float | None]] = set()
-"""What Blender was ever asked to call."""
+_called_later: set[Callable[[], float | None]] = set()  # what Blender was ever asked to call
 
 
 def register_modules(modules: Sequence[ModuleType]) -> None:
-    """Register the classes of modules, their ``HANDLERS``, each after the list that it is for, and whatever else."""
+    """Register the classes of modules, their ``HANDLERS``, each after the list or menu that it is for, and more."""
     for module in modules:
         for cls in _classes(module):
             bpy.utils.register_class(cls)
         for handlers, handler in getattr(module, "HANDLERS", ()):
-            handlers.append(handler)
+            handlers.append(persistent(handler))
         if hasattr(module, "register"):
             module.register()
 
@@ -160,9 +148,9 @@ def unregister_modules(modules: Sequence[ModuleType]) -> None:
 def _classes(module: ModuleType) -> list[type]:
     """What Blender has to know of a module: its own classes, and those of a tuple in it, in their order."""
     values = [each for value in vars(module).values() for each in (value if isinstance(value, tuple) else (value,))]
-    types = bpy.types
-    kinds = (types.Operator, types.Panel, types.PropertyGroup, types.AddonPreferences, types.FileHandler)
-    classes = [each for each in values if isinstance(each, type) and issubclass(each, kinds)]
+    kinds = ("Operator", "Panel", "PropertyGroup", "AddonPreferences", "FileHandler", "USDHook")
+    known = tuple(getattr(bpy.types, kind) for kind in kinds if hasattr(bpy.types, kind))  # some are built without USD
+    classes = [each for each in values if isinstance(each, type) and issubclass(each, known)]
     return [cls for cls in classes if cls.__module__ == module.__name__]
 
 

@@ -11,11 +11,8 @@ from ..core import ShotError
 from ..core.contract import BOX_VOXELS, MIN_VOXELS
 from .smoke import scene_of
 
-ROUNDING = 1e-5
-"""Fraction of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
-
-BOX_FRACTION = 0.9
-"""Width and height of a new box over those of the picture."""
+ROUNDING = 1e-5  # error of Blender's 32-bit places over the box's longest side: a hundred of their steps
+BOX_FRACTION = 0.9  # width and height of a new box over those of the picture
 
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
@@ -50,11 +47,7 @@ def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.Pr
     size = [count * voxel for count in counts]
     middle = (low + high) / 2
     start = [middle[0] - size[0] / 2, middle[1] - size[1] / 2, low[2]]
-    return {
-        "min": start,
-        "max": [s + length for s, length in zip(start, size, strict=True)],
-        "resolution": counts,
-    }
+    return {"min": start, "max": [s + length for s, length in zip(start, size, strict=True)], "resolution": counts}
 
 
 def sides_of(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
@@ -62,6 +55,11 @@ def sides_of(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
     corners = [rotation.inverted() @ corner for corner in box_corners(box)]
     low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
     return low, Vector(max(corner[axis] for corner in corners) for axis in range(3))
+
+
+def is_inside(low: Sequence[float], high: Sequence[float], place: Sequence[float], margin: float = 0.0) -> bool:
+    """Whether a place is between the corners of a box, and so far from its sides."""
+    return all(a + margin <= here <= b - margin for a, here, b in zip(low, place, high, strict=True))
 
 
 def keep_camera_outside(
@@ -73,15 +71,11 @@ def keep_camera_outside(
     inside the box itself.
     """
     eyes = [Vector(row[3] for row in pose[:3]) for pose in camera.get("matrices") or [camera["matrix"]]]
-
-    def inside(low: Sequence[float], high: Sequence[float], eye: Vector, margin: float) -> bool:
-        return all(a + margin <= place <= b - margin for a, place, b in zip(low, eye, high, strict=True))
-
-    if camera["type"] != "perspective" or not any(inside(domain["min"], domain["max"], eye, 0.0) for eye in eyes):
+    if camera["type"] != "perspective" or not any(is_inside(domain["min"], domain["max"], eye) for eye in eyes):
         return domain
     low, high = sides_of(box, rotation)
     rounding = ROUNDING * max(high - low)
-    if any(inside(low, high, eye, rounding) for eye in eyes):
+    if any(is_inside(low, high, eye, rounding) for eye in eyes):
         raise ShotError("The camera stands inside the smoke's box: move it out, or make the box smaller.")
     start, end = list(domain["min"]), list(domain["max"])
     for axis in (0, 1):  # upwards it grows from its floor

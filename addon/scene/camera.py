@@ -12,11 +12,8 @@ from .blender import at_frame
 from .clip import start_frame
 from .smoke import scene_of
 
-LENS = ("fx", "fy", "cx", "cy")
-"""Numbers of a camera's table that say its lens."""
-
-CAMERA_SAMPLES = 9
-"""Frames that decide whether the camera moves."""
+LENS = ("fx", "fy", "cx", "cy")  # numbers of a camera's table that say its lens
+CAMERA_SAMPLES = 9  # frames that decide whether the camera moves
 
 
 def camera_table(
@@ -42,11 +39,7 @@ def camera_table(
     pose = rotation.to_4x4().inverted() @ Matrix.Translation(camera.matrix_world.translation) @ axes.to_4x4()
     # Blender's projection matrix holds sensor fit, shift and pixel aspect; it maps the image's edges to -1 and 1.
     lens = camera.calc_matrix_camera(
-        depsgraph,
-        x=width,
-        y=height,
-        scale_x=render.pixel_aspect_x,
-        scale_y=render.pixel_aspect_y,
+        depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
     )
     perspective = camera.data.type == "PERSP"
     off_x, off_y = (-lens[0][2], -lens[1][2]) if perspective else (lens[0][3], lens[1][3])
@@ -122,11 +115,5 @@ def _moved(pose: list[list[float]], before: list[list[float]], size: float) -> b
 def _in_picture(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[Vector]) -> bool:
     """False for a box that lies wholly outside the picture or behind the camera."""
     points = [world_to_camera_view(scene, camera, corner) for corner in corners]
-    outside = (
-        all(p.z <= 0.0 for p in points),
-        all(p.x < 0.0 for p in points),
-        all(p.x > 1.0 for p in points),
-        all(p.y < 0.0 for p in points),
-        all(p.y > 1.0 for p in points),
-    )
-    return not (outside[0] or (any(outside) and all(p.z > 0.0 for p in points)))
+    outside = any(all(p[axis] < 0.0 for p in points) or all(p[axis] > 1.0 for p in points) for axis in (0, 1))
+    return any(p.z > 0.0 for p in points) and not (outside and all(p.z > 0.0 for p in points))

@@ -94,10 +94,7 @@ def frame_count(clip: bpy.types.MovieClip) -> int:
 
 
 def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
-    """Use some frames of the clip's file, counted from 0 as the engine counts them.
-
-    ShotError if the clip does not have them.
-    """
+    """Use frames of the clip's file, counted from 0 as the engine does; ShotError if the clip does not have them."""
     settings = smoke.smokelift
     lowest = settings.clip.frame_offset
     highest = lowest + frame_count(settings.clip) - 1

@@ -11,28 +11,17 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .box import engine_to_world
-from .nodes import color, feed, file_group, number
+from .nodes import Socket, Tree, color, feed, file_group, number
 from .plate import plate_image, shown_background, synchronize_plate
 from .smoke import scene_of
 from .volume import shown_index
 
-GROUP = "Smokelift Composite"
-"""Name of the node group, and of its node in the scene's compositor."""
-
-MARK = "smokelift_composite"
-"""Custom property by which the group is known under any name."""
-
-FLOOR = "Smokelift Floor"
-"""Name of the plane that catches the shadow."""
-
-FLOOR_WIDTHS = 2.0
-"""Width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke."""
-
-_ENGINE = "smokelift_engine"
-"""Custom property of the scene: the render engine that it had before."""
-
-HOLDOUTS = "Smokelift Holdouts"
-"""Name of the collection whose objects hide the smoke, and show the plate."""
+GROUP = "Smokelift Composite"  # name of the node group, and of its node in the scene's compositor
+MARK = "smokelift_composite"  # custom property by which the group is known under any name
+FLOOR = "Smokelift Floor"  # name of the plane that catches the shadow
+FLOOR_WIDTHS = 2.0  # width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke
+_ENGINE = "smokelift_engine"  # custom property of the scene: the render engine that it had before
+HOLDOUTS = "Smokelift Holdouts"  # name of the collection whose objects hide the smoke, and show the plate
 
 GRAIN_PIXELS = 4
 """What is finer than this is grain: the blur that separates it (pixels of the clip). Sensor noise differs from pixel to
@@ -41,8 +30,7 @@ pixel."""
 _CLIP_SIZE = ("Clip Width", "Clip Height")
 """Names of the group's inputs for the clip's size: grain is as wide as its pixels, whatever the render's size."""
 
-LARGEST_DIFFERENCE = 0.05
-"""Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
+LARGEST_DIFFERENCE = 0.05  # of clip and plate, blurred (linear): beyond it is smoke, whose detail is no grain
 
 _INPUTS = (
     color("Render", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
@@ -53,8 +41,7 @@ _INPUTS = (
     *(number(name, "Pixels of the clip, whatever the render's size", 1.0, 1.0) for name in _CLIP_SIZE),
 )
 
-SINCE_5 = bpy.app.version >= (5, 0, 0)
-"""Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
+SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
 
 
 def composite(smoke: bpy.types.Object) -> None:
@@ -129,7 +116,7 @@ def _hold_out(scene: bpy.types.Scene) -> None:
         layer.layer_collection.children[name].holdout = True
 
 
-def compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.NodeSocket]:
+def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
     """The scene's compositor, made if there is none, and the socket of its output."""
     if SINCE_5:
         tree = scene.compositing_node_group
@@ -147,7 +134,7 @@ def compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.No
     return tree, output.inputs[0]
 
 
-def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.Node:
+def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:
     """Put our group between the output and what it showed, or the render if it showed nothing."""
     if shown.links:
         render = shown.links[0].from_socket
@@ -156,7 +143,7 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
         layers = layers or tree.nodes.new("CompositorNodeRLayers")
         render = layers.outputs["Image"]
     node = tree.nodes.new("CompositorNodeGroup")
-    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, [("Image", "NodeSocketColor")], _build)
+    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, {"Image": "NodeSocketColor"}, _build)
     node.name = node.label = GROUP
     node.width = 200.0
     node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
@@ -166,49 +153,41 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
     return node
 
 
-def _connect_plate(tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
+def _connect_plate(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
     """Feed the plate's socket, whose source has our name unless the artist put another there."""
-    background, socket = shown_background(smoke), node.inputs["Plate"]
-    name = f"{GROUP} Plate"
-    if socket.links and tree.nodes.get(name) is None:
-        return
-    if "image" not in background:
-        if tree.nodes.get(name) is not None:
-            tree.nodes.remove(tree.nodes[name])
-        socket.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-        return
-    source = tree.nodes.get(name)
+    background = shown_background(smoke)
+    source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
     if source is None:
-        source = _source(tree, "CompositorNodeImage", name, node, -300.0, socket)
-    source.image = plate_image(smoke)
-    synchronize_plate(smoke, source.image, source)
+        return
+    if "image" in background:
+        source.image = plate_image(smoke)
+        synchronize_plate(smoke, source.image, source)
+    else:
+        tree.nodes.remove(source)
+        node.inputs["Plate"].default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
 
 
-def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
-    name, socket = f"{GROUP} Clip", node.inputs["Clip"]
+def _connect_clip(tree: Tree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
     for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
-    source = tree.nodes.get(name)
-    if source is None:
-        if socket.links:
-            return
-        source = _source(tree, "CompositorNodeMovieClip", name, node, -600.0, socket)
-    source.clip = clip
+    source = _source(tree, "CompositorNodeMovieClip", node, "Clip", -600.0)
+    if source is not None:
+        source.clip = clip
 
 
-def _source(
-    tree: bpy.types.NodeTree, kind: str, name: str, node: bpy.types.Node, down: float, socket: bpy.types.NodeSocket
-) -> bpy.types.Node:
-    """A node of pictures that feeds a socket of ours."""
-    source = tree.nodes.new(kind)
-    source.name = source.label = name
-    source.location = node.location + Vector((-300.0, down))
-    tree.links.new(source.outputs["Image"], socket)
+def _source(tree: Tree, kind: str, node: bpy.types.Node, socket: str, down: float) -> bpy.types.Node | None:
+    """Our node of pictures that feeds a socket of ours, made if need be; None where the artist put another there."""
+    source = tree.nodes.get(f"{GROUP} {socket}")
+    if source is None and not node.inputs[socket].links:
+        source = tree.nodes.new(kind)
+        source.name = source.label = f"{GROUP} {socket}"
+        source.location = node.location + Vector((-300.0, down))
+        tree.links.new(source.outputs["Image"], node.inputs[socket])
     return source
 
 
-def _build(tree: bpy.types.NodeTree) -> None:
+def _build(tree: Tree) -> None:
     """Make the group's nodes: the render over the plate, with the clip's grain, and the clip's foreground over both."""
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     source = given.outputs
@@ -224,7 +203,7 @@ def _build(tree: bpy.types.NodeTree) -> None:
         node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
 
 
-def _grain(tree: bpy.types.NodeTree, source: bpy.types.bpy_prop_collection) -> bpy.types.NodeSocket:
+def _grain(tree: Tree, source: bpy.types.bpy_prop_collection) -> Socket:
     """The clip's own grain, frame by frame, at the clip's pixels.
 
     The plate has no grain, and the same edges as the clip: their difference less its blur is grain. Where the blurred
@@ -243,7 +222,7 @@ def _grain(tree: bpy.types.NodeTree, source: bpy.types.bpy_prop_collection) -> b
     return _mix(tree, "MULTIPLY", 1.0, fine, clear)
 
 
-def _scaled(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket, kind: str) -> bpy.types.NodeSocket:
+def _scaled(tree: Tree, picture: Socket, kind: str) -> Socket:
     """A picture at the render's size, or at an absolute one."""
     node = tree.nodes.new("CompositorNodeScale")
     if "Type" in node.inputs:  # since 5.0
@@ -254,17 +233,13 @@ def _scaled(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket, kind: str) 
     return node.outputs[0]
 
 
-def _mix(
-    tree: bpy.types.NodeTree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = False
-) -> bpy.types.NodeSocket:
+def _mix(tree: Tree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = False) -> Socket:
     """Two pictures in one; from 0 to 1 if it is clamped."""
     if SINCE_5:
         node = tree.nodes.new("ShaderNodeMix")
         node.data_type, node.clamp_factor, node.clamp_result = "RGBA", False, clamp
-        sockets = [
-            next(s for s in node.inputs if s.identifier == name) for name in ("Factor_Float", "A_Color", "B_Color")
-        ]
-        result = next(s for s in node.outputs if s.identifier == "Result_Color")
+        known = {socket.identifier: socket for socket in (*node.inputs, *node.outputs)}
+        *sockets, result = (known[name] for name in ("Factor_Float", "A_Color", "B_Color", "Result_Color"))
     else:
         node = tree.nodes.new("CompositorNodeMixRGB")
         node.use_clamp = clamp
@@ -275,7 +250,7 @@ def _mix(
     return result
 
 
-def _blurred(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _blurred(tree: Tree, picture: Socket) -> Socket:
     node = tree.nodes.new("CompositorNodeBlur")
     if "Size" in node.inputs and node.inputs["Size"].type == "VECTOR":  # since 4.5
         node.inputs["Size"].default_value = [GRAIN_PIXELS] * len(node.inputs["Size"].default_value)

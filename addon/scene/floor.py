@@ -21,23 +21,13 @@ the depth to 0.165 of its half (docs/experiments/density-axis.md)."""
 
 @dataclass(frozen=True)
 class Floor:
-    """The floor of a smoke's box before the camera, in the engine's axes: those of the box.
+    """The floor of a smoke's box before the camera, in the engine's axes: those of the box."""
 
-    Attributes
-    ----------
-    rotation
-        From the engine's axes to Blender's (3x3).
-    low, high
-        Corners of the box.
-    eye, along
-        Where the camera stands in the first frame, and the level direction in which it looks.
-    """
-
-    rotation: Matrix
-    low: Vector
+    rotation: Matrix  # from the engine's axes to Blender's (3x3)
+    low: Vector  # corner of the box
     high: Vector
-    eye: Vector
-    along: Vector
+    eye: Vector  # where the camera stands in the first frame
+    along: Vector  # level direction in which it looks
 
     @classmethod
     def of(cls, smoke: bpy.types.Object) -> "Floor":

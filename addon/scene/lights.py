@@ -9,13 +9,12 @@ from mathutils import Matrix, Vector
 from ..core import ShotError
 from ..core.contract import PANORAMA_SUFFIXES
 from .blender import absolute
+from .box import is_inside
 
 
 def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> list[dict[str, Any]]:
     """The scene's suns and point lights, and the picture that lights its world."""
-    to_engine = rotation.inverted()
-    tables = []
-    unusable = []
+    to_engine, tables, unusable = rotation.inverted(), [], []
     for obj in scene.objects:
         if obj.type != "LIGHT" or obj.hide_render:
             continue
@@ -60,11 +59,10 @@ def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, An
 
     Blender rotates a direction before it reads the picture; a rotated box adds its own rotation.
     """
-    world = scene.world
-    if world is None or world.node_tree is None:
-        return []
-    backgrounds = [node for node in world.node_tree.nodes if node.type == "BACKGROUND"]
-    for node in backgrounds:
+    tree = scene.world.node_tree if scene.world is not None else None
+    for node in tree.nodes if tree is not None else ():
+        if node.type != "BACKGROUND":
+            continue
         links = node.inputs["Color"].links
         source = links[0].from_node if links else None
         strength = node.inputs["Strength"].default_value
@@ -77,12 +75,11 @@ def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, An
             )
         if not path.is_file():
             raise ShotError(f"The world's picture {path} is not there: choose it again, or unpack it.")
-        yaw, tilt = _yaw(_mapping(source) @ rotation)
-        if tilt > 1e-3:
+        turned, up = _mapping(source) @ rotation, Vector((0.0, 0.0, 1.0))
+        if up.angle(turned @ up) > 1e-3:
             raise ShotError("The box is tilted against the world's picture: stand it upright, or choose other lights.")
-        return [
-            {"type": "environment", "image": str(path), "rotation_degrees": math.degrees(yaw), "strength": strength}
-        ]
+        yaw = math.degrees(math.atan2(turned[1][0], turned[0][0]))
+        return [{"type": "environment", "image": str(path), "rotation_degrees": yaw, "strength": strength}]
     return []
 
 
@@ -96,18 +93,8 @@ def _mapping(texture: bpy.types.ShaderNode) -> Matrix:
     return rotation.inverted() if node.vector_type == "TEXTURE" else rotation
 
 
-def _yaw(rotation: Matrix) -> tuple[float, float]:
-    """Angle of a rotation about Z, and the tilt of Z (radians)."""
-    up = rotation @ Vector((0.0, 0.0, 1.0))
-    return math.atan2(rotation[1][0], rotation[0][0]), up.angle(Vector((0.0, 0.0, 1.0)))
-
-
 def require_lights_outside(tables: dict[str, Any]) -> None:
     """Refuse a point light inside the box."""
-    domain = tables.get("domain")
-    for light in tables["lights"]:
-        if domain is None or light["type"] != "point":
-            continue
-        sides = zip(domain["min"], light["position"], domain["max"], strict=True)
-        if all(low <= place <= high for low, place, high in sides):
-            raise ShotError("A point light is inside the box: move it out, or hide it from renders.")
+    domain, places = tables.get("domain"), [light["position"] for light in tables["lights"] if light["type"] == "point"]
+    if domain is not None and any(is_inside(domain["min"], domain["max"], place) for place in places):
+        raise ShotError("A point light is inside the box: move it out, or hide it from renders.")

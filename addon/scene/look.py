@@ -9,22 +9,13 @@ from typing import Any
 import bpy
 
 from .blender import set_and_remember, set_unless_changed
-from .nodes import add_node, color, file_group, math_node, number, scaled_vector, vector_node
+from .nodes import add_node, color, empty_material, file_group, math_node, number, scaled_vector, vector_node
 
-NODE = "Smokelift"
-"""Name of the node that holds the values; a material without it is the artist's own."""
-
-GROUP = "Smokelift Look"
-"""Name of the node group."""
-
-MARK = "smokelift_look"
-"""Custom property by which the group is known under any name."""
-
-BLACKBODY_KELVIN = 1000.0
-"""Temperature that a grid's value of 1 stands for; that of Blender's Principled Volume."""
-
-MIN_RATIO = 1e-3
-"""Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
+NODE = "Smokelift"  # name of the node that holds the values; a material without it is the artist's own
+GROUP = "Smokelift Look"  # name of the node group
+MARK = "smokelift_look"  # custom property by which the group is known under any name
+BLACKBODY_KELVIN = 1000.0  # temperature that a grid's value of 1 stands for; that of Blender's Principled Volume
+MIN_RATIO = 1e-3  # density over the edge's, below which edges do not change any more; keeps the power of it finite
 
 _INPUTS = (
     number("Density", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
@@ -99,10 +90,7 @@ PRESETS: dict[str, tuple[str, str, dict[str, Any]]] = {
 
 
 def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
-    """Give a smoke a material, if it has none, of what was fitted to the clip: medium and domain of a take's scene.
-
-    In a material without our node nothing is changed.
-    """
+    """Give a smoke a material, if it has none, and our node in it what was fitted to the clip, by a take's scene."""
     volume = smoke.data
     if not volume.materials or volume.materials[0] is None:
         volume.materials.clear()
@@ -125,7 +113,7 @@ def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
         fitted["Flame Color"] = (*medium["flame_color"], 1.0)
     for name, value in fitted.items():
         if name in node.inputs:  # a file's own node group may be older
-            set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
+            set_unless_changed(material, name, node.inputs[name], "default_value", value)
 
 
 def material_of(smoke: bpy.types.Object) -> bpy.types.Material | None:
@@ -154,10 +142,7 @@ def controls(smoke: bpy.types.Object) -> list[bpy.types.NodeSocket]:
 
 
 def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> bool:
-    """Set the artist's inputs to a preset's; returns whether the material has them.
-
-    A material of another file is copied to the object first.
-    """
+    """Set the artist's inputs to a preset's, in a copy of another file's material; returns whether it has them."""
     if node_of(smoke) is None:
         return False
     if is_linked(smoke):
@@ -166,7 +151,7 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
         smoke.material_slots[0].material = own
     node = node_of(smoke)
     socket = node.inputs["Anisotropy"]
-    set_and_remember(material_of(smoke), _key(socket.name), socket, "default_value", fitted_anisotropy)
+    set_and_remember(material_of(smoke), socket.name, socket, "default_value", fitted_anisotropy)
     as_in_clip = {item.name: item.default for item in _INPUTS[:6]}
     for key, value in (as_in_clip | PRESETS[name][2]).items():
         if key in node.inputs:
@@ -174,19 +159,12 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
     return True
 
 
-def _key(name: str) -> str:
-    return name.lower().replace(" ", "_")
-
-
 def _new_material(name: str) -> bpy.types.Material:
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:  # since 5.0 there always is one
-        material.use_nodes = True
+    material = empty_material(name)
     tree = material.node_tree
-    tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")], _build)
+    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, {"Volume": "NodeSocketShader"}, _build)
     node.name = node.label = NODE
     node.width, node.location = 220.0, (-300.0, 0.0)
     tree.links.new(node.outputs[0], output.inputs["Volume"])
@@ -194,10 +172,7 @@ def _new_material(name: str) -> bpy.types.Material:
 
 
 def _build(tree: bpy.types.NodeTree) -> None:
-    """Make the group's nodes."""
-    given = tree.nodes.new("NodeGroupInput")
-    given.location = (-200.0, -600.0)
-    source = given.outputs
+    source = add_node(tree, "NodeGroupInput", -1, 3).outputs
     feeds = {
         "Density": _extinction(tree, source),
         "Color": _albedo(tree, source),

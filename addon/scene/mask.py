@@ -17,8 +17,7 @@ from .clip import frame_count
 from .pictures import picture_scene
 from .smoke import scene_of
 
-PATTERN = "mask_####.png"
-"""Names of the pictures of a mask that moves; without the number of one that does not."""
+PATTERN = "mask_####.png"  # names of the pictures of a mask that moves; without the number of one that does not
 
 LAYER = ("alpha", "blend", "falloff", "invert", "hide_render", "use_fill_holes", "use_fill_overlap")
 

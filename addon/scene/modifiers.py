@@ -16,26 +16,18 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, add_node, file_group, get_input, input_path, math_node, number, set_input
+from .nodes import Input, Socket, Tree, add_node, file_group, get_input, input_path, math_node, number, set_input
 
 
 @dataclass(frozen=True)
 class SecondVolume:
-    """A kind of modifier, of which a smoke has one or none.
+    """A kind of modifier, of which a smoke has one or none."""
 
-    Attributes
-    ----------
-    name, mark, inputs, build
-        Of the modifier and its node group, as `file_group` has them.
-    socket
-        Input that is the second Volume's object, whose name ends so.
-    """
-
-    name: str
+    name: str  # of the modifier and its node group, as `file_group` has the next ones too
     mark: str
     inputs: tuple[Input, ...]
-    build: Callable[[bpy.types.NodeTree], None]
-    socket: str
+    build: Callable[[Tree], None]
+    socket: str  # input that is the second Volume's object, whose name ends so
 
     def modifier(self, smoke: bpy.types.Object) -> bpy.types.Modifier | None:
         """The modifier of a smoke."""
@@ -53,8 +45,8 @@ class SecondVolume:
         modifier = self.modifier(smoke)
         if modifier is None:
             modifier = smoke.modifiers.new(self.name, "NODES")
-            smoke_out = [("Smoke", "NodeSocketGeometry")]
-            group = file_group(self.name, "GeometryNodeTree", self.mark, self.inputs, smoke_out, self.build)
+            outputs = {"Smoke": "NodeSocketGeometry"}
+            group = file_group(self.name, "GeometryNodeTree", self.mark, self.inputs, outputs, self.build)
             modifier.node_group = group
             smoke.modifiers.move(len(smoke.modifiers) - 1, 0)  # those of the artist act on what it makes
         obj = get_input(modifier, self.socket)
@@ -79,7 +71,7 @@ class SecondVolume:
             bpy.data.volumes.remove(obj.data)  # takes the object with it
 
 
-def _build_proxy(tree: bpy.types.NodeTree) -> None:
+def _build_proxy(tree: Tree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0)
     shown = add_node(tree, "GeometryNodeObjectInfo", 1, 0, given.outputs["Proxy"])
     add_node(tree, "NodeGroupOutput", 2, 0, shown.outputs["Geometry"])
@@ -113,11 +105,8 @@ def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
         PROXY.remove(smoke)
 
 
-CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)
-"""Whether this Blender has nodes that move grids."""
-
-GRIDS = ("density", "flame")
-"""What is moved, where the files have it."""
+CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)  # whether this Blender has nodes that move grids
+GRIDS = ("density", "flame")  # what is moved, where the files have it
 
 _INTERPOLATION_INPUTS = (
     Input("Smoke", "NodeSocketGeometry", "The frame before"),
@@ -149,16 +138,14 @@ def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> 
     set_input(modifier, "Seconds", seconds)
     path = input_path(modifier, "Part")
     smoke.driver_remove(path)
-    driver = smoke.driver_add(path).driver
-    driver.type = "SCRIPTED"
-    driver.expression = f"fmod({place},1)"
+    smoke.driver_add(path).driver.expression = f"fmod({place},1)"
 
 
-def _build_interpolation(tree: bpy.types.NodeTree) -> None:
+def _build_interpolation(tree: Tree) -> None:
     given = add_node(tree, "NodeGroupInput", 0, 0).outputs
     later = add_node(tree, "GeometryNodeObjectInfo", 1, 3, given["Next Frame"]).outputs["Geometry"]
 
-    def moved(volume: bpy.types.NodeSocket, name: str, row: int, seconds: Any, weight: Any) -> bpy.types.NodeSocket:
+    def moved(volume: Socket, name: str, row: int, seconds: Any, weight: Any) -> Socket:
         """A grid that went on with its velocity for some seconds, times a number."""
         grid, velocity = (
             add_node(tree, "GeometryNodeGetNamedGrid", 2, place, volume, grid_name, False, data_type=kind)

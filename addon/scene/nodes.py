@@ -1,12 +1,13 @@
 """Node groups that the add-on makes: their sockets, and the nodes in them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import bpy
 
-SPACING = 200.0
-"""Distance from one column or row of nodes to the next."""
+Tree, Socket = bpy.types.NodeTree, bpy.types.NodeSocket
+
+SPACING = 200.0  # distance from one column or row of nodes to the next
 
 
 class Input(NamedTuple):
@@ -32,14 +33,18 @@ def color(name: str, description: str, default: tuple[float, float, float, float
     return Input(name, "NodeSocketColor", description, default)
 
 
+def empty_material(name: str) -> bpy.types.Material:
+    """A new material without nodes."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # since 5.0 there always is one
+        material.use_nodes = True
+    material.node_tree.nodes.clear()
+    return material
+
+
 def file_group(
-    name: str,
-    kind: str,
-    mark: str,
-    inputs: Sequence[Input],
-    outputs: Sequence[tuple[str, str]],
-    build: Callable[[bpy.types.NodeTree], None],
-) -> bpy.types.NodeTree:
+    name: str, kind: str, mark: str, inputs: Sequence[Input], outputs: Mapping[str, str], build: Callable[[Tree], None]
+) -> Tree:
     """The file's own node group, which the artist may have changed, or else a new one, whose nodes ``build`` adds.
 
     The kind is that of its tree. The mark is the custom property by which it is found under any name. Outputs are
@@ -59,15 +64,13 @@ def file_group(
         for attribute, value in (("min_value", item.low), ("max_value", item.high), ("default_value", item.default)):
             if value is not None:
                 setattr(socket, attribute, value)
-    for output, output_kind in outputs:
+    for output, output_kind in outputs.items():
         tree.interface.new_socket(output, in_out="OUTPUT", socket_type=output_kind)
     build(tree)
     return tree
 
 
-def add_node(
-    tree: bpy.types.NodeTree, kind: str, column: float, row: float, *inputs: Any, **settings: Any
-) -> bpy.types.Node:
+def add_node(tree: Tree, kind: str, column: float, row: float, *inputs: Any, **settings: Any) -> bpy.types.Node:
     """Add a node at a place of the grid that `SPACING` makes, with these values of its attributes.
 
     Sockets of other nodes, or values, feed its first inputs, in their order, after the attributes are set.
@@ -81,30 +84,24 @@ def add_node(
     return node
 
 
-def math_node(
-    tree: bpy.types.NodeTree, operation: str, column: float, row: float, *values: Any
-) -> bpy.types.NodeSocket:
+def math_node(tree: Tree, operation: str, column: float, row: float, *values: Any) -> Socket:
     """A number of other numbers, by a node at a place of the grid."""
     return add_node(tree, "ShaderNodeMath", column, row, *values, operation=operation).outputs[0]
 
 
-def vector_node(
-    tree: bpy.types.NodeTree, operation: str, column: float, row: float, *values: Any
-) -> bpy.types.NodeSocket:
+def vector_node(tree: Tree, operation: str, column: float, row: float, *values: Any) -> Socket:
     """A vector of other vectors."""
     return add_node(tree, "ShaderNodeVectorMath", column, row, *values, operation=operation).outputs["Vector"]
 
 
-def scaled_vector(
-    tree: bpy.types.NodeTree, column: float, row: float, vector: Any, factor: bpy.types.NodeSocket
-) -> bpy.types.NodeSocket:
+def scaled_vector(tree: Tree, column: float, row: float, vector: Any, factor: Socket) -> Socket:
     """A vector times a number."""
     node = add_node(tree, "ShaderNodeVectorMath", column, row, vector, operation="SCALE")
     tree.links.new(factor, node.inputs["Scale"])
     return node.outputs["Vector"]
 
 
-def feed(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: Any) -> None:
+def feed(tree: Tree, socket: Socket, value: Any) -> None:
     """Link an input to a socket, or set it to a value."""
     if isinstance(value, bpy.types.NodeSocket):
         tree.links.new(value, socket)

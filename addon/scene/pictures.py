@@ -11,9 +11,9 @@ from pathlib import Path
 import bpy
 
 from .compositing import SINCE_5, compositor
+from .nodes import Socket, Tree
 
-UNDISTORTED_BITS, FILMED_BITS = "16", "8"
-"""Bits per channel of a picture that is computed anew, and of one that is shown as it was filmed."""
+UNDISTORTED_BITS, FILMED_BITS = "16", "8"  # per channel of a picture that is computed anew, and as it was filmed
 
 COEFFICIENTS = {
     "POLYNOMIAL": ("k1", "k2", "k3"),
@@ -25,9 +25,7 @@ COEFFICIENTS = {
 
 
 @contextmanager
-def picture_scene(
-    clip: bpy.types.MovieClip,
-) -> Iterator[tuple[bpy.types.Scene, bpy.types.NodeTree, bpy.types.NodeSocket]]:
+def picture_scene(clip: bpy.types.MovieClip) -> Iterator[tuple[bpy.types.Scene, Tree, Socket]]:
     """A scene of its own that renders PNG of a clip's size, the nodes of its compositor, and what they are shown by."""
     scene = bpy.data.scenes.new("Smokelift Pictures")
     scene.camera = bpy.data.objects.new("Smokelift Pictures", bpy.data.cameras.new("Smokelift Pictures"))
@@ -66,9 +64,7 @@ def write_pictures(clip: bpy.types.MovieClip, first: int, last: int, prefix: Pat
         return Path(scene.render.frame_path(frame=first))
 
 
-def _undistorted(
-    tree: bpy.types.NodeTree, clip: bpy.types.MovieClip, pictures: bpy.types.NodeSocket
-) -> bpy.types.NodeSocket:
+def _undistorted(tree: Tree, clip: bpy.types.MovieClip, pictures: Socket) -> Socket:
     lens = tree.nodes.new("CompositorNodeMovieDistortion")
     lens.clip = clip
     if "Type" in lens.inputs:  # since 5.0
@@ -88,9 +84,8 @@ def is_distorted(clip: bpy.types.MovieClip) -> bool:
 def undistorted(clip: bpy.types.MovieClip, folder: Path) -> bpy.types.MovieClip:
     """Write a clip's undistorted pictures (PNG, 16 bits) into a folder; returns them as a clip of the same frames."""
     last = clip.frame_start + clip.frame_duration - 1
-    made = bpy.data.movieclips.load(
-        str(write_pictures(clip, clip.frame_start, last, folder / "undistorted_", undistort=True))
-    )
+    first = write_pictures(clip, clip.frame_start, last, folder / "undistorted_", undistort=True)
+    made = bpy.data.movieclips.load(str(first))
     made.name = f"{clip.name} undistorted"
     made.frame_start = clip.frame_start
     for name in ("sensor_width", "focal_length", "pixel_aspect"):

@@ -12,20 +12,15 @@ from ..core import ShotError
 from . import volume
 from .blender import absolute, relative
 from .clip import frame_count, number_in_file
+from .nodes import Socket, Tree
 from .strokes import saved_strokes
 
-MARK = "smokelift_plate"
-"""Custom property of pictures that a camera's view shows behind smoke, by which they are found again."""
-
-BACKGROUND = "Smokelift Background"
-"""Name of a picture of one color."""
+MARK = "smokelift_plate"  # custom property of pictures that a camera's view shows behind smoke
+BACKGROUND = "Smokelift Background"  # name of a picture of one color
 
 
 def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
-    """The table; empty where the engine estimates the background.
-
-    ShotError if a picture is missing, or the clip does not have the frames.
-    """
+    """The table; empty where the engine estimates the background. ShotError if a picture or a frame is missing."""
     settings, table = smoke.smokelift, {}
     if settings.plate_mode == "FILE":
         table["image"] = str(_plate(settings.plate))
@@ -75,12 +70,7 @@ def plate_image(smoke: bpy.types.Object) -> bpy.types.Image:
     return image
 
 
-def show_plate(
-    smoke: bpy.types.Object,
-    tree: bpy.types.NodeTree,
-    shader: bpy.types.ShaderNode,
-    place: Callable[[], bpy.types.NodeSocket],
-) -> None:
+def show_plate(smoke: bpy.types.Object, tree: Tree, shader: bpy.types.ShaderNode, place: Callable[[], Socket]) -> None:
     """Have a shader show the clean plate of the result on show, or one color if the background is that.
 
     It has an input Color. If no texture is connected to that yet, ``place`` makes coordinates in the plate.

@@ -11,22 +11,15 @@ from mathutils import Matrix, Vector
 
 from .blender import set_unless_changed
 from .box import engine_to_world
-from .nodes import Input, add_node, file_group, math_node, number, vector_node
+from .nodes import Input, Tree, add_node, empty_material, file_group, math_node, number, vector_node
 from .plate import show_plate
 from .smoke import scene_of
 from .volume import frames_before, shown_index
 
-MATERIAL = "Smokelift Projection"
-"""Name of the material, and of the node group in it."""
-
-MARK = "smokelift_projection"
-"""Custom property by which material and group are known under any name."""
-
-PROJECTOR = "Smokelift Projector"
-"""Name of the camera that stands where the clip was filmed from."""
-
-CARD = "Smokelift Card"
-"""Name of the plane that the plate is projected on."""
+MATERIAL = "Smokelift Projection"  # name of the material, and of the node group in it
+MARK = "smokelift_projection"  # custom property by which material and group are known under any name
+PROJECTOR = "Smokelift Projector"  # name of the camera that stands where the clip was filmed from
+CARD = "Smokelift Card"  # name of the plane that the plate is projected on
 
 _INPUTS = (
     Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
@@ -35,11 +28,8 @@ _INPUTS = (
     number("Perspective", "1 for a perspective camera, 0 for an orthographic one"),
 )
 
-CARD_BEHIND = 1.1
-"""Distance of the card from the projector over that of the box's farthest corner."""
-
-CARD_WIDTHS = 2.0
-"""Width of the card over the picture's there: room for a camera that moves aside."""
+CARD_BEHIND = 1.1  # distance of the card from the projector over that of the box's farthest corner
+CARD_WIDTHS = 2.0  # width of the card over the picture's there: room for a camera that moves aside
 
 
 def project(smoke: bpy.types.Object) -> None:
@@ -141,21 +131,16 @@ def _material(projector: bpy.types.Object, table: dict[str, Any]) -> bpy.types.M
 
 def _new_material() -> bpy.types.Material:
     """A material that the camera sees, and which neither lights the smoke nor takes light from it."""
-    material = bpy.data.materials.new(MATERIAL)
+    material = empty_material(MATERIAL)
     material[MARK] = True
-    if material.node_tree is None:  # since 5.0 there always is one
-        material.use_nodes = True
     tree = material.node_tree
-    tree.nodes.clear()
-
     output, mix = add_node(tree, "ShaderNodeOutputMaterial", 5, 0), add_node(tree, "ShaderNodeMixShader", 4, 0)
     rays, clear = add_node(tree, "ShaderNodeLightPath", 3, -2), add_node(tree, "ShaderNodeBsdfTransparent", 3, -1)
     shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL, label=MATERIAL)
-    outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
+    outputs = {"Vector": "NodeSocketVector", "In Front": "NodeSocketFloat"}
     group = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
-    place = add_node(
-        tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=f"{MATERIAL} Place", label=f"{MATERIAL} Place"
-    )
+    name = f"{MATERIAL} Place"
+    place = add_node(tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=name, label=name)
     place.width = 180.0
     projector = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR, label=PROJECTOR)
     tree.links.new(projector.outputs["Object"], place.inputs["Point"])
@@ -168,7 +153,7 @@ def _new_material() -> bpy.types.Material:
     return material
 
 
-def _build(tree: bpy.types.NodeTree) -> None:
+def _build(tree: Tree) -> None:
     """Make the nodes of center + focal length x (point / depth); a camera looks along its -Z axis."""
     source = add_node(tree, "NodeGroupInput", 0, 0).outputs
     z = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0, source["Point"]).outputs["Z"]

@@ -24,10 +24,7 @@ from .smoke import scene_of
 
 
 def footage_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
-    """The tables of the clip and of what is behind its smoke; ``quick`` as in `shot_tables`.
-
-    ShotError if something is missing or unusable.
-    """
+    """The tables of the clip and of what is behind its smoke; ``quick`` and errors as in `shot_tables`."""
     tables: dict[str, Any] = {"clip": clip_table(smoke)}
     mask = mask_path(smoke, quick)
     if mask is not None:

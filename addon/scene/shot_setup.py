@@ -21,17 +21,10 @@ from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
 NAME = "Smokelift"
 
-NEW_RANGE = (1, 250)
-"""Frames of a new file of Blender."""
-
-SENSOR_WIDTH = 36.0
-"""Millimeters; Blender's default."""
-
-BOUNCES = 128
-"""How often Cycles scatters light in smoke that was fitted with scattering of all orders."""
-
-NEW_SAMPLES = 4096
-"""Cycles' samples per pixel in a new file."""
+NEW_RANGE = (1, 250)  # frames of a new file of Blender
+SENSOR_WIDTH = 36.0  # millimeters; Blender's default
+BOUNCES = 128  # how often Cycles scatters light in smoke that was fitted with scattering of all orders
+NEW_SAMPLES = 4096  # Cycles' samples per pixel in a new file
 
 SAMPLES = 32
 """Samples per pixel of a set-up in a new file: marching through smoke and denoised, the example's 640 x 960 pixels take
@@ -68,10 +61,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
 
 
 def set_up(smoke: bpy.types.Object) -> list[str]:
-    """Make a render of the result on show match the clip from the camera, in the parts that are ticked.
-
-    Returns what an artist should know of it, a sentence each.
-    """
+    """Make renders match the clip from the camera, in the ticked parts; returns what to know of it, a sentence each."""
     settings, scene, index = smoke.smokelift, scene_of(smoke), volume.shown_index(smoke)
     said = []
     if settings.set_up_plate:
@@ -96,19 +86,17 @@ def set_up(smoke: bpy.types.Object) -> list[str]:
         if estimated:
             lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
             if lamps:
-                text = rpt_(
-                    "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
-                )
-                said.append(text.format(", ".join(lamps)))
+                text = "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
+                said.append(rpt_(text).format(", ".join(lamps)))
             if hide_default_lamp(scene):
                 said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
             lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
             further = [obj.name for obj in lights if not _is_estimated(obj)]
             if further:
-                text = rpt_("Beside the clip's light the smoke has that of {:s}: hide it from renders for a match.")
-                said.append(text.format(", ".join(further)))
+                text = "Beside the clip's light the smoke has that of {:s}: hide it from renders for a match."
+                said.append(rpt_(text).format(", ".join(further)))
     if settings.set_up_plate:
-        _set_up_plate(smoke)
+        {"WORLD": _set_world, "COMPOSITE": composite, "PROJECTION": project}[settings.plate_place](smoke)
     if settings.set_up_colors:
         scene.view_settings.view_transform = "Standard"
         scene.view_settings.look = "None"
@@ -127,22 +115,8 @@ def _disable_other_plates(smoke: bpy.types.Object) -> None:
         tree.nodes[NAME].mute = place != "WORLD"  # a muted Mix Shader shows what the world was before
 
 
-def _set_up_plate(smoke: bpy.types.Object) -> None:
-    """Show the clean plate where it was chosen to be."""
-    place = smoke.smokelift.plate_place
-    if place == "COMPOSITE":
-        composite(smoke)
-    elif place == "PROJECTION":
-        project(smoke)
-    else:
-        _set_world(smoke)
-
-
 def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
-    """The camera that the engine assumed, made or moved; None if the engine used the scene's own.
-
-    Its place and its lens stay where the artist changed them.
-    """
+    """The camera that the engine assumed, made or moved unless the artist did that; None if it used the scene's own."""
     settings, scene = smoke.smokelift, scene_of(smoke)
     if settings.camera_mode != "ESTIMATE":
         return None
@@ -163,7 +137,7 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
 
 def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     """Let light bounce in smoke as often as in the model that the smoke was fitted with; by default it does once."""
-    bounces = BOUNCES if _scattering(index) == "multiple" else 0
+    bounces = BOUNCES if index["scene"]["medium"].get("scattering") == "multiple" else 0
     set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
     if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
         scene.cycles.max_bounces = max(scene.cycles.max_bounces, bounces)
@@ -186,16 +160,8 @@ def has_denoiser() -> bool:
     return bool(getattr(_cycles, "with_openimagedenoise", True))
 
 
-def _scattering(index: dict[str, Any]) -> str | None:
-    """The model of scattering that the smoke was fitted with, where the take says it."""
-    return index["scene"]["medium"].get("scattering")
-
-
 def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[dict[str, Any]]) -> None:
-    """The suns that the engine estimated, and none of an earlier result besides.
-
-    They cast shadows where the smoke was fitted with them.
-    """
+    """The suns that the engine estimated, with shadows if the smoke was fitted with them; none of earlier results."""
     names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))][: len(tables)]
     for name, table in zip(names, tables, strict=True):
         sun = scene.objects.get(name)
@@ -205,7 +171,7 @@ def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[
         strongest = max(table["irradiance"]) or 1.0
         sun.data.energy = strongest
         sun.data.color = [part / strongest for part in table["irradiance"]]
-        sun.data.use_shadow = _scattering(index) in ("multiple", "single")
+        sun.data.use_shadow = index["scene"]["medium"].get("scattering") in ("multiple", "single")
         sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
     for sun in [each for each in scene.objects if _is_estimated(each) and each.name not in names]:
         bpy.data.objects.remove(sun)
@@ -222,7 +188,9 @@ def _set_world(smoke: bpy.types.Object) -> None:
     scene.render.film_transparent = False
     world = scene.world
     if world is None or not world.name.startswith(NAME):
-        _remove_unused_worlds()
+        for unused in [each for each in bpy.data.worlds if each.users == 0 and each.node_tree is not None]:
+            if NAME in unused.node_tree.nodes:  # an earlier set-up's, which the artist took out of its scene
+                bpy.data.worlds.remove(unused)
         if world is None:
             world = bpy.data.worlds.new(NAME)
         else:
@@ -251,10 +219,3 @@ def _set_world(smoke: bpy.types.Object) -> None:
             node.location = mix.location - Vector((left, 200.0))
     tree, background = world.node_tree, mix.inputs[2].links[0].from_node
     show_plate(smoke, tree, background, lambda: tree.nodes.new("ShaderNodeTexCoord").outputs["Window"])
-
-
-def _remove_unused_worlds() -> None:
-    """Remove the worlds of earlier set-ups, which the artist took out of their scenes."""
-    for world in list(bpy.data.worlds):
-        if world.users == 0 and world.node_tree is not None and NAME in world.node_tree.nodes:
-            bpy.data.worlds.remove(world)

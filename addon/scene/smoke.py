@@ -12,8 +12,7 @@ from .blender import preferred
 LAMP_OF_A_NEW_FILE = (4.0762453, 1.0054539, 5.9038620), 1000.0
 """Place (m) and power (W) of the point light that Blender's own new file begins with."""
 
-ASSUMED_CAMERA = "Smokelift Camera"
-"""Name of a camera that stands where the engine assumed the clip's."""
+ASSUMED_CAMERA = "Smokelift Camera"  # name of a camera that stands where the engine assumed the clip's
 
 
 def volume_objects() -> list[bpy.types.Object]:
@@ -132,10 +131,7 @@ def _untouched(scene: bpy.types.Scene, name: str, kind: str) -> bpy.types.Object
 
 
 def hide_default_cube(scene: bpy.types.Scene) -> bool:
-    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place.
-
-    Returns whether it was seen.
-    """
+    """Hide the cube of a new file, which stands where smoke of an unknown place is put; returns whether it was seen."""
     cube = _untouched(scene, "Cube", "MESH")
     if cube is None or cube.matrix_basis != Matrix.Identity(4):
         return False

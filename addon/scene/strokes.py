@@ -14,24 +14,14 @@ import numpy.typing as npt
 from ..core import ShotError
 from .blender import absolute
 
-SATURATION = 0.25
-"""Fraction of the frame's saturation that is kept below the strokes."""
-
-MIN_STROKE = 0.5
-"""Smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below."""
-
-WRITTEN = "smokelift_written"
-"""Custom property of an image that has a frame below: the time of its file when its strokes were written."""
-
-Pixels = npt.NDArray[np.float32]
-"""Red, green, blue and alpha of an image, (pixels, 4)."""
+SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
+MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
+WRITTEN = "smokelift_written"  # custom property of an image with a frame below: its file's time when written
+Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pixels, 4)
 
 
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
-    """The file of the strokes on a clip, with what was painted last.
-
-    ShotError if there is no file, it cannot be written, or it is of another size than the clip.
-    """
+    """The file of the strokes on a clip, with what was painted last; ShotError if it is missing or of another size."""
     file = absolute(image.filepath, image.library)
     try:
         if WRITTEN in image:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
@@ -19,28 +18,21 @@ from .look import fit_look
 from .modifiers import FRAMES_BETWEEN, PROXY, drive_interpolation, fit_interpolation, fit_proxy
 from .smoke import scene_of, smokes
 
-BESIDE = 1.1
-"""Widths of the box between a smoke and another take beside it."""
-
-EARLY = 0.001
-"""Frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one."""
+BESIDE = 1.1  # widths of the box between a smoke and another take beside it
+EARLY = 0.001  # frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one
 
 GOOD_DEGREES = 30
 """Degrees beside its camera at which smoke of one camera still has what `sentences` calls good, about 28 dB: 29.0 at 20
 and 25.1 at 45 degrees, mean of four scenes, smooth (docs/accuracy.md)."""
 
-_FRAMES = re.compile(r"[Ff]rames? \d+(?: to \d+)?")
-"""Frames that a sentence of the engine names."""
+_FRAMES = re.compile(r"[Ff]rames? \d+(?: to \d+)?")  # frames that a sentence of the engine names
 
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
 
 
 def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
-    """Show a take's finished frames in a smoke, which is returned; None while there are none.
-
-    What the artist changed of its place and material stays.
-    """
+    """Show a take's finished frames in a smoke, whose place and material stay the artist's; None if there are none."""
     index = take.read().index
     if not index or not index["frames"]:
         return None
@@ -144,10 +136,7 @@ def take_before(smoke: bpy.types.Object) -> Take | None:
 
 
 def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
-    """Show a take in a copy of a smoke, on its right, which is returned; None if no frame is finished.
-
-    It is no smoke itself, and can be deleted like any object.
-    """
+    """Show a take in a copy of a smoke, on its right, which is no smoke itself; None if no frame is finished."""
     index = take.read().index
     if not index or not index["frames"]:
         return None
@@ -209,7 +198,6 @@ def _renumbered(words: str, before: int) -> str:
     return _FRAMES.sub(lambda named: re.sub(r"\d+", lambda number: str(int(number[0]) + before), named[0]), words)
 
 
-@persistent
 def correct_positions(_file: str = "") -> None:
     """Correct all smokes, since another version of Blender may have saved the file."""
     for smoke, index in _shown():
@@ -256,7 +244,6 @@ def _play(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
 
 
 def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> None:
-    """Make a Volume read the files of a take."""
     path = relative(file)
     if volume.filepath != path:
         volume.filepath = path
@@ -297,16 +284,11 @@ def _set_time(smoke: bpy.types.Object, index: dict[str, Any]) -> None:
         if real or live:
             # Blender shows one file in each frame of the scene; the driven offset selects another
             file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
-            _drive(volume, "frame_offset", f"{file}-(frame-{start})+{numbers[0] - 1}")
+            volume.driver_add("frame_offset").driver.expression = f"{file}-(frame-{start})+{numbers[0] - 1}"
         if live and len(speeds) > 1:
-            _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({timing.speed(time)})")
+            scale = f"{1.0 if real else ratio:.9g}*({timing.speed(time)})"
+            volume.driver_add("velocity_scale").driver.expression = scale
     drive_interpolation(smoke, place, 1.0 / index["scene"]["clip"]["fps"])
-
-
-def _drive(volume: bpy.types.Volume, name: str, expression: str) -> None:
-    driver = volume.driver_add(name).driver
-    driver.type = "SCRIPTED"
-    driver.expression = expression
 
 
 def _ratio(smoke: bpy.types.Object, index: dict[str, Any]) -> float:
@@ -331,29 +313,22 @@ def frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> i
     return settings.first - 1 if frames is None or settings.clip is None else frames[0] - settings.clip.frame_offset
 
 
-@persistent
 def _listen(_file: str = "") -> None:
     """Have Blender say when the time or rate of a clip or scene changes; loading a file ends that."""
     bpy.msgbus.clear_by_owner(_LISTENER)
-    for owner, name in _TIMES:
-        key = (getattr(bpy.types, owner), name)
-        bpy.msgbus.subscribe_rna(key=key, owner=_LISTENER, args=(), notify=synchronize_playback)
+    for owner, names in _TIMES.items():
+        for name in names:
+            key = (getattr(bpy.types, owner), name)
+            bpy.msgbus.subscribe_rna(key=key, owner=_LISTENER, args=(), notify=synchronize_playback)
 
 
 _LISTENER = object()
-
-_TIMES = (
-    ("MovieClip", "frame_start"),
-    ("MovieClip", "frame_offset"),
-    ("RenderSettings", "fps"),
-    ("RenderSettings", "fps_base"),
-)
+_TIMES = {"MovieClip": ("frame_start", "frame_offset"), "RenderSettings": ("fps", "fps_base")}
 
 HANDLERS = ((bpy.app.handlers.load_post, correct_positions), (bpy.app.handlers.load_post, _listen))
 
 
-def register() -> None:
-    _listen()
+register = _listen
 
 
 def unregister() -> None:

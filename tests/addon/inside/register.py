@@ -70,7 +70,7 @@ def test_what_cannot_be_used_says_so_without_an_error(scene) -> None:
     asked = [kind for kind in kinds if hasattr(kind, "poll") and kind.__name__ != "SMOKELIFT_PT_strokes"]
     assert len(asked) > 30
     may = {kind.__name__ for kind in asked if kind.poll(bpy.context)}
-    always = {"SMOKELIFT_OT_add", "SMOKELIFT_OT_open_manual", "SMOKELIFT_PT_view", "SMOKELIFT_PT_clip"}
+    always = {f"SMOKELIFT_{name}" for name in ("OT_add", "OT_open_manual", "OT_stroke", "PT_view", "PT_clip")}
     assert may - {"SMOKELIFT_PT_presets"} == always
 
 
