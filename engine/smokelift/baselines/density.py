@@ -52,22 +52,15 @@ class OrthogonalCopy:
 
 @dataclass(frozen=True)
 class FixedRateDescent:
-    """The paper's density fit; DeviceError if Taichi, which its renderer runs on, is not installed.
-
-    Attributes
-    ----------
-    rate
-        Change of density by one step in the steepest voxel of the prior's fog. The paper gives no figure
-        (docs/experiments/density-descent.md).
-    iterations
-        Largest number of steps.
-    least_loss
-        Mean squared difference, over the pictures' mean square, at which to stop.
-    """
+    """The paper's density fit; DeviceError if Taichi, which its renderer runs on, is not installed."""
 
     rate: float = 0.03
+    """Change of density by one step in the steepest voxel of the prior's fog. The paper gives no figure
+    (docs/experiments/density-descent.md)."""
     iterations: int = 60
+    """Largest number of steps."""
     least_loss: float = 1e-4
+    """Mean squared difference, over the pictures' mean square, at which to stop."""
 
     def __post_init__(self) -> None:
         """Check for Taichi before anything is done."""

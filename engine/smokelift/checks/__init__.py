@@ -69,34 +69,23 @@ UNDETERMINED = "undetermined"
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that was given, measured, assumed or noticed.
-
-    Attributes
-    ----------
-    kind
-        Name of its words.
-    figures
-        What the words fill in, by name. ``view`` is the number of the further view that it is about, ``tolerance`` what
-        the deciding figure of a choice was compared with.
-    about
-        What it decides or explains, such as ``"background"`` or ``"scattering"``; empty of what is only noticed.
-    value
-        What a choice takes, or `UNDETERMINED`; None where nothing was chosen.
-    source
-        The user gives it, the pictures show it (``"measured"``), or it follows from what they show (``"estimated"``).
-        The pictures leave the others undetermined: ``"assumed"`` is one answer for all clips, ``"made up"`` one of many
-        for this one. None of what is only noticed.
-    spread
-        Standard deviation of the value: meters of a depth; None if it is unknown.
-    doubt
-        Whether it says why the result may be nothing, or wrong.
-    """
+    """Something that was given, measured, assumed or noticed."""
 
     kind: str
+    """Name of its words."""
     figures: Figures = field(default_factory=dict)
+    """What the words fill in, by name. ``view`` is the number of the further view that it is about, ``tolerance`` what
+    the deciding figure of a choice was compared with."""
     _: KW_ONLY
     about: str = ""
+    """What it decides or explains, such as ``"background"`` or ``"scattering"``; empty of what is only noticed."""
     value: Figure | None = None
+    """What a choice takes, or `UNDETERMINED`; None where nothing was chosen."""
     source: Source | None = None
+    """The user gives it, the pictures show it (``"measured"``), or it follows from what they show (``"estimated"``).
+    The pictures leave the others undetermined: ``"assumed"`` is one answer for all clips, ``"made up"`` one of many for
+    this one. None of what is only noticed."""
     spread: float | None = None
+    """Standard deviation of the value: meters of a depth; None if it is unknown."""
     doubt: bool = False
+    """Whether it says why the result may be nothing, or wrong."""

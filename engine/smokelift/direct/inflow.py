@@ -58,20 +58,14 @@ class Inflow:
     """The inlets, and the frames of the clip that are replayed in them.
 
     Forwards and backwards in turn, so that no frame jumps and the statistics stay those of the clip.
-
-    Attributes
-    ----------
-    voxels : (nx, ny, nz) bool
-        Those of all inlets, in a box around them.
-    states
-        Of the clip, in their order, in that box.
-    first
-        The simulation's voxel at which that box begins.
     """
 
     voxels: Mask
+    """(nx, ny, nz) bool: those of all inlets, in a box around them."""
     states: Sequence[SmokeState]
+    """Of the clip, in their order, in that box."""
     first: tuple[int, ...] = (0, 0, 0)
+    """The simulation's voxel at which that box begins."""
 
     def at(self, step: int) -> SmokeState:
         """The state that is replayed so many steps after the last one."""

@@ -27,19 +27,13 @@ LABEL_SCORES = ("patches", "patches_worst", "patches_own", "edges", "flicker")
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """What was found.
-
-    Attributes
-    ----------
-    figures
-        Nested plain values, as JSON holds them; None where there is nothing to say.
-    sequence, truth
-        What was evaluated, and the truth of its box, if it is known.
-    """
+    """What was found."""
 
     figures: Figures
+    """Nested plain values, as JSON holds them; None where there is nothing to say."""
     sequence: Sequence
     truth: Truth | None
+    """What was evaluated, and the truth of its box, if it is known."""
 
     def write_picture(self, path: Path) -> None:
         """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""

@@ -24,27 +24,18 @@ INPUT = "input"
 
 @dataclass(frozen=True, eq=False)
 class ReferenceView:
-    """A camera with the clip that its pictures are compared with.
-
-    Attributes
-    ----------
-    name
-        To call it by.
-    camera
-        With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on.
-    background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke.
-    clip
-        Its footage.
-    first
-        The clip's frame that the sequence's frame 1 belongs to.
-    """
+    """A camera with the clip that its pictures are compared with."""
 
     name: str
+    """To call it by."""
     camera: Camera
+    """With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on."""
     background: Image
+    """(rows, columns, 3) or (3,): linear radiance behind the smoke."""
     clip: Clip
+    """Its footage."""
     first: int
+    """The clip's frame that the sequence's frame 1 belongs to."""
 
     def picture(self, number: int) -> Image:
         """The clip's picture of a frame of the sequence, with its background where a mask hides it.

@@ -64,29 +64,16 @@ _OWN = re.compile(r"(smoke|proxy)_\d{4,}\.vdb")
 
 @dataclass(frozen=True)
 class ExportSettings:
-    """What is exported.
-
-    Attributes
-    ----------
-    precision
-        ``"half"`` for floats of 16 bits; ``"quantized"`` for as few bits as a picture of 8 bits needs.
-    velocity
-        Whether to export the velocity, which motion blur needs.
-    proxy
-        How many times coarser a second sequence for viewports is, of the density alone; 1 for none.
-    host
-        The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``.
-
-    Raises
-    ------
-    ValueError
-        If the proxy is not 1 to 16.
-    """
+    """What is exported; ValueError if the proxy is not 1 to 16."""
 
     precision: Precision = "half"
+    """``"half"`` for floats of 16 bits; ``"quantized"`` for as few bits as a picture of 8 bits needs."""
     velocity: bool = True
+    """Whether to export the velocity, which motion blur needs."""
     proxy: int = 1
+    """How many times coarser a second sequence for viewports is, of the density alone; 1 for none."""
     host: HostName = "blender"
+    """The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``."""
 
     def __post_init__(self) -> None:
         """Check the proxy."""

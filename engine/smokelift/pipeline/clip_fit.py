@@ -27,19 +27,13 @@ two rays per voxel see both its ends and its middle (docs/experiments/clip-pixel
 
 @dataclass(frozen=True, eq=False)
 class BesideClip:
-    """Pixels of a clip's frame where the domain is, and what a density shows there.
-
-    Attributes
-    ----------
-    seen, shown : (rows, columns, 3)
-        The clip's and the density's; linear radiance.
-    inside : (rows, columns) bool
-        Which of them show smoke in the clip.
-    """
+    """Pixels of a clip's frame where the domain is, and what a density shows there."""
 
     seen: Image
     shown: Image
+    """(rows, columns, 3): the clip's and the density's; linear radiance."""
     inside: NDArray[np.bool_]
+    """(rows, columns) bool: which of them show smoke in the clip."""
 
     @property
     def psnr(self) -> float | None:

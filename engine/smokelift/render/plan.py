@@ -16,42 +16,28 @@ from smokelift.scene.domain import box_around
 
 @dataclass(frozen=True, eq=False)
 class RenderPlan:
-    """One camera before one grid: the box around the voxels that may hold smoke.
-
-    Attributes
-    ----------
-    domain
-        The whole domain.
-    corner
-        First voxel of the box.
-    marked : (x, y, z) uint8
-        The voxels of the box that may hold smoke.
-    medium
-        Extinction, albedo, anisotropy.
-    rays
-        Of the camera, through the box.
-    to_eye : (3, 4)
-        Affine map from a voxel's index in the box to the direction from there to the eye, of any length.
-    lights
-        In coordinates of the box, in the smoke's color.
-    color : (channels, 3)
-        Of the radiance in each channel. Without channels the smoke only absorbs.
-    shadows
-        Whether light is attenuated on its way to the voxels.
-    diffuse
-        Whether scattered light is scattered again.
-    """
+    """One camera before one grid: the box around the voxels that may hold smoke."""
 
     domain: Domain
+    """The whole domain."""
     corner: Voxel
+    """First voxel of the box."""
     marked: NDArray[np.uint8]
+    """(x, y, z) uint8: the voxels of the box that may hold smoke."""
     medium: Medium
+    """Extinction, albedo, anisotropy."""
     rays: Rays
+    """Of the camera, through the box."""
     to_eye: NDArray[np.float64]
+    """(3, 4): affine map from a voxel's index in the box to the direction from there to the eye, of any length."""
     lights: tuple[Sweep, ...]
+    """In coordinates of the box, in the smoke's color."""
     color: Doubles
+    """(channels, 3): color of the radiance in each channel. Without channels the smoke only absorbs."""
     shadows: bool
+    """Whether light is attenuated on its way to the voxels."""
     diffuse: bool
+    """Whether scattered light is scattered again."""
 
     @property
     def shape(self) -> Shape:

@@ -32,22 +32,15 @@ Volume = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Optics:
-    """How light travels through the smoke of a domain.
-
-    Attributes
-    ----------
-    domain, medium
-        Where the smoke is, and what it does to light.
-    lights
-        Directional and point lights only; an environment is split into many.
-    scattering
-        ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
-    """
+    """How light travels through the smoke of a domain."""
 
     domain: Domain
     medium: Medium
+    """Where the smoke is, and what it does to light."""
     lights: tuple[FiniteLight, ...]
+    """Directional and point lights only; an environment is split into many."""
     scattering: Scattering
+    """``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``."""
 
     def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
