@@ -8,7 +8,6 @@ from importlib import metadata
 import psutil
 
 from smokelift import __version__, _core
-from smokelift.app.options import Command
 from smokelift.app.progress import Reporter
 from smokelift.checks import counted
 from smokelift.output.vdb import VdbUnavailable, vdb_module
@@ -59,6 +58,3 @@ def _gpu(running: str) -> str:
     return (
         f"{gpu}, with --device gpu; by itself the renderer runs on the processor" if gpu else "none that Taichi can use"
     )
-
-
-COMMANDS = {"doctor": Command("list versions, devices and what is missing", add_options, run)}

@@ -9,7 +9,6 @@ import numpy as np
 from PIL import Image
 
 from smokelift.app.options import (
-    Command,
     add_run_options,
     named_path,
     require_file,
@@ -140,6 +139,3 @@ def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:
     both = np.concatenate([seen.image, found], 0 if columns > rows else 1)
     with atomic_path(path) as aside:
         Image.fromarray(eight_bit(both)).save(aside, format="PNG")
-
-
-COMMANDS = {"reconstruct": Command("turn a clip or scene file into a VDB sequence", add_options, run)}
