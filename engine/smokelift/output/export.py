@@ -76,7 +76,6 @@ class ExportSettings:
     """The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``."""
 
     def __post_init__(self) -> None:
-        """Check the proxy."""
         if not 1 <= self.proxy <= 16:
             raise ValueError(f"the proxy must be 1 (none) to 16 times coarser, not {self.proxy}.")
 

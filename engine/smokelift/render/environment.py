@@ -130,12 +130,8 @@ def _first_largest(values: Doubles) -> int:
 def _gather(picture: NDArray[np.float32]) -> tuple[Doubles, Doubles]:
     """Sum a picture up over `CELLS`.
 
-    Returns
-    -------
-    irradiance : (cells, 3)
-        Integral of radiance over each cell.
-    direction : (cells, 3)
-        Unit vector to its centroid, weighted by luminance; arbitrary for a black cell.
+    It returns the integrals of radiance over the cells (cells, 3), and unit vectors to their centroids (cells, 3),
+    weighted by luminance; arbitrary for a black cell.
     """
     rows, columns = picture.shape[:2]
     finer = -(-CELLS[0] // rows), -(-CELLS[1] // columns)  # texels larger than cells are cut

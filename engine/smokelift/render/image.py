@@ -198,13 +198,7 @@ def scene_optics(scene: CompleteScene) -> Optics:
 
 
 def scene_renderer(scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> Renderer:
-    """The renderer of a scene: by default for its own camera, before its own background.
-
-    Raises
-    ------
-    ValueError
-        If the camera moves.
-    """
+    """The renderer of a scene: by default for its own camera, before its own background; ValueError if it moves."""
     view = camera or scene.camera
     if view.moves:
         raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")

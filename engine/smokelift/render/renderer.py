@@ -65,28 +65,16 @@ class Optics:
 
 
 class Renderer:
-    """A differentiable renderer for one camera and one grid.
+    """A differentiable renderer for one camera, which stands still, and one grid.
 
-    Parameters
-    ----------
-    camera, domain, medium
-        What is seen, from where; the camera stands still.
-    lights
-        Directional and point lights; none leave absorption only.
-    background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke. A fourth channel, in which smoke sends nothing, shows its transmittance.
-    scattering
-        ``"multiple"``: scattering of all orders, isotropic smoke only; ``"single"``: single scattering with
-        self-shadowing; ``"unshadowed"``: light reaches every voxel unattenuated; ``"absorption"``: the background
-        attenuated, nothing else.
-    support : (nx, ny, nz) bool, optional
-        Voxels that may hold smoke: what the density says elsewhere does not count, the gradient is zero there, and
-        the work follows their number.
+    Lights are directional or points; without any there is absorption only. The background, (rows, columns, 3) or (3,),
+    is linear radiance; a fourth channel, in which smoke sends nothing, shows the smoke's transmittance. Only voxels of
+    the support (nx, ny, nz) may hold smoke: what the density says elsewhere does not count, the gradient is zero there,
+    and the work follows their number.
 
-    Raises
-    ------
-    ValueError
-        If a point light stands inside the domain, or if light is to be scattered many times by anisotropic smoke.
+    Scattering is ``"multiple"``: of all orders, isotropic smoke only; ``"single"``, with self-shadowing;
+    ``"unshadowed"``: light reaches every voxel unattenuated; or ``"absorption"``: the background attenuated, nothing
+    else. It is a ValueError if a point light stands inside the domain, or anisotropic smoke is to scatter many times.
     """
 
     def __init__(
@@ -108,19 +96,10 @@ class Renderer:
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
-        """Render a density.
+        """Render a density (nx, ny, nz) at voxel centers, finite and >= 0.
 
-        Parameters
-        ----------
-        density : (nx, ny, nz) float32
-            At voxel centers, finite and >= 0.
-        keep_record
-            Keep what `gradient` needs: channels + 1 numbers a sample of every ray.
-
-        Returns
-        -------
-        (rows, columns, channels) float32
-            Linear radiance in the background's channels, row 0 at the top.
+        The picture (rows, columns, channels) is linear radiance in the background's channels, row 0 at the top. The
+        record is what `gradient` needs: channels + 1 numbers a sample of every ray.
         """
         scattered, self._depth = self._backend.image(density, keep_record)
         with products_on_one_thread():
@@ -140,18 +119,9 @@ class Renderer:
     def gradient(self, image_gradient: Image, out: Volume | None = None) -> Volume:
         """Pull the derivative of a loss back through the last `image` made with ``keep_record``; uses its record up.
 
-        Parameters
-        ----------
-        image_gradient : (rows, columns, channels)
-            dloss / dimage.
-        out : (nx, ny, nz) float32, optional
-            Written where there is support, and returned: new memory takes as long as a sweep. Zero elsewhere, as what
-            an earlier call has returned is.
-
-        Returns
-        -------
-        (nx, ny, nz) float32
-            dloss / ddensity, 0 outside the support.
+        Of dloss / dimage (rows, columns, channels) it makes dloss / ddensity (nx, ny, nz), 0 outside the support. If
+        ``out`` (nx, ny, nz) is given, it is written where there is support, and returned: new memory takes as long as a
+        sweep. Elsewhere it is zero, as what an earlier call has returned is.
         """
         image_gradient = np.asarray(image_gradient, np.float32)
         background = np.broadcast_to(self._background, image_gradient.shape)

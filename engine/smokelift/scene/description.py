@@ -23,7 +23,7 @@ from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
 from smokelift.scene.lights import EnvironmentLight, Light, PointLight
 from smokelift.scene.medium import Medium, Scattering, checked_scattering
 from smokelift.scene.projection import sees
-from smokelift.scene.tables import from_tables, to_tables
+from smokelift.scene.tables import from_tables, scene_to_dict
 from smokelift.scene.toml_files import TomlFile, read_toml, write_toml
 from smokelift.scene.view import Background, ClipSource, View
 
@@ -227,15 +227,6 @@ def scene_from_dict(data: Mapping[str, Any], name: str = "scene", base: Path | N
     It raises SceneError for the same reasons as `Scene.load`.
     """
     return _read(data, TomlFile(name, (base or Path()).absolute(), {}))
-
-
-def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
-    """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
-
-    A complete scene is what `completed` makes of the description that is read back. Paths below the folder `base`
-    become relative to it; all others absolute.
-    """
-    return to_tables(vars(scene), base)
 
 
 def _read(data: Mapping[str, Any], file: TomlFile) -> Scene:

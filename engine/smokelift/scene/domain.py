@@ -40,7 +40,6 @@ class Box:
     max: Vector
 
     def __post_init__(self) -> None:
-        """Check every value and store plain tuples."""
         set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if not low < high:
@@ -98,7 +97,6 @@ class Domain(Box):
     resolution: tuple[int, int, int]
 
     def __post_init__(self) -> None:
-        """Check every value and store plain tuples."""
         super().__post_init__()
         key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {MAX_SIDE_VOXELS}"
         counts = tuple(integer(v, key, expected, 1, MAX_SIDE_VOXELS) for v in items(self.resolution, 3, key, expected))
@@ -195,7 +193,6 @@ class Inlet:
     radius: float
 
     def __post_init__(self) -> None:
-        """Check the values."""
         radius = positive(self.radius, "radius", "a number of meters above 0")
         set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
 

@@ -42,7 +42,6 @@ class Medium:
     flame_color: Vector | None = None
 
     def __post_init__(self) -> None:
-        """Check every value."""
         set_fields(
             self,
             extinction=positive(self.extinction, "extinction"),
