@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.checks import counted
 from smokelift.extraction.given_background import background_picture, open_plates
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import area_average
+from smokelift.footage.images import area_average, reduced_size
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
@@ -83,12 +83,6 @@ def open_views(
     return views
 
 
-def at_most(camera: Camera) -> Camera:
-    """Return a camera with at most `MAX_COMPARED_SIDE` pixels."""
-    scale = min(1.0, MAX_COMPARED_SIDE / max(camera.size))
-    return camera.resized(*(max(1, round(side * scale)) for side in camera.size))
-
-
 def _view(
     name: str, camera: Camera, background: Image | None, clip: Clip, first: int, sequence: Sequence
 ) -> ReferenceView:
@@ -102,7 +96,7 @@ def _view(
             f"{clip.path}: has {counted(len(clip), 'frame')}, but the sequence goes on to frame {last} of its clip "
             "(from 0); give the whole clip of that camera."
         )
-    camera = at_most(camera.resized(*clip.size))
+    camera = camera.resized(*clip.size).resized(*reduced_size(*clip.size, MAX_COMPARED_SIDE))
     if camera.moves:
         camera = replace(camera, matrix=camera.matrices[first], matrices=camera.matrices[first:])
     if background is None:

@@ -185,7 +185,8 @@ class _Export:
         """Write the files of a frame; returns their bytes."""
         sequence, host = self.sequence, self.host
         domain, extinction = sequence.scene.domain, sequence.scene.medium.extinction
-        thinned = _thinned(sequence.density(number), domain, extinction)
+        density, longest = sequence.density(number), max(domain.resolution) * domain.voxel_size
+        thinned = np.where(density < MIN_OPACITY / (extinction * longest), np.float32(0), density)
         rho, velocity, flame = thinned, None, None
         if self.settings.velocity:
             velocity = sequence.velocity_at_centres(number)
@@ -259,11 +260,6 @@ def _density_step(domain: Domain, extinction: float) -> float:
     """Step of a quantized density: the largest power of two whose rounding does not show (see the module)."""
     longest = max(domain.resolution)
     return _power_of_two(HALF_CODE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
-
-
-def _thinned(density: Array, domain: Domain, extinction: float) -> Array:
-    longest = max(domain.resolution) * domain.voxel_size
-    return np.where(density < MIN_OPACITY / (extinction * longest), np.float32(0.0), density)
 
 
 def _rounded(values: Array, step: float) -> Array:

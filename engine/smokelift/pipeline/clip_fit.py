@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.extraction.matte import matte
+from smokelift.footage.images import reduced_size
 from smokelift.render import Image, Optics, Volume
 from smokelift.setup.shot import Shot, ShotView
 
@@ -72,8 +73,7 @@ def beside_clip(
     renderer = optics.renderer(camera.resized(columns, rows), behind, density > 0)
     shown = renderer.image(density)
     seen = view.clip.stored(frame).cut(cut).averaged(columns, rows)
-    shrink = max(1.0, max(working.width, working.height) / OUTLINE_PIXELS)
-    small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
+    small = working.resized(*reduced_size(working.width, working.height, OUTLINE_PIXELS))
     smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask
     inside = smoke[np.ix_(down * smoke.shape[0] // working.height, across * smoke.shape[1] // working.width)]
     return BesideClip(seen, shown, inside)

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks import listed, require_kind, shown
+from smokelift.checks import listed, one_of, require_kind, shown
 from smokelift.scene.camera import Camera
-from smokelift.scene.checks import SceneError, file_path, integer, set_fields
+from smokelift.scene.checks import SceneError, file_path, integer, set_fields, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
 from smokelift.scene.lights import EnvironmentLight, Light, PointLight
-from smokelift.scene.medium import Medium, Scattering, checked_scattering
+from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
 from smokelift.scene.projection import sees
 from smokelift.scene.tables import from_tables, scene_to_dict
 from smokelift.scene.toml_files import TomlFile, read_toml, write_toml
@@ -75,7 +75,9 @@ class Scene:
         for table, given in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
             if len(given) > MAX_LISTED:
                 raise SceneError(f"is given {len(given)} times; {MAX_LISTED} at most", table=table)
-        set_fields(self, closed=checked_sides(self.closed), scattering=checked_scattering(self.scattering))
+        set_fields(self, closed=checked_sides(self.closed))
+        if self.scattering not in (None, *SCATTERINGS):
+            raise unexpected(self.scattering, "scattering", f"one of {one_of(SCATTERINGS)}", "medium")
         if self.domain is not None:
             self._check_places(self.domain)
 
