@@ -148,8 +148,7 @@ def inlet_score(changes: Sequence[Array], smoke: Mask) -> Array:
     coherent = _ramp(mean / (magnitude + MIN_RESIDUAL_FRACTION), COHERENCE)
     strong = _ramp(mean / np.float32(typical), STRENGTH)
     prominent = _ramp(mean / max(np.max(coherent * mean), MIN_RESIDUAL_FRACTION), PROMINENCE)
-    score: Array = coherent * strong * prominent
-    return score
+    return np.asarray(coherent * strong * prominent)
 
 
 def _blurred_mean(changes: Sequence[Array]) -> Array:
@@ -185,5 +184,4 @@ def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, outflow: 
     numbers = np.arange(1, count + 1)
     entered, lasted, left = (ndimage.sum_labels(each, labels, numbers) for each in (strength, lasting, outflow))
     entered = np.where(left > 0, entered, 0)
-    strongest: Mask = np.isin(labels, numbers[(entered > 0) & (lasted >= MIN_LASTING_FRACTION * entered.max())])
-    return strongest
+    return np.asarray(np.isin(labels, numbers[(entered > 0) & (lasted >= MIN_LASTING_FRACTION * entered.max())]))

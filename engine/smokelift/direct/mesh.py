@@ -113,8 +113,7 @@ class Mesh:
         return {"frames": len(self.places), "triangles": self.places.shape[1], "checksum": checksum}
 
     def _at(self, step: int) -> npt.NDArray[np.float32]:
-        place: npt.NDArray[np.float32] = self.places[min(step, len(self.places) - 1)]
-        return place
+        return np.asarray(self.places[min(step, len(self.places) - 1)])
 
 
 def _read_stl(path: Path) -> npt.NDArray[np.float32]:

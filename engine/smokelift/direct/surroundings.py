@@ -29,8 +29,7 @@ class Ball:
     def voxels(self, domain: Domain) -> Mask:
         """The voxels whose centers lie in it, shape (nx, ny, nz)."""
         x, y, z = domain.offsets(self.centre)
-        inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
-        return inside
+        return np.asarray(x**2 + y**2 + z**2 <= self.radius**2)
 
     def bounds(self) -> tuple[Vector, Vector]:
         """The corners in meters of the box around it."""
@@ -49,8 +48,7 @@ class BoxObstacle:
         """The voxels whose centers lie in it, shape (nx, ny, nz)."""
         above, below = domain.offsets(self.low), domain.offsets(self.high)
         x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
-        inside: Mask = x & y & z
-        return inside
+        return np.asarray(x & y & z)
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Its corners in meters."""

@@ -139,8 +139,7 @@ def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:
 
 def _in_smoke(density: Array) -> Array:
     """1 in the smoke, 0 elsewhere."""
-    smoke: Array = (density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32)
-    return smoke
+    return np.asarray((density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32))
 
 
 def _on_faces(density: Array) -> tuple[Faces, Faces]:

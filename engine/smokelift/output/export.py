@@ -263,8 +263,7 @@ def _density_step(domain: Domain, extinction: float) -> float:
 
 
 def _rounded(values: Array, step: float) -> Array:
-    rounded: Array = np.round(values / np.float32(step)) * np.float32(step)
-    return rounded
+    return np.asarray(np.round(values / np.float32(step)) * np.float32(step))
 
 
 def _power_of_two(value: float) -> float:

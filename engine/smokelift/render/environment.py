@@ -118,8 +118,7 @@ class EnvironmentCells:
 
 def _concentration(weight: Doubles, moment: Doubles) -> Doubles:
     """|moment|^2 / weight of the first one, two, ... cells: their weight less their scatter."""
-    total: Doubles = np.square(np.cumsum(moment, axis=0)).sum(-1) / np.cumsum(weight)
-    return total
+    return np.asarray(np.square(np.cumsum(moment, axis=0)).sum(-1) / np.cumsum(weight))
 
 
 def _first_largest(values: Doubles) -> int:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,5 +134,6 @@ def _backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
     """What renders a plan on the device of this process."""
     if device.start() == "cpu":
         return CpuBackend(plan)
-    on_gpu: GpuBackend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
-    return on_gpu
+    from smokelift.render.gpu.backend import GpuBackend  # here, because Taichi takes long to import
+
+    return GpuBackend(plan)

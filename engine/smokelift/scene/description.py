@@ -201,8 +201,7 @@ class CompleteScene(Scene):
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
         if not self.inlets:
             return None
-        entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets])
-        return entries
+        return np.asarray(np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets]))
 
 
 def require_scene(scene: object) -> None:

@@ -67,8 +67,7 @@ class Box:
     def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Return the eight corners in meters, shape (8, 3)."""
         axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
-        corners: np.ndarray[Any, np.dtype[np.float64]] = np.stack(axes, axis=-1).reshape(8, 3)
-        return corners
+        return np.asarray(np.stack(axes, axis=-1).reshape(8, 3))
 
 
 @dataclass(frozen=True)
@@ -205,8 +204,7 @@ class Inlet:
         """Return the voxels whose centers lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
         x, y, z = domain.offsets(self.centre)
         squares = x**2 + y**2 + z**2
-        inside: NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())
-        return inside
+        return np.asarray(squares <= max(self.radius**2, squares.min()))
 
 
 def checked_sides(value: Any) -> tuple[Side, ...]:
