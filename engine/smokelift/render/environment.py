@@ -45,17 +45,7 @@ def environment_lights(light: EnvironmentLight, count: int) -> tuple[Directional
 
 
 class EnvironmentCells:
-    """The parts of an environment's picture that are not black, read once for any number of lights.
-
-    Attributes
-    ----------
-    irradiance : (cells, 3)
-        Integral of radiance over the cell, W/m^2.
-    importance : (cells,)
-        Its luminance.
-    direction : (cells, 3)
-        Unit vector towards the cell in the picture's own frame, that is before the rotation.
-    """
+    """The parts of an environment's picture that are not black, read once for any number of lights."""
 
     def __init__(self, light: EnvironmentLight) -> None:
         self.rotation = np.radians(light.rotation_degrees)
@@ -68,8 +58,11 @@ class EnvironmentCells:
         importance = irradiance @ LUMINANCE
         lit = importance * light.strength > 0
         self.irradiance = light.strength * irradiance[lit]
+        """(cells, 3): integral of radiance over the cell, W/m^2."""
         self.importance = importance[lit]
+        """(cells,): its luminance."""
         self.direction = direction[lit]
+        """(cells, 3): unit vector towards the cell in the picture's own frame, that is before the rotation."""
 
     def lights(self, count: int) -> tuple[DirectionalLight, ...]:
         """Return at most so many lights, as `environment_lights`."""

@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +76,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             seconds,
             lambda: forecast_of(shot, facts(shot, scene, estimate_cost(resolution, work)), work),
         )
-        report = _report(shot, options.thumbnail, say, new)
+
+        def report(frame: Frame) -> None:
+            new.add(frame.number)
+            if options.thumbnail:
+                _write_thumbnail(options.thumbnail, shot, frame)
+            say.frame(frame.number, frame.figures)
+
         sequence = reconstruction.write(
             options.out, npz=options.npz, resume=options.resume, start_number=options.start_number, on_frame=report
         )
@@ -103,18 +108,6 @@ def _finished(options: argparse.Namespace) -> int:
     if not options.resume or not (options.out / INDEX).is_file():
         return 0
     return len(Sequence.open(options.out).frames)
-
-
-def _report(shot: Shot, thumbnail: Path | None, say: Reporter, new: set[int]) -> Callable[[Frame], None]:
-    """Return what is called with each written frame, whose number it adds to ``new``."""
-
-    def report(frame: Frame) -> None:
-        new.add(frame.number)
-        if thumbnail:
-            _write_thumbnail(thumbnail, shot, frame)
-        say.frame(frame.number, frame.figures)
-
-    return report
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
