@@ -73,14 +73,8 @@ class FixedRateDescent:
 
         if not views.hull.any():
             return empty_density(views)
-        optics = views.optics
         seen = depth.views.views
-        renderers = [
-            PaperRenderer(
-                view.camera, optics.domain, optics.medium, optics.lights, view.background[..., :3], optics.scattering
-            )
-            for view in seen
-        ]
+        renderers = [PaperRenderer(views.optics, view.camera, view.background[..., :3]) for view in seen]
         pictures = [view.image[..., :3] for view in seen]
         start = depth.density if initial is None else initial
         density, residuals, done = self._descend(renderers, pictures, start, depth.density)

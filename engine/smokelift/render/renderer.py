@@ -9,18 +9,20 @@ the last line:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
+from smokelift.render.camera_rays import camera_rays
 from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.device import products_on_one_thread
-from smokelift.render.plan import RenderPlan, plan_render
-from smokelift.scene import Camera, Domain, FiniteLight, Medium, PointLight, Scattering
+from smokelift.render.light_sweeps import light_sweeps
+from smokelift.render.plan import RenderPlan, to_eye
+from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, PointLight, Scattering
+from smokelift.scene.domain import box_around
 
 if TYPE_CHECKING:
     from smokelift.render.gpu.backend import GpuBackend
@@ -37,13 +39,46 @@ class Optics:
     medium: Medium
     """Where the smoke is, and what it does to light."""
     lights: tuple[FiniteLight, ...]
-    """Directional and point lights only; an environment is split into many."""
-    scattering: Scattering
-    """``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``."""
+    """Directional and point lights only; an environment is split into many. Without any there is absorption only."""
+    scattering: Scattering = "single"
+    """``"multiple"``: of all orders, isotropic smoke only; ``"single"``, with self-shadowing; ``"unshadowed"``: light
+    reaches every voxel unattenuated; or ``"absorption"``: the background attenuated, nothing else."""
 
     def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
-        return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
+        return Renderer(self, camera, background, support)
+
+    def plan(self, camera: Camera, support: NDArray[np.bool_] | None = None) -> RenderPlan:
+        """Plan the rendering for a camera; see `Renderer` for the support."""
+        scattering, medium = self.scattering, self.medium
+        if scattering not in get_args(Scattering):
+            raise ValueError(f"scattering must be one of {', '.join(get_args(Scattering))}, not {scattering!r}.")
+        if scattering == "multiple" and medium.anisotropy != 0.0:
+            raise ValueError(
+                f'Scattering "multiple" needs anisotropy 0, not {medium.anisotropy:g}; take scattering "single", or '
+                "smoke that scatters alike in all directions."
+            )
+        if support is None:
+            support = np.broadcast_to(np.True_, self.domain.resolution)
+        # with the neighbors of the voxels that may hold smoke; one voxel if none may
+        x, y, z = part = box_around(support, 1) if support.any() else (slice(0, 1),) * 3
+        corner, box = (x.start, y.start, z.start), self.domain.part(part)
+        scatters = () if scattering == "absorption" else self.lights
+        # light that is scattered again takes on more of the smoke's color
+        split = scattering == "multiple" and not medium.is_gray
+        sweeps, color = light_sweeps(scatters, self.domain, corner, box.resolution, medium.color, split)
+        return RenderPlan(
+            domain=self.domain,
+            corner=corner,
+            marked=support[part].astype(np.uint8),
+            medium=medium,
+            rays=camera_rays(camera, box),
+            to_eye=to_eye(camera, box),
+            lights=sweeps,
+            color=color,
+            shadows=scattering in SHADOWED and len(color) > 0,
+            diffuse=scattering == "multiple" and len(color) > 0,
+        )
 
     def unshadowed_source(self) -> NDArray[np.float64]:
         """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.
@@ -66,28 +101,17 @@ class Optics:
 class Renderer:
     """A differentiable renderer for one camera, which stands still, and one grid.
 
-    Lights are directional or points; without any there is absorption only. The background, (rows, columns, 3) or (3,),
-    is linear radiance; a fourth channel, in which smoke sends nothing, shows the smoke's transmittance. Only voxels of
-    the support (nx, ny, nz) may hold smoke: what the density says elsewhere does not count, the gradient is zero there,
-    and the work follows their number.
-
-    Scattering is ``"multiple"``: of all orders, isotropic smoke only; ``"single"``, with self-shadowing;
-    ``"unshadowed"``: light reaches every voxel unattenuated; or ``"absorption"``: the background attenuated, nothing
-    else. It is a ValueError if a point light stands inside the domain, or anisotropic smoke is to scatter many times.
+    The background, (rows, columns, 3) or (3,), is linear radiance; a fourth channel, in which smoke sends nothing,
+    shows the smoke's transmittance. Only voxels of the support (nx, ny, nz) may hold smoke: what the density says
+    elsewhere does not count, the gradient is zero there, and the work follows their number. It is a ValueError if a
+    point light stands inside the domain, or anisotropic smoke is to scatter many times.
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        domain: Domain,
-        medium: Medium,
-        lights: Sequence[FiniteLight],
-        background: Image,
-        scattering: Scattering = "single",
-        support: NDArray[np.bool_] | None = None,
+        self, optics: Optics, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None
     ) -> None:
-        self.camera, self.domain, self.medium = camera, domain, medium
-        plan = plan_render(camera, domain, medium, lights, scattering, support)
+        self.optics, self.camera = optics, camera
+        plan = optics.plan(camera, support)
         self._background = np.asarray(background, np.float32)
         sent = np.asarray(plan.color, np.float32)
         self._color = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
