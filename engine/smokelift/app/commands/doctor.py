@@ -16,10 +16,6 @@ from smokelift.render import device
 LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
-
-
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Say what is there, line by line."""
     for line in _report():
