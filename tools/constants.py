@@ -65,6 +65,7 @@ def constants(path: Path) -> list[Constant]:
     text = path.read_text(encoding="utf-8")
     tree = ast.parse(text)
     of_module = "".join(OF_MODULE.findall(" ".join((ast.get_docstring(tree) or "").split())))
+    module = path.parent.name if path.stem == "__init__" else path.stem
     found = []
     for node, after in pairwise([*tree.body, ast.Pass()]):
         match node:
@@ -79,7 +80,7 @@ def constants(path: Path) -> list[Constant]:
                 meaning = ""
         if name.isupper() and any(_is_number(part) for part in ast.walk(value)):
             written = " ".join((ast.get_source_segment(text, value) or "").split())
-            found.append(Constant(path.stem, name, written, meaning, _source(meaning) or _source(of_module) or BY_HAND))
+            found.append(Constant(module, name, written, meaning, _source(meaning) or _source(of_module) or BY_HAND))
     return found
 
 

@@ -26,7 +26,7 @@ from scipy import ndimage
 from benchmarks.tables import markdown
 from smokelift.evaluation.metrics import volume_error
 from smokelift.output.images import write_image
-from smokelift.render import Renderer
+from smokelift.render import Optics, Renderer
 from smokelift.render.environment import environment_lights
 from smokelift.render.image import environment_count
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium, PointLight
@@ -161,7 +161,7 @@ class Comparison:
 
     def renderer(self, case: tuple[int, int], lights: tuple[FiniteLight, ...], grid: int) -> Renderer:
         black = np.zeros(3, np.float32)
-        return Renderer(CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), lights, black)
+        return Optics(Domain(LOW, HIGH, (grid,) * 3), self.medium(case), lights).renderer(CAMERA, black)
 
     def errors(
         self, kind: str, case: tuple[int, int], lights: tuple[FiniteLight, ...], grid: int

@@ -18,7 +18,7 @@ from benchmarks.tables import markdown
 from smokelift.baselines.paper_renderer import PaperRenderer
 from smokelift.checks import Doubles
 from smokelift.evaluation.metrics import volume_error
-from smokelift.render import Renderer, Volume
+from smokelift.render import Optics, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 from tests.engine import paper_reference, renderer_reference
 
@@ -87,7 +87,8 @@ def main() -> None:
     for depth in DEPTHS:
         medium = Medium(depth / (density.sum(1).max() * DOMAIN.voxel_size), 0.9, 0.0)
         setup = (CAMERA, DOMAIN, medium, (SUN,), BLACK)
-        ours, papers = Renderer(*setup), PaperRenderer(*setup)
+        optics = Optics(DOMAIN, medium, (SUN,))
+        ours, papers = optics.renderer(CAMERA, BLACK), PaperRenderer(optics, CAMERA, BLACK)
         ours.image(density, keep_record=True)
         papers.image(density)
 

@@ -15,7 +15,7 @@ from benchmarks.renderer.reference import image_and_gradient
 from benchmarks.renderer.scene import PLUME, BenchScene, bench_scene, plume, shining, spread
 from benchmarks.tables import markdown
 from smokelift.evaluation.metrics import volume_error
-from smokelift.render import Renderer, Volume
+from smokelift.render import Optics, Volume
 from smokelift.scene import Medium
 
 SIZE = 40
@@ -46,9 +46,8 @@ def at_depth(density: Volume, depth: float, anisotropy: float) -> BenchScene:
 def row(scene: BenchScene) -> list[str]:
     """Measure one scene."""
     background = np.array(scene.background, np.float32)
-    renderer = Renderer(
-        scene.camera, scene.domain, scene.medium, scene.lights[:1], background, support=scene.density > 0
-    )
+    optics = Optics(scene.domain, scene.medium, scene.lights[:1])
+    renderer = optics.renderer(scene.camera, background, scene.density > 0)
     image = renderer.image(scene.density, keep_record=True)
     gradient = renderer.gradient(2 * (image - scene.target))
     exact_image, exact_gradient = image_and_gradient(scene)
@@ -64,7 +63,7 @@ def white_room(scene: BenchScene) -> float:
     lights = shining(spread(ROOM_LIGHTS, -1.0), (4 * np.pi,) * 3)
     room = replace(scene.medium, anisotropy=0.0)
     wall = np.ones(3, np.float32)
-    return float(Renderer(scene.camera, scene.domain, room, lights, wall).image(scene.density).max())
+    return float(Optics(scene.domain, room, lights).renderer(scene.camera, wall).image(scene.density).max())
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.scene import BenchScene
-from smokelift.render import Renderer
+from smokelift.render import Optics
 
 Volume = NDArray[np.float32]
 
@@ -16,7 +16,8 @@ Volume = NDArray[np.float32]
 def prepare(scene: BenchScene) -> Iteration:
     """Set up the renderer, which knows the voxels that may hold smoke."""
     background = np.array(scene.background, np.float32)
-    renderer = Renderer(scene.camera, scene.domain, scene.medium, scene.lights, background, support=scene.support)
+    optics = Optics(scene.domain, scene.medium, scene.lights)
+    renderer = optics.renderer(scene.camera, background, scene.support)
     gradient = np.zeros(scene.density.shape, np.float32)
     return iteration(scene, partial(renderer.image, keep_record=True), partial(renderer.gradient, out=gradient))
 

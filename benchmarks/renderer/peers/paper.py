@@ -6,10 +6,11 @@ from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.peers.ours import iteration
 from benchmarks.renderer.scene import BenchScene
 from smokelift.baselines.paper_renderer import PaperRenderer
+from smokelift.render import Optics
 
 
 def prepare(scene: BenchScene) -> Iteration:
     """Set up the renderer and its record."""
     background = np.array(scene.background, np.float32)
-    renderer = PaperRenderer(scene.camera, scene.domain, scene.medium, scene.lights, background)
+    renderer = PaperRenderer(Optics(scene.domain, scene.medium, scene.lights), scene.camera, background)
     return iteration(scene, renderer.image, renderer.gradient)

@@ -7,21 +7,12 @@ from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
-from smokelift.app.progress import Reporter
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.scene import SCATTERINGS, ClipSource, Scene
 from smokelift.scene.checks import LARGEST, SceneError, file_path
 from smokelift.setup.settings import METHODS, QUALITIES, Settings
-
-
-class Command(NamedTuple):
-    """What a command is for, what adds its options to its parser, and what runs it and says what happens."""
-
-    help: str
-    add_options: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace, Reporter], None]
 
 
 def named_path(text: str) -> Path:

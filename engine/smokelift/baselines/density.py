@@ -52,22 +52,15 @@ class OrthogonalCopy:
 
 @dataclass(frozen=True)
 class FixedRateDescent:
-    """The paper's density fit; DeviceError if Taichi, which its renderer runs on, is not installed.
-
-    Attributes
-    ----------
-    rate
-        Change of density by one step in the steepest voxel of the prior's fog. The paper gives no figure
-        (docs/experiments/density-descent.md).
-    iterations
-        Largest number of steps.
-    least_loss
-        Mean squared difference, over the pictures' mean square, at which to stop.
-    """
+    """The paper's density fit; DeviceError if Taichi, which its renderer runs on, is not installed."""
 
     rate: float = 0.03
+    """Change of density by one step in the steepest voxel of the prior's fog. The paper gives no figure
+    (docs/experiments/density-descent.md)."""
     iterations: int = 60
+    """Largest number of steps."""
     least_loss: float = 1e-4
+    """Mean squared difference, over the pictures' mean square, at which to stop."""
 
     def __post_init__(self) -> None:
         """Check for Taichi before anything is done."""
@@ -80,14 +73,8 @@ class FixedRateDescent:
 
         if not views.hull.any():
             return empty_density(views)
-        optics = views.optics
         seen = depth.views.views
-        renderers = [
-            PaperRenderer(
-                view.camera, optics.domain, optics.medium, optics.lights, view.background[..., :3], optics.scattering
-            )
-            for view in seen
-        ]
+        renderers = [PaperRenderer(views.optics, view.camera, view.background[..., :3]) for view in seen]
         pictures = [view.image[..., :3] for view in seen]
         start = depth.density if initial is None else initial
         density, residuals, done = self._descend(renderers, pictures, start, depth.density)

@@ -30,8 +30,6 @@ steps; the light's transmittance is a volume made once a picture, by the exact r
 trilinearly, and the record is spread with the same weights.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,32 +42,24 @@ from smokelift.baselines import kernels
 from smokelift.render.gpu import camera_kernels
 from smokelift.render.gpu.backend import LightSweeps
 from smokelift.render.light_sweeps import ParallelSweep
-from smokelift.render.plan import plan_render
-from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
+from smokelift.render.renderer import Image, Optics, Volume
+from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
 
 class PaperRenderer:
     """The paper's differentiable renderer for one camera and one grid, in Taichi on the device of this process.
 
-    Without lights there is absorption only; a point light inside the domain is a ValueError. ``background`` is linear
-    radiance, (rows, columns, 3) or (3,). ``"multiple"`` scattering is ``"single"``: the paper stops there.
+    A point light inside the domain is a ValueError. ``background`` is linear radiance, (rows, columns, 3) or (3,).
+    ``"multiple"`` scattering is ``"single"``: the paper stops there.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        domain: Domain,
-        medium: Medium,
-        lights: Sequence[FiniteLight],
-        background: Image,
-        scattering: Scattering = "single",
-    ) -> None:
+    def __init__(self, optics: Optics, camera: Camera, background: Image) -> None:
         taichi.start(device.start())
-        self.camera, self.domain, self.medium = camera, domain, medium
+        domain = self.domain = optics.domain
+        self.medium = optics.medium
         self._background = np.asarray(background, np.float64)
-        setup = plan_render(camera, domain, medium, lights, scattering, None)
+        setup = optics.plan(camera)
         self._shadows = setup.shadows
         self._lights = setup.lights
         # without lights a black one: kernels want a channel

@@ -18,20 +18,14 @@ from smokelift.velocity.solver import PrimalDual, Solver
 
 @dataclass(frozen=True)
 class PaperVelocity:
-    """The paper's estimator (a `VelocityEstimator`), by the paper's splitting.
-
-    Attributes
-    ----------
-    smoothness, kinetic
-        Weights, without unit, of the squared differences of velocity and of the squared velocity. The latter only
-        decides what nothing else does.
-    blur
-        Standard deviation in voxels of the Gaussian that smooths the densities.
-    """
+    """The paper's estimator (a `VelocityEstimator`), by the paper's splitting."""
 
     smoothness: float = 0.03
     kinetic: float = 0.003
+    """Weights, without unit, of the squared differences of velocity and of the squared velocity. The latter only
+    decides what nothing else does."""
     blur: float = 0.5
+    """Standard deviation in voxels of the Gaussian that smooths the densities."""
     solver: Solver = field(default_factory=PrimalDual)
 
     def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:

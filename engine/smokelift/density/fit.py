@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.checks import listed, numbers, require_kind
-from smokelift.checks.arguments import MAX_MAGNITUDE
+from smokelift.checks import MAX_MAGNITUDE, listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.levels import BLUR_REACH

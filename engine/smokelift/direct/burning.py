@@ -23,18 +23,12 @@ from smokelift.transport import Array, advect
 
 @dataclass(frozen=True, eq=False)
 class Combustion:
-    """How fire goes on.
-
-    Attributes
-    ----------
-    remaining
-        Fraction of the emission that is left of it after a step, 0 to 1.
-    feed : (nx, ny, nz)
-        Emission that a step adds.
-    """
+    """How fire goes on."""
 
     remaining: float
+    """Fraction of the emission that is left of it after a step, 0 to 1."""
     feed: Array
+    """(nx, ny, nz): emission that a step adds."""
 
     def after(self, advected: Array, solid: Mask | None) -> Array:
         """The emission (nx, ny, nz) after a step, from the advected one; zero in obstacles."""

@@ -45,42 +45,29 @@ ROOM = 8.0
 
 @dataclass(frozen=True)
 class Continuation:
-    """How a sequence goes on.
-
-    Attributes
-    ----------
-    frames
-        Frames after `start`.
-    start
-        The last frame that stays as it is; None takes the last there is.
-    fade
-        Frames at the end in which the smoke fades to nothing.
-    wind
-        Velocity in m/s that all air gains after `start`.
-    turbulences
-        Eddies that all air gains after `start`.
-    fans, obstacles
-        What stands there after `start`, in the clip's box or where it can grow to.
-    closed
-        Sides that are walls after `start`, besides those of the scene.
-    room
-        How many times as many voxels as the clip's the box may have that grows with the smoke, 1 at least. Before a
-        side that cannot move any more the smoke dissolves.
-    buoyancy, dissipation
-        As in `smokelift.direct.simulation.Physics`; None takes those of the clip.
-    """
+    """How a sequence goes on."""
 
     frames: int
+    """Frames after `start`."""
     start: int | None = None
+    """The last frame that stays as it is; None takes the last there is."""
     fade: int = 0
+    """Frames at the end in which the smoke fades to nothing."""
     wind: Vector = (0.0, 0.0, 0.0)
+    """Velocity in m/s that all air gains after `start`."""
     turbulences: tuple[Turbulence, ...] = ()
+    """Eddies that all air gains after `start`."""
     fans: tuple[Fan, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
+    """What stands there after `start`, in the clip's box or where it can grow to."""
     closed: tuple[Side, ...] = ()
+    """Sides that are walls after `start`, besides those of the scene."""
     room: float = ROOM
+    """How many times as many voxels as the clip's the box may have that grows with the smoke, 1 at least. Before a side
+    that cannot move any more the smoke dissolves."""
     buoyancy: float | None = None
     dissipation: float | None = None
+    """As in `smokelift.direct.simulation.Physics`; None takes those of the clip."""
 
 
 def continue_sequence(

@@ -152,8 +152,7 @@ def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis:
     compared[:, :, :BORDER_LAYERS] = compared[:, :, -BORDER_LAYERS:] = 0
 
     def picture(density: Array) -> Array:
-        blurred: Array = ndimage.gaussian_filter((density * compared).sum(depth_axis), BLUR)
-        return blurred
+        return np.asarray(ndimage.gaussian_filter((density * compared).sum(depth_axis), BLUR))
 
     found = [picture(state.density) for state in states]
 

@@ -44,24 +44,16 @@ Moves = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 
 @dataclass(frozen=True)
 class Growth:
-    """How far a box may grow.
-
-    Attributes
-    ----------
-    clip
-        The box of the clip.
-    closed
-        Sides that are walls.
-    voxels
-        Of the largest box.
-    outside
-        Points in meters that stay outside: cameras and lamps.
-    """
+    """How far a box may grow."""
 
     clip: Domain
+    """The box of the clip."""
     closed: tuple[Side, ...]
+    """Sides that are walls."""
     voxels: int
+    """Of the largest box."""
     outside: tuple[Vector, ...] = ()
+    """Points in meters that stay outside: cameras and lamps."""
 
     def after(self, box: Domain, state: SmokeState, dt: float) -> Domain:
         """The box for the step that follows a state, whose smoke may be near a side of its own."""

@@ -58,20 +58,14 @@ class Inflow:
     """The inlets, and the frames of the clip that are replayed in them.
 
     Forwards and backwards in turn, so that no frame jumps and the statistics stay those of the clip.
-
-    Attributes
-    ----------
-    voxels : (nx, ny, nz) bool
-        Those of all inlets, in a box around them.
-    states
-        Of the clip, in their order, in that box.
-    first
-        The simulation's voxel at which that box begins.
     """
 
     voxels: Mask
+    """(nx, ny, nz) bool: those of all inlets, in a box around them."""
     states: Sequence[SmokeState]
+    """Of the clip, in their order, in that box."""
     first: tuple[int, ...] = (0, 0, 0)
+    """The simulation's voxel at which that box begins."""
 
     def at(self, step: int) -> SmokeState:
         """The state that is replayed so many steps after the last one."""
@@ -154,8 +148,7 @@ def inlet_score(changes: Sequence[Array], smoke: Mask) -> Array:
     coherent = _ramp(mean / (magnitude + MIN_RESIDUAL_FRACTION), COHERENCE)
     strong = _ramp(mean / np.float32(typical), STRENGTH)
     prominent = _ramp(mean / max(np.max(coherent * mean), MIN_RESIDUAL_FRACTION), PROMINENCE)
-    score: Array = coherent * strong * prominent
-    return score
+    return np.asarray(coherent * strong * prominent)
 
 
 def _blurred_mean(changes: Sequence[Array]) -> Array:
@@ -191,5 +184,4 @@ def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, outflow: 
     numbers = np.arange(1, count + 1)
     entered, lasted, left = (ndimage.sum_labels(each, labels, numbers) for each in (strength, lasting, outflow))
     entered = np.where(left > 0, entered, 0)
-    strongest: Mask = np.isin(labels, numbers[(entered > 0) & (lasted >= MIN_LASTING_FRACTION * entered.max())])
-    return strongest
+    return np.asarray(np.isin(labels, numbers[(entered > 0) & (lasted >= MIN_LASTING_FRACTION * entered.max())]))

@@ -34,22 +34,16 @@ ORDERS = [1, 2, 0], [2, 0, 1], [0, 1, 2]
 
 
 class Crossings(NamedTuple):
-    """Where triangles cross columns of voxels' centers.
-
-    Attributes
-    ----------
-    column, face, side, triangle : (k,)
-        Number of the column; the face between two centers in it; 1 or -1 for the side the triangle is crossed from;
-        number of the triangle.
-    weights : (k, 3)
-        Of the triangle's corners at the crossing.
-    """
+    """Where triangles cross columns of voxels' centers."""
 
     column: Integers
     face: Integers
     side: Integers
     triangle: Integers
+    """(k,): number of the column; the face between two centers in it; 1 or -1 for the side the triangle is crossed
+    from; number of the triangle."""
     weights: Doubles
+    """(k, 3): weights of the triangle's corners at the crossing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +51,11 @@ class Mesh:
     """A closed surface of triangles as an obstacle, at one place or, as it moves and bends, at one after another.
 
     Which way the triangles turn does not matter, as long as it is the same over each part.
-
-    Attributes
-    ----------
-    places : (k, n, 3, 3)
-        Corners in meters, at the frame that the smoke starts from and at every frame after it; it stays at the last
-        one. Of a mesh that stands still, (n, 3, 3) is enough.
     """
 
     places: npt.NDArray[np.float32]
+    """(k, n, 3, 3): corners in meters, at the frame that the smoke starts from and at every frame after it; it stays at
+    the last one. Of a mesh that stands still, (n, 3, 3) is enough."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "places", self.places.reshape(-1, *self.places.shape[-3:]))
@@ -123,8 +113,7 @@ class Mesh:
         return {"frames": len(self.places), "triangles": self.places.shape[1], "checksum": checksum}
 
     def _at(self, step: int) -> npt.NDArray[np.float32]:
-        place: npt.NDArray[np.float32] = self.places[min(step, len(self.places) - 1)]
-        return place
+        return np.asarray(self.places[min(step, len(self.places) - 1)])
 
 
 def _read_stl(path: Path) -> npt.NDArray[np.float32]:

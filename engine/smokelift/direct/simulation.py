@@ -34,49 +34,32 @@ TRACE_FRACTION = np.float32(1e-4)
 
 @dataclass(frozen=True)
 class Physics:
-    """What acts on the smoke of a clip.
-
-    Attributes
-    ----------
-    buoyancy
-        Upward acceleration at density 1, in m/s2, below zero for smoke that sinks.
-    dissipation
-        Rate at which smoke dissolves, in 1/s, at least 0.
-    contradicted_buoyancy
-        One that was fitted and is not taken, because the clip's smoke moves the other way; 0 if there is none.
-    """
+    """What acts on the smoke of a clip."""
 
     buoyancy: float
+    """Upward acceleration at density 1, in m/s2, below zero for smoke that sinks."""
     dissipation: float
+    """Rate at which smoke dissolves, in 1/s, at least 0."""
     contradicted_buoyancy: float = 0.0
+    """One that was fitted and is not taken, because the clip's smoke moves the other way; 0 if there is none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A simulation with the forces, inlets and fire of a clip, and with what the artist has placed.
-
-    Attributes
-    ----------
-    physics
-        Fitted to the clip.
-    inflow
-        Of the clip.
-    surroundings
-        What the artist has placed.
-    dt
-        Time of a step in seconds.
-    fire
-        Of the clip; None without any.
-    eddy_speed
-        Of the small eddies that the smoke keeps, in m/s; 0 leaves the flow to itself.
-    """
+    """A simulation with the forces, inlets and fire of a clip, and with what the artist has placed."""
 
     physics: Physics
+    """Fitted to the clip."""
     inflow: Inflow
+    """Of the clip."""
     surroundings: Surroundings
+    """What the artist has placed."""
     dt: float
+    """Time of a step in seconds."""
     fire: Combustion | None = None
+    """Of the clip; None without any."""
     eddy_speed: float = 0.0
+    """Of the small eddies that the smoke keeps, in m/s; 0 leaves the flow to itself."""
 
     def next(self, state: SmokeState, step: int) -> SmokeState:
         """Return the state one step later; step 1 starts from the clip's last state."""

@@ -26,21 +26,14 @@ RESOLVED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SmokeState:
-    """Smoke at one time, and how it moves.
-
-    Attributes
-    ----------
-    density : (nx, ny, nz) float32
-        At voxel centers.
-    velocity
-        Without divergence, in m/s; it has carried the frame before to this one.
-    flame : (nx, ny, nz) float32, optional
-        Emission of fire; None without any.
-    """
+    """Smoke at one time, and how it moves."""
 
     density: Array
+    """(nx, ny, nz) float32: at voxel centers."""
     velocity: Velocity
+    """Without divergence, in m/s; it has carried the frame before to this one."""
     flame: Array | None = None
+    """(nx, ny, nz) float32: emission of fire; None without any."""
 
     def scaled(self, factor: Array | np.float32) -> "SmokeState":
         """The state with its smoke and fire times a factor, (nx, ny, nz) or one number."""

@@ -29,8 +29,7 @@ class Ball:
     def voxels(self, domain: Domain) -> Mask:
         """The voxels whose centers lie in it, shape (nx, ny, nz)."""
         x, y, z = domain.offsets(self.centre)
-        inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
-        return inside
+        return np.asarray(x**2 + y**2 + z**2 <= self.radius**2)
 
     def bounds(self) -> tuple[Vector, Vector]:
         """The corners in meters of the box around it."""
@@ -49,8 +48,7 @@ class BoxObstacle:
         """The voxels whose centers lie in it, shape (nx, ny, nz)."""
         above, below = domain.offsets(self.low), domain.offsets(self.high)
         x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
-        inside: Mask = x & y & z
-        return inside
+        return np.asarray(x & y & z)
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Its corners in meters."""
@@ -61,17 +59,12 @@ Obstacle = Ball | BoxObstacle | Mesh
 
 
 class Solid(NamedTuple):
-    """What is solid at a step.
-
-    Attributes
-    ----------
-    voxels : (nx, ny, nz) bool
-    velocity
-        Of what they are made of, in m/s on all faces; None where all of it stands still.
-    """
+    """What is solid at a step."""
 
     voxels: Mask
+    """(nx, ny, nz): which voxels are."""
     velocity: Faces | None
+    """That of what they are made of, in m/s on all faces; None where all of it stands still."""
 
     def projected(self, velocity: Velocity) -> Velocity:
         """The nearest velocity that is without divergence outside, and moves with the solid on its faces and inside.
@@ -138,30 +131,20 @@ class Fan:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What acts on the smoke from outside.
-
-    Attributes
-    ----------
-    domain
-        The box; None where nothing is placed in it.
-    wind
-        Velocity in m/s that all air gains, beside what moves it already.
-    turbulences
-        Eddies that all air gains, likewise.
-    fans
-        In the box.
-    obstacles
-        Through which nothing passes, in the box or outside it.
-    first
-        Voxel at which the box begins, counted from the clip's box: turbulence stays where it is when the box grows.
-    """
+    """What acts on the smoke from outside."""
 
     domain: Domain | None = None
+    """The box; None where nothing is placed in it."""
     wind: Vector = (0.0, 0.0, 0.0)
+    """Velocity in m/s that all air gains, beside what moves it already."""
     turbulences: tuple[Turbulence, ...] = ()
+    """Eddies that all air gains, likewise."""
     fans: tuple[Fan, ...] = ()
+    """In the box."""
     obstacles: tuple[Obstacle, ...] = ()
+    """Through which nothing passes, in the box or outside it."""
     first: tuple[int, ...] = (0, 0, 0)
+    """Voxel at which the box begins, counted from the clip's box: turbulence stays where it is when the box grows."""
 
     def air(self, like: Velocity, time: float) -> list[Array]:
         """The velocity in m/s that wind and turbulence have given to all air after a time in seconds, on faces."""

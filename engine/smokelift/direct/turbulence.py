@@ -42,21 +42,14 @@ class _Modes(NamedTuple):
 
 @dataclass(frozen=True)
 class Turbulence:
-    """Eddies everywhere, which change in the time that air takes to cross them.
-
-    Attributes
-    ----------
-    speed
-        Of the air in the eddies, in m/s, root mean square.
-    size
-        Across an eddy, in meters, above 0.
-    seed
-        Another one makes other eddies, from 0.
-    """
+    """Eddies everywhere, which change in the time that air takes to cross them."""
 
     speed: float
+    """Of the air in the eddies, in m/s, root mean square."""
     size: float
+    """Across an eddy, in meters, above 0."""
     seed: int = 0
+    """Another one makes other eddies, from 0."""
 
     def velocity(self, like: Velocity, time: float, first: tuple[int, ...] = (0, 0, 0)) -> list[Array]:
         """The velocity in m/s on the faces of a grid that begins at a voxel, at a time in seconds."""
@@ -146,8 +139,7 @@ def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:
 
 def _in_smoke(density: Array) -> Array:
     """1 in the smoke, 0 elsewhere."""
-    smoke: Array = (density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32)
-    return smoke
+    return np.asarray((density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32))
 
 
 def _on_faces(density: Array) -> tuple[Faces, Faces]:

@@ -27,19 +27,13 @@ LABEL_SCORES = ("patches", "patches_worst", "patches_own", "edges", "flicker")
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """What was found.
-
-    Attributes
-    ----------
-    figures
-        Nested plain values, as JSON holds them; None where there is nothing to say.
-    sequence, truth
-        What was evaluated, and the truth of its box, if it is known.
-    """
+    """What was found."""
 
     figures: Figures
+    """Nested plain values, as JSON holds them; None where there is nothing to say."""
     sequence: Sequence
     truth: Truth | None
+    """What was evaluated, and the truth of its box, if it is known."""
 
     def write_picture(self, path: Path) -> None:
         """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""
@@ -110,8 +104,20 @@ def _orbit_figures(sequence: Sequence, truth: Truth | None) -> Figures:
 
 
 def _load_truth(sequence: Sequence, path: Path) -> Truth:
-    truth = Truth.load(path)
-    _check_box(sequence, truth, path)
+    truth, domain = Truth.load(path), sequence.scene.domain
+    box = np.array(domain.max) - np.array(domain.min)
+    wanted = np.array(truth.shape) * truth.voxel_size
+    if not np.allclose(box, wanted, rtol=0.01):
+        raise ValueError(
+            f"{path}: is a box of {_meters(wanted)}, but the sequence's is {_meters(box)}; reconstruct with the "
+            "truth's box as [domain] in the scene file."
+        )
+    fps = sequence.scene.clip.fps if sequence.scene.clip else None
+    if fps is not None and abs(fps - truth.fps) > 0.01 * truth.fps:
+        raise ValueError(
+            f"{path}: has {truth.fps:g} frames per second, but the sequence has {fps:g}; give fps in the scene's "
+            "[clip]."
+        )
     if (last := sequence.frames[-1] + first_frame(sequence) - 1) >= truth.frames:
         raise ValueError(
             f"{path}: holds {counted(truth.frames, 'frame')}, but the sequence goes on to frame {last} of its clip "
@@ -131,23 +137,6 @@ def _against_truth(sequence: Sequence, truth: Truth) -> Figures:
         velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None
         volumes.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
     return volumes.figures()
-
-
-def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:
-    domain = sequence.scene.domain
-    box = np.array(domain.max) - np.array(domain.min)
-    wanted = np.array(truth.shape) * truth.voxel_size
-    if not np.allclose(box, wanted, rtol=0.01):
-        raise ValueError(
-            f"{path}: is a box of {_meters(wanted)}, but the sequence's is {_meters(box)}; reconstruct with the "
-            "truth's box as [domain] in the scene file."
-        )
-    fps = sequence.scene.clip.fps if sequence.scene.clip else None
-    if fps is not None and abs(fps - truth.fps) > 0.01 * truth.fps:
-        raise ValueError(
-            f"{path}: has {truth.fps:g} frames per second, but the sequence has {fps:g}; give fps in the scene's "
-            "[clip]."
-        )
 
 
 def _meters(size: npt.NDArray[np.float64]) -> str:

@@ -69,17 +69,14 @@ def orbit_scores(
         shapes.append(azimuth_shapes(orbit.table, smoke))
         pictures = _pictures(orbit, smoke, AZIMUTHS)
         if truth is None:
-            true = _pictures(orbit, smoke, (0,))
+            front = orbit.picture(smoke, 0)
+            fronts.append(PatchStatistics.of(front))
+            references, sharp = len(AZIMUTHS) * fronts[-1:], len(AZIMUTHS) * [mean_gradient(front)]
         else:
             true_smoke = truth(frame)
             true_shapes.append(azimuth_shapes(orbit.table, true_smoke))
             true = _pictures(orbit, true_smoke, AZIMUTHS)
-        references = [PatchStatistics.of(picture) for picture in true]
-        sharp = [mean_gradient(picture) for picture in true]
-        if truth is None:
-            fronts += references
-            references, sharp = len(AZIMUTHS) * references, len(AZIMUTHS) * sharp
-        else:
+            references, sharp = [PatchStatistics.of(picture) for picture in true], list(map(mean_gradient, true))
             _add_distances(own, [*references[OWN_STEP:], *references[:OWN_STEP]], references)
             outline = _outline(true)
             beyond = ((float(picture[~outline].sum()), float(picture.sum())) for picture in pictures)

@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.checks import counted
 from smokelift.extraction.given_background import background_picture, open_plates
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import area_average
+from smokelift.footage.images import area_average, reduced_size
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
@@ -24,27 +24,18 @@ INPUT = "input"
 
 @dataclass(frozen=True, eq=False)
 class ReferenceView:
-    """A camera with the clip that its pictures are compared with.
-
-    Attributes
-    ----------
-    name
-        To call it by.
-    camera
-        With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on.
-    background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke.
-    clip
-        Its footage.
-    first
-        The clip's frame that the sequence's frame 1 belongs to.
-    """
+    """A camera with the clip that its pictures are compared with."""
 
     name: str
+    """To call it by."""
     camera: Camera
+    """With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on."""
     background: Image
+    """(rows, columns, 3) or (3,): linear radiance behind the smoke."""
     clip: Clip
+    """Its footage."""
     first: int
+    """The clip's frame that the sequence's frame 1 belongs to."""
 
     def picture(self, number: int) -> Image:
         """The clip's picture of a frame of the sequence, with its background where a mask hides it.
@@ -92,12 +83,6 @@ def open_views(
     return views
 
 
-def at_most(camera: Camera) -> Camera:
-    """Return a camera with at most `MAX_COMPARED_SIDE` pixels."""
-    scale = min(1.0, MAX_COMPARED_SIDE / max(camera.size))
-    return camera.resized(*(max(1, round(side * scale)) for side in camera.size))
-
-
 def _view(
     name: str, camera: Camera, background: Image | None, clip: Clip, first: int, sequence: Sequence
 ) -> ReferenceView:
@@ -111,7 +96,7 @@ def _view(
             f"{clip.path}: has {counted(len(clip), 'frame')}, but the sequence goes on to frame {last} of its clip "
             "(from 0); give the whole clip of that camera."
         )
-    camera = at_most(camera.resized(*clip.size))
+    camera = camera.resized(*clip.size).resized(*reduced_size(*clip.size, MAX_COMPARED_SIDE))
     if camera.moves:
         camera = replace(camera, matrix=camera.matrices[first], matrices=camera.matrices[first:])
     if background is None:

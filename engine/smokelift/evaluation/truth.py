@@ -21,31 +21,21 @@ class TruthError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Densities, velocities and inlet of one scene.
-
-    Attributes
-    ----------
-    densities
-        float16 [frame, x, y, z]; a density times the medium's extinction is in 1/m.
-    faces
-        Velocities (m/s) on x, y and z faces, float16 [frame, x, y, z]; those of frame f carry density f to f + 1, at
-        the points of arrival. Known within 6 voxels of smoke, zero elsewhere.
-    inflow_packed
-        np.packbits of the cells where smoke was put into the density of a frame, [frame, byte].
-    voxel_size
-        Edge of a voxel (m).
-    fps
-        Frames per second.
-    closed
-        Names of the sides that are walls.
-    """
+    """Densities, velocities and inlet of one scene."""
 
     densities: npt.NDArray[np.float16]
+    """float16 [frame, x, y, z]; a density times the medium's extinction is in 1/m."""
     faces: tuple[npt.NDArray[np.float16], ...]
+    """Velocities (m/s) on x, y and z faces, float16 [frame, x, y, z]; those of frame f carry density f to f + 1, at the
+    points of arrival. Known within 6 voxels of smoke, zero elsewhere."""
     inflow_packed: npt.NDArray[np.uint8]
+    """np.packbits of the cells where smoke was put into the density of a frame, [frame, byte]."""
     voxel_size: float
+    """Edge of a voxel (m)."""
     fps: float
+    """Frames per second."""
     closed: tuple[Side, ...]
+    """Names of the sides that are walls."""
 
     @staticmethod
     def load(path: Path) -> "Truth":

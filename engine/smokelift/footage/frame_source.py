@@ -112,30 +112,20 @@ class StoredPicture:
 
 
 class FrameSource:
-    """The frames of one file or sequence, counted from 0 over the whole of it; a subclass for each kind.
-
-    Attributes
-    ----------
-    count
-        Frames that can be read.
-    fps
-        Frames a second.
-    warning
-        What is said of a defect, else None.
-    files
-        The video, or one picture for each frame.
-    lens
-        Focal length in millimeters on 35 mm film (of its diagonal, as CIPA DCG-001 defines it), if the file says it.
-    backdrop
-        Linear gray shown behind pictures with an alpha channel; None if they are opaque.
-    """
+    """The frames of one file or sequence, counted from 0 over the whole of it; a subclass for each kind."""
 
     count: int
+    """Frames that can be read."""
     fps = DEFAULT_FPS
+    """Frames a second."""
     warning: Finding | None = None
+    """What is said of a defect, else None."""
     files: tuple[Path, ...] = ()
+    """The video, or one picture for each frame."""
     lens: float | None = None
+    """Focal length in millimeters on 35 mm film (of its diagonal, as CIPA DCG-001 defines it), if the file says it."""
     backdrop: float | None = None
+    """Linear gray shown behind pictures with an alpha channel; None if they are opaque."""
     _held: Association = "straight"
 
     @property

@@ -41,24 +41,16 @@ Seen = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Mask:
-    """What hides a part of the frames of a clip's file.
-
-    Attributes
-    ----------
-    seen
-        What returns which pixels (height, width) of the file's frame n are not hidden, by n, width and height.
-    files
-        What it is read from.
-    count
-        Number of the file's frames that have a mask, None if one serves all.
-    close
-        What closes its file.
-    """
+    """What hides a part of the frames of a clip's file."""
 
     seen: Callable[[int, int, int], Seen]
+    """What returns which pixels (height, width) of the file's frame n are not hidden, by n, width and height."""
     files: tuple[Path, ...] = ()
+    """What it is read from."""
     count: int | None = None
+    """Number of the file's frames that have a mask, None if one serves all."""
     close: Callable[[], None] = lambda: None
+    """What closes its file."""
 
     @staticmethod
     def open(path: Path, needed: range, size: tuple[int, int]) -> "Mask":

@@ -358,8 +358,7 @@ class Video(FrameSource):
             self._interlaced, shown = True, self._of_one_moment(frame)
         way = _SHRINKING if size[0] < width else _GROWING
         # in this thread: after a fork of a process that has read a video, the converter waits forever for its own
-        codes: npt.NDArray[Any] = shown.reformat(*size, layout, interpolation=way, threads=1).to_ndarray()
-        return codes
+        return np.asarray(shown.reformat(*size, layout, interpolation=way, threads=1).to_ndarray())
 
     def _layer(self, frame: av.VideoFrame) -> Layer:
         linear, alpha = decode(self._codes(frame), self._encoding(), _white(frame), self._held)

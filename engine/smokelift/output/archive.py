@@ -10,7 +10,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks.arguments import MAX_MAGNITUDE
+from smokelift.checks import MAX_MAGNITUDE
 from smokelift.checks.whole_files import atomic_path
 
 Shape = tuple[int, ...]

@@ -64,32 +64,18 @@ _OWN = re.compile(r"(smoke|proxy)_\d{4,}\.vdb")
 
 @dataclass(frozen=True)
 class ExportSettings:
-    """What is exported.
-
-    Attributes
-    ----------
-    precision
-        ``"half"`` for floats of 16 bits; ``"quantized"`` for as few bits as a picture of 8 bits needs.
-    velocity
-        Whether to export the velocity, which motion blur needs.
-    proxy
-        How many times coarser a second sequence for viewports is, of the density alone; 1 for none.
-    host
-        The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``.
-
-    Raises
-    ------
-    ValueError
-        If the proxy is not 1 to 16.
-    """
+    """What is exported; ValueError if the proxy is not 1 to 16."""
 
     precision: Precision = "half"
+    """``"half"`` for floats of 16 bits; ``"quantized"`` for as few bits as a picture of 8 bits needs."""
     velocity: bool = True
+    """Whether to export the velocity, which motion blur needs."""
     proxy: int = 1
+    """How many times coarser a second sequence for viewports is, of the density alone; 1 for none."""
     host: HostName = "blender"
+    """The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``."""
 
     def __post_init__(self) -> None:
-        """Check the proxy."""
         if not 1 <= self.proxy <= 16:
             raise ValueError(f"the proxy must be 1 (none) to 16 times coarser, not {self.proxy}.")
 
@@ -199,7 +185,8 @@ class _Export:
         """Write the files of a frame; returns their bytes."""
         sequence, host = self.sequence, self.host
         domain, extinction = sequence.scene.domain, sequence.scene.medium.extinction
-        thinned = _thinned(sequence.density(number), domain, extinction)
+        density, longest = sequence.density(number), max(domain.resolution) * domain.voxel_size
+        thinned = np.where(density < MIN_OPACITY / (extinction * longest), np.float32(0), density)
         rho, velocity, flame = thinned, None, None
         if self.settings.velocity:
             velocity = sequence.velocity_at_centres(number)
@@ -275,14 +262,8 @@ def _density_step(domain: Domain, extinction: float) -> float:
     return _power_of_two(HALF_CODE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
 
 
-def _thinned(density: Array, domain: Domain, extinction: float) -> Array:
-    longest = max(domain.resolution) * domain.voxel_size
-    return np.where(density < MIN_OPACITY / (extinction * longest), np.float32(0.0), density)
-
-
 def _rounded(values: Array, step: float) -> Array:
-    rounded: Array = np.round(values / np.float32(step)) * np.float32(step)
-    return rounded
+    return np.asarray(np.round(values / np.float32(step)) * np.float32(step))
 
 
 def _power_of_two(value: float) -> float:

@@ -27,21 +27,15 @@ RIM_POINTS = 24
 
 @dataclass(frozen=True)
 class Framing:
-    """Where in a camera's picture the smoke is.
-
-    Attributes
-    ----------
-    box
-        The smoke of all frames; what cameras are turned about.
-    left, top, width, height
-        The part of the full picture, in its pixels.
-    """
+    """Where in a camera's picture the smoke is."""
 
     box: Domain
+    """The smoke of all frames; what cameras are turned about."""
     left: int
     top: int
     width: int
     height: int
+    """The part of the full picture, in its pixels."""
 
     def camera(self, camera: Camera, height: int) -> Camera:
         """Return the camera of the part, so many pixels high."""

@@ -16,30 +16,20 @@ Axes = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 
 @dataclass(frozen=True)
 class Host:
-    """What a program expects.
-
-    Attributes
-    ----------
-    velocity
-        Name of the grid of the velocity.
-    up_axis
-        ``"Z"`` or ``"Y"``.
-    axes
-        For each of the program's axes ours, and 1, or -1 where it points the other way.
-    left_handed
-        Whether these axes mirror the smoke.
-    eight_bits
-        Whether it keeps densities from 0 to 1 in 8 bits: they are divided by the largest of the sequence.
-    whole_box
-        Whether it puts the pivot at the corner of what is active: then the box's corners are, in every frame.
-    """
+    """What a program expects."""
 
     velocity: str = "velocity"
+    """Name of the grid of the velocity."""
     up_axis: str = "Z"
+    """``"Z"`` or ``"Y"``."""
     axes: Axes = ((0, 1), (1, 1), (2, 1))
+    """For each of the program's axes ours, and 1, or -1 where it points the other way."""
     left_handed: bool = False
+    """Whether these axes mirror the smoke."""
     eight_bits: bool = False
+    """Whether it keeps densities from 0 to 1 in 8 bits: they are divided by the largest of the sequence."""
     whole_box: bool = False
+    """Whether it puts the pivot at the corner of what is active: then the box's corners are, in every frame."""
 
     def box(self, domain: Domain) -> Domain:
         """The box of the smoke in the program's axes."""

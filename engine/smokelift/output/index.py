@@ -61,44 +61,30 @@ def software_versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Index:
-    """The content of the file, as plain values.
-
-    Attributes
-    ----------
-    scene
-        The tables of a scene file.
-    settings
-        All settings that decide the result.
-    choices
-        What was chosen for the clip and why. Not compared when a run goes on: what they decided is in the scene and the
-        settings.
-    provenance
-        What of the result is measured, estimated, assumed and made up. Not compared either.
-    sources
-        Size and content of the files that the run reads, and frames that it takes the background from, by their table
-        in a scene file.
-    frames
-        The figures of every finished frame, by its number as text.
-    checksums
-        Of the frames' files, by name (`smokelift.output.files`).
-    complete
-        Whether the run came to its end.
-    start_number
-        Number in the names of the files of frame 1.
-    versions
-        Of the software.
-    """
+    """The content of the file, as plain values."""
 
     scene: dict[str, Any]
+    """The tables of a scene file."""
     settings: dict[str, Any]
+    """All settings that decide the result."""
     choices: list[Any] = field(default_factory=list)
+    """What was chosen for the clip and why. Not compared when a run goes on: what they decided is in the scene and the
+    settings."""
     provenance: list[Any] = field(default_factory=list)
+    """What of the result is measured, estimated, assumed and made up. Not compared either."""
     frames: dict[str, Any] = field(default_factory=dict)
+    """The figures of every finished frame, by its number as text."""
     sources: dict[str, Any] = field(default_factory=dict)
+    """Size and content of the files that the run reads, and frames that it takes the background from, by their table in
+    a scene file."""
     checksums: dict[str, str] = field(default_factory=dict)
+    """Of the frames' files, by name (`smokelift.output.files`)."""
     complete: bool = False
+    """Whether the run came to its end."""
     start_number: int = 1
+    """Number in the names of the files of frame 1."""
     versions: dict[str, Any] = field(default_factory=software_versions)
+    """Of the software."""
 
     @property
     def numbers(self) -> tuple[int, ...]:

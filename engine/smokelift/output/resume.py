@@ -21,23 +21,16 @@ grid is empty."""
 
 @dataclass(frozen=True)
 class ResumeState:
-    """What a reconstruction carries from one frame to the next.
-
-    Attributes
-    ----------
-    number
-        The last finished frame.
-    density : (nx, ny, nz)
-    velocity
-        On faces, m/s; the grid may be coarser than that of the density.
-    extra : (nx, ny, nz) each
-        Further volumes by name.
-    """
+    """What a reconstruction carries from one frame to the next."""
 
     number: int
+    """The last finished frame."""
     density: Array
+    """(nx, ny, nz): at voxel centers."""
     velocity: Faces
+    """On faces, m/s; the grid may be coarser than that of the density."""
     extra: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    """(nx, ny, nz) each: further volumes by name."""
 
     def write(self, path: Path) -> None:
         """Write the state; OSError if that fails."""

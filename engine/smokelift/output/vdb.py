@@ -110,34 +110,19 @@ def write_vdb(
 ) -> None:
     """Write one frame; the file appears whole or not at all.
 
-    Values are stored as 16 bit floats, which have three digits; larger values are clipped. Density and emission are
-    stored where they are not zero, velocity within `VELOCITY_MARGIN` voxels of density.
+    Values are stored as 16 bit floats, which have three digits; larger values are clipped. Density (nx, ny, nz), and
+    the flame's emission (nx, ny, nz) in radiance per meter, are not negative and stored where they are not zero. The
+    velocity in m/s, on faces or at voxel centers (nx, ny, nz, 3), is stored within `VELOCITY_MARGIN` voxels of density.
+    Without velocity or flame there is no such grid.
 
-    Parameters
-    ----------
-    density : (nx, ny, nz)
-        Not negative.
-    velocity
-        m/s, on faces or at voxel centers, shape (nx, ny, nz, 3); None for a file of the density alone.
-    settings
-        Kept with the density grid, as JSON can hold them.
-    flame : (nx, ny, nz), optional
-        Emission, radiance per meter, not negative; None for a file without that grid.
-    metadata
-        What every grid gets.
-    host
-        Names the grid of the velocity, and says whether two opposite corners of the box are active although there is no
-        smoke. The axes of the volumes are its own already.
-    lattice
-        Whose first voxel has the index (0, 0, 0), with voxels in line with those of `domain`; by default `domain`. All
-        frames of a sequence share one, because a host mixes grids with one transform only.
+    The settings are kept with the density grid, as JSON can hold them, and every grid gets the metadata. The host names
+    the grid of the velocity, and says whether two opposite corners of the box are active although there is no smoke;
+    the axes of the volumes are its own already. The first voxel of the lattice, by default `domain`, has the index
+    (0, 0, 0); its voxels are in line with those of `domain`. All frames of a sequence share one, because a host mixes
+    grids with one transform only.
 
-    Raises
-    ------
-    ValueError
-        If a shape does not fit the domain, a value is not finite, or a density or an emission negative.
-    VdbUnavailable, OSError
-        If there is no OpenVDB module, or the file cannot be written.
+    It raises ValueError if a shape does not fit the domain, a value is not finite, or a density or an emission
+    negative; VdbUnavailable if there is no OpenVDB module, and OSError if the file cannot be written.
     """
     vdb = vdb_module()
     rho = checked_volume(density, domain.shape, "density")

@@ -14,16 +14,9 @@ from smokelift.scene import Camera, CompleteScene, shared_part
 class Viewer:
     """Renders the frames of a sequence for one camera; where nothing moves, one renderer serves all of them.
 
-    `smokelift.extraction.given_background.behind` says what another camera than the scene's own sees of a clean plate.
-
-    Parameters
-    ----------
-    scene
-        What is rendered.
-    camera
-        By default the scene's own.
-    background : (rows, columns, 3) or (3,), optional
-        Linear radiance behind the smoke in place of the scene's.
+    By default that is the scene's own camera, before the scene's background;
+    `smokelift.extraction.given_background.behind` says what another camera sees of a clean plate. A background that is
+    given, (rows, columns, 3) or (3,), is linear radiance.
     """
 
     def __init__(self, scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> None:

@@ -16,22 +16,10 @@ from typing import Any
 
 import numpy.typing as npt
 
+import smokelift.output.files as files
 from smokelift.checks import counted
 from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME, VELOCITY, write_arrays
-from smokelift.output.files import (
-    BACKGROUND,
-    DISK_FULL,
-    INDEX,
-    LOCK,
-    MAX_START_NUMBER,
-    RESUME,
-    Lock,
-    checksum,
-    frame_path,
-    is_foreign,
-    proxy_path,
-)
 from smokelift.output.images import write_image
 from smokelift.output.index import BOX, DirectoryBusyError, Index, SequenceError, first_change, json_value
 from smokelift.output.resume import ResumeState
@@ -46,35 +34,14 @@ class SequenceWriter:
     Leaving the block without an exception completes the sequence. After an exception the finished frames stay
     and ``resume=True`` goes on from them.
 
-    Parameters
-    ----------
-    directory
-        Made if missing. It must be empty, or hold the same run unfinished with ``resume``.
-    scene
-        Kept in `sequence.json`.
-    settings
-        All settings that decide the result, as JSON can hold them.
-    npz
-        Whether to write a NumPy twin of every frame, with velocity on faces.
-    resume
-        Whether to go on from the finished frames in the directory. An empty directory starts a new run.
-    background : (rows, columns, 3), optional
-        A background of the scene's picture that was found in the clip, kept as `background.exr`.
-    start_number
-        Number in the names of the files of frame 1, from 0 to `MAX_START_NUMBER`.
-    choices, provenance, sources
-        Where the result comes from, in values that JSON can hold: see `smokelift.output.index.Index`. Kept.
+    The directory is made if it is missing. It must be empty, or hold the same run unfinished with ``resume``. Scene,
+    settings (all that decide the result), choices, provenance and sources are kept in `sequence.json` as JSON can hold
+    them: see `smokelift.output.index.Index`. With ``npz`` every frame has a NumPy twin, with velocity on faces. A
+    ``background`` (rows, columns, 3) of the scene's picture that was found in the clip is kept as `background.exr`.
+    The files of frame 1 have the ``start_number`` in their names, from 0 to `MAX_START_NUMBER`.
 
-    Attributes
-    ----------
-    state
-        Where a run that is resumed goes on from, until it writes; None if there is nothing to go on from.
-
-    Raises
-    ------
-    SequenceError
-        On entering: another run is at work, the directory holds other files or finished frames or another
-        run, or nothing could be written because there is no OpenVDB module.
+    Entering is a SequenceError if another run is at work, the directory holds other files or finished frames or another
+    run, or nothing could be written because there is no OpenVDB module.
     """
 
     def __init__(
@@ -93,20 +60,21 @@ class SequenceWriter:
     ) -> None:
         self.directory = Path(directory)
         self.state: ResumeState | None = None
+        """Where a run that is resumed goes on from, until it writes; None if there is nothing to go on from."""
         self._domain = scene.domain
         self._background = background
         if background is not None:
-            scene = replace(scene, background=Background(image=self.directory.resolve() / BACKGROUND))
+            scene = replace(scene, background=Background(image=self.directory.resolve() / files.BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
         origins = json_value({"choices": choices, "provenance": provenance, "sources": sources or {}})
-        if not 0 <= start_number <= MAX_START_NUMBER:
-            raise ValueError(f"start_number must be from 0 to {MAX_START_NUMBER}, not {start_number}")
+        if not 0 <= start_number <= files.MAX_START_NUMBER:
+            raise ValueError(f"start_number must be from 0 to {files.MAX_START_NUMBER}, not {start_number}")
         self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **origins, start_number=start_number)
         self._npz = npz
         self._kinds: tuple[str, ...] = ()
         self._resume = resume
-        self._lock = Lock(self.directory / LOCK)
+        self._lock = files.Lock(self.directory / files.LOCK)
 
     @property
     def finished(self) -> tuple[int, ...]:
@@ -131,10 +99,10 @@ class SequenceWriter:
             self._take_over()
             self._index.write(self.directory)  # first: without it a run that goes on takes all else for another's
             if self._background is not None:
-                write_image(self.directory / BACKGROUND, self._background)
+                write_image(self.directory / files.BACKGROUND, self._background)
         except OSError as error:
             self._lock.release()
-            raise self._write_error(INDEX, error) from error
+            raise self._write_error(files.INDEX, error) from error
         except BaseException:
             self._lock.release()
             raise
@@ -148,9 +116,9 @@ class SequenceWriter:
                 self._check_files()
                 self._index = replace(self._index, complete=True)
                 self._index.write(self.directory)
-                (self.directory / RESUME).unlink(missing_ok=True)
+                (self.directory / files.RESUME).unlink(missing_ok=True)
         except OSError as failure:
-            raise self._write_error(INDEX, failure) from failure
+            raise self._write_error(files.INDEX, failure) from failure
         finally:
             self._lock.release()
 
@@ -168,31 +136,15 @@ class SequenceWriter:
     ) -> None:
         """Write one frame and make it count.
 
-        Parameters
-        ----------
-        number
-            The frame's number, the one after the last finished; in its file name it counts from ``start_number``.
-        density : (nx, ny, nz)
-            Not negative.
-        velocity_faces
-            m/s, shapes (nx+1, ny, nz), (nx, ny+1, nz), (nx, ny, nz+1).
-        figures
-            Numbers and text about the frame by name. Numbers that are not finite become null.
-        flame : (nx, ny, nz), optional
-            Emission of fire, radiance per meter, not negative; None where there can be none.
-        box
-            Of the frame, with voxels in line with the scene's domain; by default that. It is kept in the figures.
-        ready
-            Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
-        state
-            What the next frame depends on; without it density and velocity.
+        Its number is the one after the last finished. Density and flame (nx, ny, nz), the latter the emission of fire
+        in radiance per meter, are not negative; there is none where there can be no fire. The velocity on faces, in
+        m/s, has the shapes (nx+1, ny, nz), (nx, ny+1, nz), (nx, ny, nz+1). Figures are numbers and text about the frame
+        by name; numbers that are not finite become null. The frame's box, which they keep, has voxels in line with the
+        scene's domain; by default it is that. Files that are ``ready``, by their kind ``"vdb"`` or ``"npz"``, hold this
+        frame already and are copied. The state is what the next frame depends on; by default density and velocity.
 
-        Raises
-        ------
-        ValueError
-            If a shape, a value or the number does not fit.
-        SequenceError
-            If the frame cannot be written; the finished ones stay.
+        It raises ValueError if a shape, a value or the number does not fit, and SequenceError if the frame cannot be
+        written; the finished ones stay.
         """
         if self.finished and number != self.finished[-1] + 1:
             raise ValueError(f"frame {number} cannot follow frame {self.finished[-1]}: a sequence has no gaps")
@@ -216,25 +168,25 @@ class SequenceWriter:
                     self._write_arrays(path, rho, velocity, fire, box)
             if "vdb" in self._kinds and math.prod(self._domain.shape) >= MIN_PROXY_VOXELS:  # of all frames or of none
                 write_proxy(
-                    proxy_path(self.directory, self._index.file_number(number)),
+                    files.proxy_path(self.directory, self._index.file_number(number)),
                     rho,
                     box,
                     flame=fire,
                     lattice=self._domain,
                 )
             frames = {**self._index.frames, str(number): json_value({**(figures or {}), **own_box})}
-            checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
+            checksums = {**self._index.checksums, **{path.name: files.checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
             grown.write(self.directory)
             # Last: a state without its frame would pass for a frame that was lost.
-            state.write(self.directory / RESUME)
+            state.write(self.directory / files.RESUME)
             self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
             raise self._write_error(f"frame {number}", error) from error
 
     def _path(self, number: int, kind: str) -> Path:
         """The file of a frame."""
-        return frame_path(self.directory, self._index.file_number(number), kind)
+        return files.frame_path(self.directory, self._index.file_number(number), kind)
 
     def _write_arrays(self, path: Path, density: Array, velocity: Velocity, flame: Array | None, box: Domain) -> None:
         if path.suffix == ".npz":
@@ -247,7 +199,7 @@ class SequenceWriter:
         """Judge what is in the directory, and read what can be gone on from."""
         there = _earlier_run(self.directory, self._resume)
         if there is None:
-            self._clear(INDEX)  # nothing else is written before it
+            self._clear(files.INDEX)  # nothing else is written before it
             return
         if what := first_change(there, self._index):
             raise SequenceError(
@@ -274,7 +226,7 @@ class SequenceWriter:
             return there.box(number, self._domain).shape if str(number) in there.frames else self._domain.shape
 
         try:
-            return ResumeState.read(self.directory / RESUME, shape_of)
+            return ResumeState.read(self.directory / files.RESUME, shape_of)
         except OSError as error:
             raise SequenceError(f"{error}; this run cannot be resumed, choose another directory") from error
 
@@ -287,7 +239,7 @@ class SequenceWriter:
                 )
 
     def _write_error(self, what: str, error: OSError) -> SequenceError:
-        reason = "the disk is full" if error.errno in DISK_FULL else str(error)
+        reason = "the disk is full" if error.errno in files.DISK_FULL else str(error)
         return SequenceError(
             f"{self.directory}: {what} could not be written: {reason}; "
             f"finished frames stay ({len(self.finished)}), and a resumed run goes on from them"
@@ -320,9 +272,9 @@ def written_kinds(npz: bool) -> tuple[str, ...]:
 def _earlier_run(directory: Path, resume: bool) -> Index | None:
     """The run in a directory that can be gone on with, or None if there is nothing; SequenceError for all else."""
     names = sorted(file.name for file in directory.iterdir() if not file.name.startswith("."))
-    has_index = INDEX in names
+    has_index = files.INDEX in names
     # Without an index nothing here was written by a run, whatever it is called.
-    foreign = [name for name in names if is_foreign(name) or not (has_index or name == LOCK)]
+    foreign = [name for name in names if files.is_foreign(name) or not (has_index or name == files.LOCK)]
     if foreign:
         raise SequenceError(
             f"{directory}: holds other files ({foreign[0]}); nothing was overwritten, choose an empty directory"

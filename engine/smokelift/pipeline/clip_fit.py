@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.extraction.matte import matte
+from smokelift.footage.images import reduced_size
 from smokelift.render import Image, Optics, Volume
 from smokelift.setup.shot import Shot, ShotView
 
@@ -27,19 +28,13 @@ two rays per voxel see both its ends and its middle (docs/experiments/clip-pixel
 
 @dataclass(frozen=True, eq=False)
 class BesideClip:
-    """Pixels of a clip's frame where the domain is, and what a density shows there.
-
-    Attributes
-    ----------
-    seen, shown : (rows, columns, 3)
-        The clip's and the density's; linear radiance.
-    inside : (rows, columns) bool
-        Which of them show smoke in the clip.
-    """
+    """Pixels of a clip's frame where the domain is, and what a density shows there."""
 
     seen: Image
     shown: Image
+    """(rows, columns, 3): the clip's and the density's; linear radiance."""
     inside: NDArray[np.bool_]
+    """(rows, columns) bool: which of them show smoke in the clip."""
 
     @property
     def psnr(self) -> float | None:
@@ -78,8 +73,7 @@ def beside_clip(
     renderer = optics.renderer(camera.resized(columns, rows), behind, density > 0)
     shown = renderer.image(density)
     seen = view.clip.stored(frame).cut(cut).averaged(columns, rows)
-    shrink = max(1.0, max(working.width, working.height) / OUTLINE_PIXELS)
-    small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
+    small = working.resized(*reduced_size(working.width, working.height, OUTLINE_PIXELS))
     smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask
     inside = smoke[np.ix_(down * smoke.shape[0] // working.height, across * smoke.shape[1] // working.width)]
     return BesideClip(seen, shown, inside)

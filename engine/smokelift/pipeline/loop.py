@@ -22,7 +22,6 @@ from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
 from smokelift.render import Volume
 from smokelift.render.device import products_on_one_thread
-from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
 from smokelift.velocity.estimator import DensityPair
@@ -160,15 +159,17 @@ def _measured(before: Frame, fitted: FittedDensity) -> tuple[Volume, Volume]:
 def _density(
     views: ViewSet | None, before: Frame | None, predicted: Velocity | None, shot: Shot, method: Method
 ) -> tuple[FittedDensity, Mapping[str, float]]:
-    """The density of a frame, and what was taken over of the carried one."""
+    """The density of a frame, the carried one where nothing is seen, and what the fit took over of the carried one."""
     if views is None:
         carried = _carried(before, predicted, shot)
-        return _unseen(shot.optics.domain, None if carried is None else carried[0]), {}
+        nothing: Array = np.zeros(shot.optics.domain.resolution, np.float32)
+        figures: Mapping[str, float] = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
+        return FittedDensity(nothing if carried is None else carried[0], nothing > 0, figures), {}
     depth = method.depth_prior.estimate(views)
     carried = _carried(before, predicted, shot)
     initial: Volume | None = None
     unseen: tuple[Volume, Volume] | None = None
-    figures: Mapping[str, float] = {}
+    figures = {}
     if carried is not None:
         start = method.temporal_prior.start(depth.views, depth, *carried)
         initial, figures = start.density, start.figures
@@ -207,10 +208,3 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
         return np.zeros_like(density)
     # least squares over the channels
     return flame_emission(seen.image @ color / (color @ color), seen.camera, density, shot.optics)
-
-
-def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:
-    """The density of a frame whose picture shows nothing of the domain: what was carried along."""
-    nothing: Array = np.zeros(domain.resolution, np.float32)
-    figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
-    return FittedDensity(nothing if carried is None else carried, nothing > 0, figures)

@@ -16,10 +16,10 @@ from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.report.result import provenance
 from smokelift.report.views import choices, part
-from smokelift.scene import Background, EnvironmentLight, Scene
+from smokelift.scene import EnvironmentLight, Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot, ShotView
+from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity, halved
 
 
@@ -181,7 +181,8 @@ def sources(shot: Shot) -> dict[str, dict[str, Any]]:
         files[f"{table}clip"] = view.clip.files
         files[f"{table}mask"] = () if view.clip.mask is None else view.clip.mask.files
         given = shot.scene.views[number - 1].background if number else shot.scene.background
-        files[f"{table}background"] = _background(given, view)
+        picture = None if given is None else given.image
+        files[f"{table}background"] = view.plate.files or (() if picture is None else (picture,))
         if given is not None and given.strokes is not None:
             files[f"{table}strokes"] = (given.strokes,)
         if given is not None and given.frame is not None:
@@ -194,8 +195,3 @@ def sources(shot: Shot) -> dict[str, dict[str, Any]]:
         for table, paths in files.items()
         if paths
     }
-
-
-def _background(given: Background | None, view: ShotView) -> tuple[Path, ...]:
-    """The files of a background; none where it is a color, or estimated."""
-    return view.plate.files or (() if given is None or given.image is None else (given.image,))

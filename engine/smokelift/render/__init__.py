@@ -9,7 +9,7 @@
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
-from smokelift.render.device import DeviceError, start
+from smokelift.render.device import DeviceError
 from smokelift.render.image import render, render_gradient, scene_optics, scene_renderer
 from smokelift.render.renderer import Image, Optics, Renderer, Volume
 
@@ -23,5 +23,4 @@ __all__ = [
     "render_gradient",
     "scene_optics",
     "scene_renderer",
-    "start",
 ]

@@ -32,26 +32,18 @@ BAND = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """One ray per pixel, for one grid.
-
-    Attributes
-    ----------
-    lines : (rows, columns, 4) float32
-        start_b, slope_b, start_c, slope_c in voxel units, voxel centers at integers.
-    length : (rows, columns) float32
-        Distance between samples, m.
-    planes : (rows, columns, 4) int32
-        Dominant axis; +1 or -1, the direction of travel along it; first and last plane in ascending order
-        (last < first: the ray misses the grid).
-    to_pixel : (3, 4) float64
-        Homogeneous map from grid coordinates to pixel x, pixel y (both times depth), depth. Depth is 1 for an
-        orthographic camera.
-    """
+    """One ray per pixel, for one grid."""
 
     lines: NDArray[np.float32]
+    """(rows, columns, 4) float32: start_b, slope_b, start_c, slope_c in voxel units, voxel centers at integers."""
     length: NDArray[np.float32]
+    """(rows, columns) float32: distance between samples, m."""
     planes: NDArray[np.int32]
+    """(rows, columns, 4) int32: dominant axis; +1 or -1, the direction of travel along it; first and last plane in
+    ascending order (last < first: the ray misses the grid)."""
     to_pixel: Doubles
+    """(3, 4) float64: homogeneous map from grid coordinates to pixel x, pixel y (both times depth), depth. Depth is 1
+    for an orthographic camera."""
 
     @cached_property
     def axes(self) -> tuple[int, ...]:

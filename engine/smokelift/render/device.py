@@ -11,7 +11,6 @@ import ctypes
 import sys
 from contextlib import AbstractContextManager
 from functools import lru_cache
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Literal
 
@@ -42,8 +41,9 @@ def available_gpu() -> str | None:
     """Name of the first GPU back end that Taichi can use here, or None."""
     if not (driver_installed() and has_taichi()):
         return None
-    name: str | None = _taichi().supported_gpu()
-    return name
+    from smokelift.render import taichi_runtime
+
+    return taichi_runtime.supported_gpu()
 
 
 def has_taichi() -> bool:
@@ -75,13 +75,11 @@ def start(device: DeviceName = "auto") -> str:
             "No GPU that Taichi can use was found (CUDA, Metal or Vulkan); choose cpu as the device, or update the "
             "driver."
         )
-    _taichi().start(gpu)
+    from smokelift.render import taichi_runtime
+
+    taichi_runtime.start(gpu)
     _running = gpu
     return _running
-
-
-def _taichi() -> Any:
-    return import_module("smokelift.render.taichi_runtime")
 
 
 def driver_installed() -> bool:

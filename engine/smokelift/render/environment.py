@@ -45,17 +45,7 @@ def environment_lights(light: EnvironmentLight, count: int) -> tuple[Directional
 
 
 class EnvironmentCells:
-    """The parts of an environment's picture that are not black, read once for any number of lights.
-
-    Attributes
-    ----------
-    irradiance : (cells, 3)
-        Integral of radiance over the cell, W/m^2.
-    importance : (cells,)
-        Its luminance.
-    direction : (cells, 3)
-        Unit vector towards the cell in the picture's own frame, that is before the rotation.
-    """
+    """The parts of an environment's picture that are not black, read once for any number of lights."""
 
     def __init__(self, light: EnvironmentLight) -> None:
         self.rotation = np.radians(light.rotation_degrees)
@@ -68,8 +58,11 @@ class EnvironmentCells:
         importance = irradiance @ LUMINANCE
         lit = importance * light.strength > 0
         self.irradiance = light.strength * irradiance[lit]
+        """(cells, 3): integral of radiance over the cell, W/m^2."""
         self.importance = importance[lit]
+        """(cells,): its luminance."""
         self.direction = direction[lit]
+        """(cells, 3): unit vector towards the cell in the picture's own frame, that is before the rotation."""
 
     def lights(self, count: int) -> tuple[DirectionalLight, ...]:
         """Return at most so many lights, as `environment_lights`."""
@@ -118,8 +111,7 @@ class EnvironmentCells:
 
 def _concentration(weight: Doubles, moment: Doubles) -> Doubles:
     """|moment|^2 / weight of the first one, two, ... cells: their weight less their scatter."""
-    total: Doubles = np.square(np.cumsum(moment, axis=0)).sum(-1) / np.cumsum(weight)
-    return total
+    return np.asarray(np.square(np.cumsum(moment, axis=0)).sum(-1) / np.cumsum(weight))
 
 
 def _first_largest(values: Doubles) -> int:
@@ -130,12 +122,8 @@ def _first_largest(values: Doubles) -> int:
 def _gather(picture: NDArray[np.float32]) -> tuple[Doubles, Doubles]:
     """Sum a picture up over `CELLS`.
 
-    Returns
-    -------
-    irradiance : (cells, 3)
-        Integral of radiance over each cell.
-    direction : (cells, 3)
-        Unit vector to its centroid, weighted by luminance; arbitrary for a black cell.
+    It returns the integrals of radiance over the cells (cells, 3), and unit vectors to their centroids (cells, 3),
+    weighted by luminance; arbitrary for a black cell.
     """
     rows, columns = picture.shape[:2]
     finer = -(-CELLS[0] // rows), -(-CELLS[1] // columns)  # texels larger than cells are cut

@@ -176,14 +176,15 @@ def _of_view(density: Volume, renderer: Renderer, target: npt.ArrayLike) -> tupl
 
 def _checked(density: Volume, renderer: Renderer) -> Volume:
     density = numbers(density, "The density")
-    wanted = renderer.domain.resolution
+    domain = renderer.optics.domain
+    wanted = domain.resolution
     if density.shape != wanted:
         raise ValueError(f"The density has the shape {density.shape}, the domain {wanted}; resample one of them.")
     if not np.isfinite(density).all():
         raise ValueError("The density holds values that are not finite; set them to 0.")
     if density.min(initial=0.0) < 0:
         raise ValueError("The density holds negative values; set them to 0.")
-    depth = float(density.max(initial=0.0)) * renderer.medium.extinction * renderer.domain.voxel_size
+    depth = float(density.max(initial=0.0)) * renderer.optics.medium.extinction * domain.voxel_size
     if depth > LARGEST_DEPTH:
         raise ValueError(
             f"The densest voxel has an optical depth of {depth:g}; {LARGEST_DEPTH:g} at most. Lower the density "
@@ -198,13 +199,7 @@ def scene_optics(scene: CompleteScene) -> Optics:
 
 
 def scene_renderer(scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> Renderer:
-    """The renderer of a scene: by default for its own camera, before its own background.
-
-    Raises
-    ------
-    ValueError
-        If the camera moves.
-    """
+    """The renderer of a scene: by default for its own camera, before its own background; ValueError if it moves."""
     view = camera or scene.camera
     if view.moves:
         raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")
@@ -248,7 +243,7 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
     cells = EnvironmentCells(light)
 
     def picture(lights: int) -> Image:
-        return Renderer(view, small, medium, cells.lights(lights), np.zeros(3, np.float32)).image(ball)
+        return Optics(small, medium, cells.lights(lights)).renderer(view, np.zeros(3, np.float32)).image(ball)
 
     count, image = MIN_LIGHTS, picture(MIN_LIGHTS)
     while count < MAX_LIGHTS:

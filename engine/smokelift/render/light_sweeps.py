@@ -28,31 +28,21 @@ CLOSEST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ParallelSweep:
-    """Parallel light, swept from plane to plane across the dominant axis of its direction.
-
-    Attributes
-    ----------
-    direction : (3,)
-        Of travel, unit length.
-    energy : (channels,)
-        Irradiance, W/m^2.
-    axis, travel
-        Dominant axis, and +1 or -1 along it.
-    first
-        Number of the box's first plane: its columns are those of the whole domain.
-    slope
-        Lateral shift a plane along the two other axes, in voxels, -1 to 1.
-    step
-        Length of a ray between two planes, m.
-    """
+    """Parallel light, swept from plane to plane across the dominant axis of its direction."""
 
     direction: Doubles
+    """(3,): direction of travel, unit length."""
     energy: Doubles
+    """(channels,): irradiance, W/m^2."""
     axis: int
     travel: int
+    """Dominant axis, and +1 or -1 along it."""
     first: int
+    """Number of the box's first plane: its columns are those of the whole domain."""
     slope: tuple[float, float]
+    """Lateral shift a plane along the two other axes, in voxels, -1 to 1."""
     step: float
+    """Length of a ray between two planes, m."""
 
 
 @dataclass(frozen=True)
@@ -61,49 +51,34 @@ class Face:
 
     From the light go columns with slopes p / far, q / far: in the plane at the distance ``far`` they are one voxel
     apart, nearer to the light they are closer together.
-
-    Attributes
-    ----------
-    axis, travel
-        The planes lie across this axis; +1 or -1 along it leads away from the light.
-    first, planes
-        The nearest plane, and how many there are.
-    far
-        Distance of the whole domain's farthest plane, in voxels.
-    columns_b, columns_c
-        First column that meets the grid and their number, along the two other axes.
     """
 
     axis: int
     travel: int
+    """The planes lie across this axis; +1 or -1 along it leads away from the light."""
     first: int
     planes: int
+    """The nearest plane, and how many there are."""
     far: float
+    """Distance of the whole domain's farthest plane, in voxels."""
     columns_b: tuple[int, int]
     columns_c: tuple[int, int]
+    """First column that meets the grid and their number, along the two other axes."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointSweep:
-    """Light from a point.
-
-    Attributes
-    ----------
-    position : (3,)
-        In the box's grid coordinates: voxel centers at integers.
-    energy : (channels,)
-        Intensity over the voxel edge squared, W/m^2: the irradiance one voxel away.
-    voxel_size
-        m.
-    faces
-        Those through which voxels are seen. A voxel belongs to the axis along which it is farthest from the light,
-        the first such axis if there are several.
-    """
+    """Light from a point."""
 
     position: Doubles
+    """(3,): in the box's grid coordinates: voxel centers at integers."""
     energy: Doubles
+    """(channels,): intensity over the voxel edge squared, W/m^2: the irradiance one voxel away."""
     voxel_size: float
+    """Edge of a voxel, m."""
     faces: tuple[Face, ...]
+    """Those through which voxels are seen. A voxel belongs to the axis along which it is farthest from the light, the
+    first such axis if there are several."""
 
 
 Sweep = ParallelSweep | PointSweep

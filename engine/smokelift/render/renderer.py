@@ -9,19 +9,20 @@ the last line:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
+from smokelift.render.camera_rays import camera_rays
 from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.device import products_on_one_thread
-from smokelift.render.plan import RenderPlan, plan_render
-from smokelift.scene import Camera, Domain, FiniteLight, Medium, PointLight, Scattering
+from smokelift.render.light_sweeps import light_sweeps
+from smokelift.render.plan import RenderPlan, to_eye
+from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, PointLight, Scattering
+from smokelift.scene.domain import box_around
 
 if TYPE_CHECKING:
     from smokelift.render.gpu.backend import GpuBackend
@@ -32,26 +33,52 @@ Volume = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Optics:
-    """How light travels through the smoke of a domain.
-
-    Attributes
-    ----------
-    domain, medium
-        Where the smoke is, and what it does to light.
-    lights
-        Directional and point lights only; an environment is split into many.
-    scattering
-        ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
-    """
+    """How light travels through the smoke of a domain."""
 
     domain: Domain
     medium: Medium
+    """Where the smoke is, and what it does to light."""
     lights: tuple[FiniteLight, ...]
-    scattering: Scattering
+    """Directional and point lights only; an environment is split into many. Without any there is absorption only."""
+    scattering: Scattering = "single"
+    """``"multiple"``: of all orders, isotropic smoke only; ``"single"``, with self-shadowing; ``"unshadowed"``: light
+    reaches every voxel unattenuated; or ``"absorption"``: the background attenuated, nothing else."""
 
     def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
-        return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
+        return Renderer(self, camera, background, support)
+
+    def plan(self, camera: Camera, support: NDArray[np.bool_] | None = None) -> RenderPlan:
+        """Plan the rendering for a camera; see `Renderer` for the support."""
+        scattering, medium = self.scattering, self.medium
+        if scattering not in get_args(Scattering):
+            raise ValueError(f"scattering must be one of {', '.join(get_args(Scattering))}, not {scattering!r}.")
+        if scattering == "multiple" and medium.anisotropy != 0.0:
+            raise ValueError(
+                f'Scattering "multiple" needs anisotropy 0, not {medium.anisotropy:g}; take scattering "single", or '
+                "smoke that scatters alike in all directions."
+            )
+        if support is None:
+            support = np.broadcast_to(np.True_, self.domain.resolution)
+        # with the neighbors of the voxels that may hold smoke; one voxel if none may
+        x, y, z = part = box_around(support, 1) if support.any() else (slice(0, 1),) * 3
+        corner, box = (x.start, y.start, z.start), self.domain.part(part)
+        scatters = () if scattering == "absorption" else self.lights
+        # light that is scattered again takes on more of the smoke's color
+        split = scattering == "multiple" and not medium.is_gray
+        sweeps, color = light_sweeps(scatters, self.domain, corner, box.resolution, medium.color, split)
+        return RenderPlan(
+            domain=self.domain,
+            corner=corner,
+            marked=support[part].astype(np.uint8),
+            medium=medium,
+            rays=camera_rays(camera, box),
+            to_eye=to_eye(camera, box),
+            lights=sweeps,
+            color=color,
+            shadows=scattering in SHADOWED and len(color) > 0,
+            diffuse=scattering == "multiple" and len(color) > 0,
+        )
 
     def unshadowed_source(self) -> NDArray[np.float64]:
         """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.
@@ -72,42 +99,19 @@ class Optics:
 
 
 class Renderer:
-    """A differentiable renderer for one camera and one grid.
+    """A differentiable renderer for one camera, which stands still, and one grid.
 
-    Parameters
-    ----------
-    camera, domain, medium
-        What is seen, from where; the camera stands still.
-    lights
-        Directional and point lights; none leave absorption only.
-    background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke. A fourth channel, in which smoke sends nothing, shows its transmittance.
-    scattering
-        ``"multiple"``: scattering of all orders, isotropic smoke only; ``"single"``: single scattering with
-        self-shadowing; ``"unshadowed"``: light reaches every voxel unattenuated; ``"absorption"``: the background
-        attenuated, nothing else.
-    support : (nx, ny, nz) bool, optional
-        Voxels that may hold smoke: what the density says elsewhere does not count, the gradient is zero there, and
-        the work follows their number.
-
-    Raises
-    ------
-    ValueError
-        If a point light stands inside the domain, or if light is to be scattered many times by anisotropic smoke.
+    The background, (rows, columns, 3) or (3,), is linear radiance; a fourth channel, in which smoke sends nothing,
+    shows the smoke's transmittance. Only voxels of the support (nx, ny, nz) may hold smoke: what the density says
+    elsewhere does not count, the gradient is zero there, and the work follows their number. It is a ValueError if a
+    point light stands inside the domain, or anisotropic smoke is to scatter many times.
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        domain: Domain,
-        medium: Medium,
-        lights: Sequence[FiniteLight],
-        background: Image,
-        scattering: Scattering = "single",
-        support: NDArray[np.bool_] | None = None,
+        self, optics: Optics, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None
     ) -> None:
-        self.camera, self.domain, self.medium = camera, domain, medium
-        plan = plan_render(camera, domain, medium, lights, scattering, support)
+        self.optics, self.camera = optics, camera
+        plan = optics.plan(camera, support)
         self._background = np.asarray(background, np.float32)
         sent = np.asarray(plan.color, np.float32)
         self._color = np.pad(sent, ((0, 0), (0, self._background.shape[-1] - sent.shape[1])))
@@ -115,19 +119,10 @@ class Renderer:
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
-        """Render a density.
+        """Render a density (nx, ny, nz) at voxel centers, finite and >= 0.
 
-        Parameters
-        ----------
-        density : (nx, ny, nz) float32
-            At voxel centers, finite and >= 0.
-        keep_record
-            Keep what `gradient` needs: channels + 1 numbers a sample of every ray.
-
-        Returns
-        -------
-        (rows, columns, channels) float32
-            Linear radiance in the background's channels, row 0 at the top.
+        The picture (rows, columns, channels) is linear radiance in the background's channels, row 0 at the top. The
+        record is what `gradient` needs: channels + 1 numbers a sample of every ray.
         """
         scattered, self._depth = self._backend.image(density, keep_record)
         with products_on_one_thread():
@@ -147,18 +142,9 @@ class Renderer:
     def gradient(self, image_gradient: Image, out: Volume | None = None) -> Volume:
         """Pull the derivative of a loss back through the last `image` made with ``keep_record``; uses its record up.
 
-        Parameters
-        ----------
-        image_gradient : (rows, columns, channels)
-            dloss / dimage.
-        out : (nx, ny, nz) float32, optional
-            Written where there is support, and returned: new memory takes as long as a sweep. Zero elsewhere, as what
-            an earlier call has returned is.
-
-        Returns
-        -------
-        (nx, ny, nz) float32
-            dloss / ddensity, 0 outside the support.
+        Of dloss / dimage (rows, columns, channels) it makes dloss / ddensity (nx, ny, nz), 0 outside the support. If
+        ``out`` (nx, ny, nz) is given, it is written where there is support, and returned: new memory takes as long as a
+        sweep. Elsewhere it is zero, as what an earlier call has returned is.
         """
         image_gradient = np.asarray(image_gradient, np.float32)
         background = np.broadcast_to(self._background, image_gradient.shape)
@@ -172,5 +158,6 @@ def _backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
     """What renders a plan on the device of this process."""
     if device.start() == "cpu":
         return CpuBackend(plan)
-    on_gpu: GpuBackend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
-    return on_gpu
+    from smokelift.render.gpu.backend import GpuBackend  # here, because Taichi takes long to import
+
+    return GpuBackend(plan)

@@ -44,13 +44,9 @@ def start(backend: str) -> None:
         raise RuntimeError(f"Taichi already runs on {_running} in this process; start a new one.")
 
 
-def _cache_directory() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "smokelift" / "taichi"
-
-
 def _initialize(arch: Any) -> None:
-    cache = _cache_directory()
+    base = os.environ.get("XDG_CACHE_HOME")
+    cache = (Path(base) if base else Path.home() / ".cache") / "smokelift" / "taichi"
     try:
         cache.mkdir(parents=True, exist_ok=True)
         where: dict[str, Any] = {"offline_cache_file_path": str(cache)}

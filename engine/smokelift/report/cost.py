@@ -101,30 +101,22 @@ class NotEnoughMemoryError(MemoryError):
 
 @dataclass(frozen=True)
 class Workload:
-    """What decides how much a run takes, besides the resolution.
-
-    Attributes
-    ----------
-    settings
-        The given ones: a velocity's grid that is chosen is coarse, and hardly takes memory.
-    frames, views, pixels
-        Numbers: of frames, of cameras, and of pixels in all cameras' pictures of one moment.
-    smoky_max, smoky_mean
-        Fractions of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all.
-    prepared
-        Seconds that preparing the shot took, without what it waited for a processor; a run prepares it again.
-    peak
-        Bytes of memory at the peak of that, 0 if unknown. For a large clip on a small grid it is as much as the run's.
-    """
+    """What decides how much a run takes, besides the resolution."""
 
     settings: Settings
+    """The given ones: a velocity's grid that is chosen is coarse, and hardly takes memory."""
     frames: int
     views: int
     pixels: int
+    """Numbers: of frames, of cameras, and of pixels in all cameras' pictures of one moment."""
     smoky_max: float
     smoky_mean: float
+    """Fractions of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all."""
     prepared: float = 0.0
+    """Seconds that preparing the shot took, without what it waited for a processor; a run prepares it again."""
     peak: int = 0
+    """Bytes of memory at the peak of that, 0 if unknown. For a large clip on a small grid it is as much as the
+    run's."""
 
     @staticmethod
     def of(shot: Shot, settings: Settings, began: tuple[float, float]) -> "Workload":

@@ -54,7 +54,6 @@ class Camera:
     matrices: tuple[Matrix, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check every value and store plain tuples."""
         if self.type not in ("perspective", "orthographic"):
             raise unexpected(self.type, "type", '"perspective" or "orthographic"')
         set_fields(self, matrices=tuple(_rigid(matrix, "matrices") for matrix in self.matrices))

@@ -24,10 +24,7 @@ ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:[/\\]")
 class SceneError(ValueError):
     """A scene that cannot be used: what was expected, and what was found.
 
-    Attributes
-    ----------
-    table, key
-        Where in a scene file the value would stand; empty when unknown.
+    In a scene file the value would stand under ``key`` of ``table``; each is empty when unknown.
     """
 
     def __init__(self, message: str, *, key: str = "", table: str = "") -> None:

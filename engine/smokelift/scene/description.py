@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.checks import listed, require_kind, shown
+from smokelift.checks import listed, one_of, require_kind, shown
 from smokelift.scene.camera import Camera
-from smokelift.scene.checks import SceneError, file_path, integer, set_fields
+from smokelift.scene.checks import SceneError, file_path, integer, set_fields, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
 from smokelift.scene.lights import EnvironmentLight, Light, PointLight
-from smokelift.scene.medium import Medium, Scattering, checked_scattering
+from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
 from smokelift.scene.projection import sees
-from smokelift.scene.tables import from_tables, to_tables
+from smokelift.scene.tables import from_tables, scene_to_dict
 from smokelift.scene.toml_files import TomlFile, read_toml, write_toml
 from smokelift.scene.view import Background, ClipSource, View
 
@@ -75,7 +75,9 @@ class Scene:
         for table, given in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
             if len(given) > MAX_LISTED:
                 raise SceneError(f"is given {len(given)} times; {MAX_LISTED} at most", table=table)
-        set_fields(self, closed=checked_sides(self.closed), scattering=checked_scattering(self.scattering))
+        set_fields(self, closed=checked_sides(self.closed))
+        if self.scattering not in (None, *SCATTERINGS):
+            raise unexpected(self.scattering, "scattering", f"one of {one_of(SCATTERINGS)}", "medium")
         if self.domain is not None:
             self._check_places(self.domain)
 
@@ -199,8 +201,7 @@ class CompleteScene(Scene):
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
         if not self.inlets:
             return None
-        entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets])
-        return entries
+        return np.asarray(np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets]))
 
 
 def require_scene(scene: object) -> None:
@@ -227,15 +228,6 @@ def scene_from_dict(data: Mapping[str, Any], name: str = "scene", base: Path | N
     It raises SceneError for the same reasons as `Scene.load`.
     """
     return _read(data, TomlFile(name, (base or Path()).absolute(), {}))
-
-
-def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
-    """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
-
-    A complete scene is what `completed` makes of the description that is read back. Paths below the folder `base`
-    become relative to it; all others absolute.
-    """
-    return to_tables(vars(scene), base)
 
 
 def _read(data: Mapping[str, Any], file: TomlFile) -> Scene:

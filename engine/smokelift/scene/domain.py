@@ -40,7 +40,6 @@ class Box:
     max: Vector
 
     def __post_init__(self) -> None:
-        """Check every value and store plain tuples."""
         set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if not low < high:
@@ -68,8 +67,7 @@ class Box:
     def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Return the eight corners in meters, shape (8, 3)."""
         axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
-        corners: np.ndarray[Any, np.dtype[np.float64]] = np.stack(axes, axis=-1).reshape(8, 3)
-        return corners
+        return np.asarray(np.stack(axes, axis=-1).reshape(8, 3))
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,6 @@ class Domain(Box):
     resolution: tuple[int, int, int]
 
     def __post_init__(self) -> None:
-        """Check every value and store plain tuples."""
         super().__post_init__()
         key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {MAX_SIDE_VOXELS}"
         counts = tuple(integer(v, key, expected, 1, MAX_SIDE_VOXELS) for v in items(self.resolution, 3, key, expected))
@@ -195,7 +192,6 @@ class Inlet:
     radius: float
 
     def __post_init__(self) -> None:
-        """Check the values."""
         radius = positive(self.radius, "radius", "a number of meters above 0")
         set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
 
@@ -208,8 +204,7 @@ class Inlet:
         """Return the voxels whose centers lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
         x, y, z = domain.offsets(self.centre)
         squares = x**2 + y**2 + z**2
-        inside: NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())
-        return inside
+        return np.asarray(squares <= max(self.radius**2, squares.min()))
 
 
 def checked_sides(value: Any) -> tuple[Side, ...]:

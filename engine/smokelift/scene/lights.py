@@ -64,7 +64,6 @@ class PointLight:
     intensity: Vector
 
     def __post_init__(self) -> None:
-        """Check the values."""
         set_fields(self, position=vector(self.position, "position"), intensity=color(self.intensity, "intensity"))
 
     def samples(self) -> "tuple[FiniteLight, ...]":
@@ -118,7 +117,6 @@ class EnvironmentLight:
     directions: int | None = None
 
     def __post_init__(self) -> None:
-        """Check the values."""
         image = file_path(self.image, "image")
         if image.suffix.lower() not in (".exr", ".hdr"):
             raise unexpected(str(image), "image", "an .exr or .hdr file")

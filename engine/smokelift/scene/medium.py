@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from smokelift.checks import one_of
 from smokelift.scene.checks import Vector, number, positive, set_fields, unexpected, vector
 
 Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
@@ -42,7 +41,6 @@ class Medium:
     flame_color: Vector | None = None
 
     def __post_init__(self) -> None:
-        """Check every value."""
         set_fields(
             self,
             extinction=positive(self.extinction, "extinction"),
@@ -71,13 +69,3 @@ def _fractions(value: Any, key: str) -> Vector:
     if min(rgb) < 0.0 or max(rgb) > 1.0 or max(rgb) == 0.0:
         raise unexpected(list(rgb), key, expected)
     return rgb
-
-
-def checked_scattering(value: Any) -> Scattering | None:
-    """Return how light is scattered, or None where that is open; raise a SceneError if there is no such way."""
-    if value is None:
-        return None
-    for name in SCATTERINGS:
-        if value == name:
-            return name
-    raise unexpected(value, "scattering", f"one of {one_of(SCATTERINGS)}", "medium")

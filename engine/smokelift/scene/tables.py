@@ -53,16 +53,21 @@ _FIELDS = {name: "inlets" if name == "inlet" else name for name in TABLES}
 _LIGHT_NAMES = {kind: name for name, kind in LIGHT_TYPES.items()}
 
 
-def to_tables(scene: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
-    """Return the tables of a scene from its fields; see `smokelift.scene.scene_to_dict`."""
+def scene_to_dict(scene: object, base: Path | None = None) -> dict[str, Any]:
+    """Return a `Scene` as the tables of a scene file: dictionaries, lists, strings and numbers only.
+
+    A complete scene is what `completed` makes of the description that is read back. Paths below the folder `base`
+    become relative to it; all others absolute.
+    """
     tables: dict[str, Any] = {}
+    given = vars(scene)
     for name, field in _FIELDS.items():
-        part, beside = scene[field], {key: scene[key] for table, key in BESIDE.items() if table == name}
+        part, beside = given[field], {key: given[key] for table, key in BESIDE.items() if table == name}
         if name in LISTS:
             tables[name] = [_plain(each, base) for each in part]
         else:
             tables[name] = _plain_table({**({} if part is None else _values(part)), **beside}, base)
-    return {name: table for name, table in tables.items() if table or scene[_FIELDS[name]]}
+    return {name: table for name, table in tables.items() if table or given[_FIELDS[name]]}
 
 
 def _values(part: Any) -> dict[str, Any]:

@@ -46,7 +46,6 @@ class ClipSource:
     mask: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check the values."""
         set_fields(self, path=file_path(self.path, "path"))
         if self.fps is not None:
             set_fields(self, fps=positive(self.fps, "fps"))
@@ -91,7 +90,6 @@ class Background:
     strokes: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check the values."""
         given = [key for key in ("color", "image", "frame") if getattr(self, key) is not None]
         if len(given) > 1:
             raise SceneError(f"takes {given[0]} or {given[1]}, not both", key=given[1])
@@ -138,7 +136,6 @@ class View:
     background: Background | None = None
 
     def __post_init__(self) -> None:
-        """Check the kinds."""
         require_kind(self.camera, Camera, "camera", "a Camera")
         require_kind(self.clip, ClipSource, "clip", 'a ClipSource, such as ClipSource("clip.mp4")')
         require_kind(self.background, Background | None, "background", "a Background")

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks import Mask, numbers, require_kind
-from smokelift.checks.arguments import MAX_MAGNITUDE
+from smokelift.checks import MAX_MAGNITUDE, Mask, numbers, require_kind
 from smokelift.scene import Side
 from smokelift.scene.checks import set_fields
 from smokelift.scene.domain import checked_sides

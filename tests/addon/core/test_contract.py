@@ -1,6 +1,5 @@
 """What the engine and the add-on have in common, from names to scene files and the pace that is tried out."""
 
-import argparse
 import math
 import tomllib
 from pathlib import Path
@@ -16,6 +15,7 @@ from addon.core.image_sequence import ImageSequence, image_sequence_from
 from addon.core.retiming import retiming
 from addon.core.take import toml_text
 from extension_products import NAMED, PLATFORMS, Product
+from smokelift.app.cli import command_parser
 from smokelift.app.commands import directed
 from smokelift.checks import Source
 from smokelift.direct import new_sequence, playback
@@ -68,10 +68,7 @@ def test_resolutions() -> None:
 
 
 def test_directions() -> None:
-    parser = argparse.ArgumentParser()
-    commands = parser.add_subparsers()
-    for name, command in directed.COMMANDS.items():
-        command.add_options(commands.add_parser(name))
+    parser = command_parser()
     values = {"--frames": {"continue": "9", "loop": "1:9"}, "--wind": "1 2 -3", "--fan": "1 2 3 1 -4 5 6"}
     values |= {"--turbulence": "1 2 3", "--closed": "x- z+"}
     for direction, options in contract.DIRECTIONS.items():

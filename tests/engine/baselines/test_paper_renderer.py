@@ -7,7 +7,7 @@ import paper_reference as reference
 import pytest
 
 from smokelift.baselines.paper_renderer import PaperRenderer
-from smokelift.render import Renderer
+from smokelift.render import Optics
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 8, 10)
@@ -71,8 +71,12 @@ def one_at(voxel):
     return direction
 
 
+def paper_renderer(camera, domain, medium, lights, background, scattering="single"):
+    return PaperRenderer(Optics(domain, medium, lights, scattering), camera, background)
+
+
 def paper_gradient(density, weights, *setup):
-    renderer = PaperRenderer(*setup)
+    renderer = paper_renderer(*setup)
     renderer.image(density)
     return renderer.gradient(weights)
 
@@ -84,7 +88,7 @@ def paper_gradient(density, weights, *setup):
 def test_image_equals_the_riemann_sum(density, wall, camera, lights, scattering):
     """The picture is the paper's sum, for every camera, light and model, and a second one does not remember it."""
     setup = (camera, DOMAIN, medium_of_depth(density, 3), LIGHTS[lights], wall, scattering)
-    renderer = PaperRenderer(*setup)
+    renderer = paper_renderer(*setup)
     renderer.image(2 * density)
     expected = reference.render(density.astype(np.float64), *setup)
     assert relative(renderer.image(density), expected) < 2e-6
@@ -125,11 +129,11 @@ def test_thin_smoke_looks_and_derives_as_with_the_exact_renderer(density):
         CAMERAS["orthographic"], matrix=Camera.look_at((0.45, -2, 0.5), CENTER, fov_y_degrees=9, size=(9, 9)).matrix
     )
     camera = replace(far, fx=10.0, fy=10.0, cx=4.5, cy=5.0, size=(9, 10))
-    setup = (camera, DOMAIN, medium_of_depth(density, 1e-3), (SUN,), np.full(3, 0.1))
+    optics, behind = Optics(DOMAIN, medium_of_depth(density, 1e-3), (SUN,)), np.full(3, 0.1)
     weights = np.random.default_rng(8).random((10, 9, 3))
-    exact = Renderer(*setup)
+    exact = optics.renderer(camera, behind)
     expected = exact.image(density, keep_record=True)
-    renderer = PaperRenderer(*setup)
+    renderer = PaperRenderer(optics, camera, behind)
     assert relative(renderer.image(density), expected) < 1e-5
     assert relative(renderer.gradient(weights), exact.gradient(weights)) < 0.01
 
@@ -137,6 +141,6 @@ def test_thin_smoke_looks_and_derives_as_with_the_exact_renderer(density):
 def test_no_smoke_no_change(wall):
     away = Camera.look_at((1.9, -1.2, 1.4), (3, -3, 1.4), fov_y_degrees=40, size=(14, 16))
     for camera in (CAMERAS["perspective"], away):
-        renderer = PaperRenderer(camera, DOMAIN, Medium(), (SUN,), wall)
+        renderer = PaperRenderer(Optics(DOMAIN, Medium(), (SUN,)), camera, wall)
         np.testing.assert_allclose(renderer.image(np.zeros(SHAPE, np.float32)), wall, rtol=1e-6)
     assert not renderer.gradient(np.ones(wall.shape)).any()

@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.density.axis_cues import estimate_axis
 from smokelift.density.upright_plane import SmokeAxis, depth_at
-from smokelift.render import Renderer
+from smokelift.render import Optics
 from smokelift.scene import Camera, Domain, Inlet, Medium
 
 BOX = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
@@ -22,7 +22,7 @@ def column(depth: float, lean: float = 0.0, low: float = 0.0, high: float = 2.0,
 
 def seen(*densities: np.ndarray, camera: Camera = FRONT) -> list[np.ndarray]:
     """Optical depths that a camera sees."""
-    renderer = Renderer(camera, BOX, Medium(extinction=1.0), (), np.ones(3), "absorption")
+    renderer = Optics(BOX, Medium(extinction=1.0), (), "absorption").renderer(camera, np.ones(3))
     return [-np.log(np.maximum(renderer.image(density)[..., 0], 1e-9)) for density in densities]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import renderer_reference as reference
 
-from smokelift.render import Renderer
+from smokelift.render import Optics
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 
 SHAPE = (7, 6, 81)  # high enough for blocks of three voxels
@@ -29,7 +29,7 @@ def density():
 
 
 def renderer(lights=(SUN,), medium=MEDIUM, support=None, background=WALL):
-    return Renderer(CAMERA, DOMAIN, medium, lights, background, "multiple", support)
+    return Optics(DOMAIN, medium, lights, "multiple").renderer(CAMERA, background, support)
 
 
 def exact(density, lights=(SUN,), medium=MEDIUM):
@@ -50,7 +50,7 @@ def test_colored_smoke_in_white_light_is_deeper_in_color_where_light_is_scattere
     black = np.zeros(3)
     sums = reference.render(density.astype(float), CAMERA, DOMAIN, thick, (SUN,), black, "multiple")
     np.testing.assert_allclose(image, sums, rtol=5e-4, atol=1e-5)
-    once = Renderer(CAMERA, DOMAIN, thick, (SUN,), black.astype(np.float32)).image(density)
+    once = Optics(DOMAIN, thick, (SUN,)).renderer(CAMERA, black.astype(np.float32)).image(density)
     lit = once.max(-1) > 0.1 * once.max()
     np.testing.assert_allclose(once[lit] / once[lit][:, :1], np.broadcast_to(thick.color, once[lit].shape), rtol=1e-5)
     assert (image[lit][:, 2] / image[lit][:, 0]).max() < 0.485
@@ -83,7 +83,7 @@ def test_light_that_has_left_the_blocks_does_not_come_back():
     shape, black = (12, 10, 10), np.zeros(3, np.float32)
     values = np.random.default_rng(1).random(shape).astype(np.float32)
     domain, medium = Domain((0.0, 0.0, 0.0), (1.2, 1.0, 1.0), shape), replace(MEDIUM, extinction=5.0)
-    image = Renderer(CAMERA, domain, medium, (SUN,), black, "multiple").image(values)
+    image = Optics(domain, medium, (SUN,), "multiple").renderer(CAMERA, black).image(values)
     sums = reference.render(values.astype(float), CAMERA, domain, medium, (SUN,), black.astype(float), "multiple")
     np.testing.assert_allclose(image, sums, rtol=5e-4, atol=1e-5)
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from smokelift.render import taichi_runtime
+from smokelift.render import Optics, taichi_runtime
 from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.gpu.backend import GpuBackend
-from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 10, 12)
@@ -40,7 +39,7 @@ def test_both_backends_agree(lights, scattering, anisotropy, hull):
         support[:2], support[:, -3:] = False, False
         density = np.where(support, density, 0).astype(np.float32)
     camera = Camera.look_at((2.5, -1.2, 2.4), (0.45, 0.5, 0.6), fov_y_degrees=40, size=(14, 16))
-    plan = plan_render(camera, DOMAIN, Medium(4.0, 0.9, anisotropy), lights, scattering, support)
+    plan = Optics(DOMAIN, Medium(4.0, 0.9, anisotropy), lights, scattering).plan(camera, support)
     backends = CpuBackend(plan), GpuBackend(plan)
     for values in (density / 2, density):
         results = []

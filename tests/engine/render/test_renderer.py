@@ -11,7 +11,7 @@ import renderer_reference as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smokelift.render import Optics, Renderer
+from smokelift.render import Optics
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 8, 10)
@@ -90,7 +90,7 @@ def check(
         clear = reference.render(values, camera, domain, medium, (), np.ones(3), "absorption")[..., :1]
         return np.concatenate([colors, clear * behind[..., 3:]], -1)
 
-    renderer = Renderer(camera, domain, medium, lights, background, scattering)
+    renderer = Optics(domain, medium, lights, scattering).renderer(camera, background)
     image, expected = renderer.image(density, keep_record=True), exact(density.astype(np.float64))
     assert np.linalg.norm(image - expected) < 2e-5 * np.linalg.norm(expected)
     weights = np.random.default_rng(5).random(image.shape)
@@ -155,7 +155,8 @@ def test_light_along_axes_lamps_at_the_surface_the_eye_inside_and_thin_grids(nam
 
 def test_a_fourth_channel_leaves_light_of_all_orders_as_it_is() -> None:
     medium = medium_of_depth(3, 0.0)
-    colors, both = (Renderer(DIAGONAL, DOMAIN, medium, (SUN,), wall, "multiple") for wall in (WALL[..., :3], WALL))
+    optics = Optics(DOMAIN, medium, (SUN,), "multiple")
+    colors, both = (optics.renderer(DIAGONAL, wall) for wall in (WALL[..., :3], WALL))
     image = both.image(DENSITY)
     np.testing.assert_allclose(image[..., :3], colors.image(DENSITY), rtol=1e-6)
     np.testing.assert_allclose(image[..., 3], both.transmittance * WALL[..., 3], rtol=1e-6)
@@ -175,7 +176,8 @@ def test_image_is_finite_and_creates_no_light(yaw, pitch, light, anisotropy, dep
     eye = CENTER + 2 * np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
     medium = replace(medium_of_depth(depth, anisotropy), albedo=1.0)
     sun = DirectionalLight(tuple(light), (1.0, 1.0, 1.0))
-    image = Renderer(make_camera(tuple(eye)), DOMAIN, medium, (sun,), np.full(3, 0.5, np.float32)).image(DENSITY)
+    gray = np.full(3, 0.5, np.float32)
+    image = Optics(DOMAIN, medium, (sun,)).renderer(make_camera(tuple(eye)), gray).image(DENSITY)
     g = abs(anisotropy)
     brightest = (1 - g * g) / (4 * np.pi * (1 - g) ** 3)
     assert np.isfinite(image).all()
@@ -187,7 +189,7 @@ def test_gradient_stays_on_the_support() -> None:
     support = DENSITY > 0.3
     inside, wall, gradients = np.where(support, DENSITY, 0), WALL[..., :3], []
     for given_support in (None, support):
-        renderer = Renderer(DIAGONAL, DOMAIN, medium_of_depth(3), (SUN,), wall, support=given_support)
+        renderer = Optics(DOMAIN, medium_of_depth(3), (SUN,)).renderer(DIAGONAL, wall, given_support)
         renderer.image(inside, keep_record=True)
         gradients.append(renderer.gradient(wall))
     np.testing.assert_allclose(gradients[1][support], gradients[0][support], rtol=1e-4, atol=1e-6)
@@ -196,7 +198,7 @@ def test_gradient_stays_on_the_support() -> None:
 
 def test_a_gradient_is_written_where_an_earlier_one_was() -> None:
     wall = WALL[..., :3]
-    renderer = Renderer(DIAGONAL, DOMAIN, medium_of_depth(3), (SUN,), wall, support=DENSITY > 0.3)
+    renderer = Optics(DOMAIN, medium_of_depth(3), (SUN,)).renderer(DIAGONAL, wall, DENSITY > 0.3)
     renderer.image(DENSITY, keep_record=True)
     first = renderer.gradient(wall)
     expected = first.copy()
@@ -211,7 +213,7 @@ def test_a_gradient_is_written_where_an_earlier_one_was() -> None:
 
 def test_a_point_light_inside_the_domain_is_refused() -> None:
     with pytest.raises(ValueError):
-        Renderer(DIAGONAL, DOMAIN, Medium(), (PointLight(tuple(CENTER), (1, 1, 1)),), np.zeros(3))
+        Optics(DOMAIN, Medium(), (PointLight(tuple(CENTER), (1, 1, 1)),)).renderer(DIAGONAL, np.zeros(3))
 
 
 def test_unshadowed_source_is_the_radiance_of_thin_smoke() -> None:

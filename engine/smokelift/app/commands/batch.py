@@ -10,7 +10,7 @@ from typing import Any
 import psutil
 
 from smokelift.app.commands import reconstruct
-from smokelift.app.options import Command, add_device, named_path, whole_number
+from smokelift.app.options import add_device, named_path, whole_number
 from smokelift.app.progress import Reporter
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
 from smokelift.batch.shots import BatchShot, read_shots
@@ -152,6 +152,3 @@ def _time(seconds: float) -> str:
 
 def _gib(size: float) -> str:
     return f"{size / 2**30:.1f} GiB"
-
-
-COMMANDS = {"batch": Command("reconstruct a list of shots, as many at a time as memory allows", add_options, run)}

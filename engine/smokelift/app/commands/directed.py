@@ -5,28 +5,10 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from smokelift.app.options import Command, add_directed_options, finite_number, frame_range, named_path, require_new
+import smokelift.direct as direct
+from smokelift.app.options import add_directed_options, finite_number, frame_range, named_path, require_new
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
-from smokelift.direct import (
-    CONTRADICTED,
-    DISSOLVED,
-    ROOM,
-    Ball,
-    BoxObstacle,
-    Continuation,
-    Fan,
-    Mesh,
-    Turbulence,
-    continue_sequence,
-    default_overlap,
-    loop_length,
-    loop_sequence,
-    open_source,
-    playback,
-    retime_sequence,
-    steady_part,
-)
 from smokelift.direct.new_sequence import Written
 from smokelift.output.files import INDEX
 from smokelift.output.index import Index
@@ -89,7 +71,7 @@ def add_continue_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--room",
         type=finite_number,
-        default=ROOM,
+        default=direct.ROOM,
         metavar="TIMES",
         help="let the box grow with the smoke to at most so many times the clip's size; 1 keeps it",
     )
@@ -123,11 +105,11 @@ def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[
 def continue_(options: argparse.Namespace, say: Reporter) -> None:
     """Continue the sequence, and say every frame."""
     continuation = _continuation(options)
-    sequence = open_source(options.directory)
+    sequence = direct.open_source(options.directory)
     require_new(options)
     continuation = replace(continuation, room=_room(options, sequence, say))
     start = sequence.frames[-1] if continuation.start is None else continuation.start
-    written = continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
+    written = direct.continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
     written = _with_note(written, continuation.room, say)
     total = start - sequence.frames[0] + 1 + continuation.frames
     first, simulated = sequence.frames[0], continuation.frames
@@ -154,16 +136,16 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
     said = contradicted = False
     for number, figures in written:
         yield number, figures
-        if not contradicted and (buoyancy := figures.get(CONTRADICTED, 0.0)):
+        if not contradicted and (buoyancy := figures.get(direct.CONTRADICTED, 0.0)):
             contradicted = True
             motion = "rises" if buoyancy < 0 else "sinks"
             say.note(Finding("contradicted buoyancy", {"buoyancy": buoyancy, "motion": motion}, doubt=True))
-        if not said and figures.get(DISSOLVED, 0.0) > MIN_DISSOLVED_FRACTION:
+        if not said and figures.get(direct.DISSOLVED, 0.0) > MIN_DISSOLVED_FRACTION:
             said = True
             say.note(Finding("dissolving smoke", {"frame": number, "room": room}, doubt=True))
 
 
-def _continuation(options: argparse.Namespace) -> Continuation:
+def _continuation(options: argparse.Namespace) -> direct.Continuation:
     """The continuation that the options say; ValueError for wrong values."""
     if options.frames < 1:
         raise ValueError(f"--frames {options.frames}: expected 1 or more.")
@@ -175,15 +157,15 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         raise ValueError(f"--room {options.room:g}: expected 1 or more, in boxes of the clip.")
     balls = [_ball("--ball", values) for values in options.ball]
     corners = [zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True) for v in options.box]
-    boxes = [BoxObstacle(low, high) for low, high in corners]
-    return Continuation(
+    boxes = [direct.BoxObstacle(low, high) for low, high in corners]
+    return direct.Continuation(
         frames=options.frames,
         start=options.start,
         fade=options.fade,
         wind=tuple(options.wind),
         turbulences=tuple(_turbulence(*values) for values in options.turbulence),
-        fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
-        obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
+        fans=tuple(direct.Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
+        obstacles=(*balls, *boxes, *map(direct.Mesh.read, options.mesh)),
         closed=tuple(side for side in SIDES if side in options.closed),
         room=options.room,
         buoyancy=options.buoyancy,
@@ -191,20 +173,20 @@ def _continuation(options: argparse.Namespace) -> Continuation:
     )
 
 
-def _turbulence(speed: float, size: float, seed: float) -> Turbulence:
+def _turbulence(speed: float, size: float, seed: float) -> direct.Turbulence:
     if speed < 0 or size <= 0 or seed < 0 or seed != int(seed):
         raise ValueError(
             f"--turbulence {speed:g} {size:g} {seed:g}: expected a speed of 0 m/s or more, a size above 0 m, and "
             "a whole number from 0."
         )
-    return Turbulence(speed, size, int(seed))
+    return direct.Turbulence(speed, size, int(seed))
 
 
-def _ball(option: str, values: list[float]) -> Ball:
+def _ball(option: str, values: list[float]) -> direct.Ball:
     x, y, z, radius = values
     if radius <= 0:
         raise ValueError(f"{option}: the radius must be above 0 m, not {radius:g}.")
-    return Ball((x, y, z), radius)
+    return direct.Ball((x, y, z), radius)
 
 
 def add_retime_options(parser: argparse.ArgumentParser) -> None:
@@ -225,11 +207,11 @@ def retime(options: argparse.Namespace, say: Reporter) -> None:
     for speed in options.speed:
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
             raise ValueError(f"--speed {speed:g}: expected a number from {SPEEDS[0]:g} to {SPEEDS[1]:g}.")
-    sequence = open_source(options.directory)
+    sequence = direct.open_source(options.directory)
     require_new(options)
     speeds = tuple(options.speed)
-    total = len(playback(len(sequence.frames), speeds)[0])
-    written = retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume)
+    total = len(direct.playback(len(sequence.frames), speeds)[0])
+    written = direct.retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume)
     say_sequence(say, written, kind="written", directory=options.out, total=total)
 
 
@@ -252,17 +234,10 @@ def add_loop_options(parser: argparse.ArgumentParser) -> None:
 
 def loop(options: argparse.Namespace, say: Reporter) -> None:
     """Loop the sequence, and say every frame."""
-    sequence = open_source(options.directory)
-    first, last = options.frames or steady_part(sequence, options.overlap)
-    overlap = default_overlap(last - first + 1) if options.overlap is None else options.overlap
-    total = loop_length(sequence, first, last, overlap)
+    sequence = direct.open_source(options.directory)
+    first, last = options.frames or direct.steady_part(sequence, options.overlap)
+    overlap = direct.default_overlap(last - first + 1) if options.overlap is None else options.overlap
+    total = direct.loop_length(sequence, first, last, overlap)
     require_new(options)
-    written = loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)
+    written = direct.loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)
     say_sequence(say, written, kind="looped", directory=options.out, total=total, first=first, last=last)
-
-
-COMMANDS = {
-    "continue": Command("make what the smoke does after its clip, or in wind", add_continue_options, continue_),
-    "retime": Command("make slow motion, fast motion and ramps of a sequence", add_retime_options, retime),
-    "loop": Command("make a part of a sequence repeat without a seam", add_loop_options, loop),
-}

@@ -8,17 +8,12 @@ from importlib import metadata
 import psutil
 
 from smokelift import __version__, _core
-from smokelift.app.options import Command
 from smokelift.app.progress import Reporter
 from smokelift.checks import counted
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device
 
 LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
@@ -59,6 +54,3 @@ def _gpu(running: str) -> str:
     return (
         f"{gpu}, with --device gpu; by itself the renderer runs on the processor" if gpu else "none that Taichi can use"
     )
-
-
-COMMANDS = {"doctor": Command("list versions, devices and what is missing", add_options, run)}

@@ -4,7 +4,7 @@ import argparse
 import time
 from typing import get_args
 
-from smokelift.app.options import Command, named_path
+from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
 from smokelift.output.export import (
@@ -72,6 +72,3 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             "seconds": round(time.monotonic() - began, 1),
         },
     )
-
-
-COMMANDS = {"export": Command("write small OpenVDB files, a proxy and a USD file", add_options, run)}

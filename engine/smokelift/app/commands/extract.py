@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.app.options import Command, add_clip_options, named_path, require_file, scene_of
+from smokelift.app.options import add_clip_options, named_path, require_file, scene_of
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
@@ -87,6 +87,3 @@ def _write_preview(path: Path, extraction: Extraction) -> None:
         write_image(path, next(pairs(range(middle, middle + 1))))
     else:
         write_video(path, pairs(range(len(extraction))), extraction.clip.fps)
-
-
-COMMANDS = {"extract": Command("separate smoke from what is behind it, as pictures with alpha", add_options, run)}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from smokelift.app.options import Command, add_run_options, named_path, require_file, scene_of, settings_of
+from smokelift.app.options import add_run_options, named_path, require_file, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.checks import Finding, counted
 from smokelift.footage.clip import Clip
@@ -109,6 +109,3 @@ def _write_scene(path: Path, shot: Shot, known: Sequence[Finding]) -> tuple[Path
         said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it as background.")
     scene.save(path, said)
     return files
-
-
-COMMANDS = {"inspect": Command("say what a run would assume, choose and cost, without running it", add_options, run)}

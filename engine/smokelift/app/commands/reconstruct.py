@@ -2,14 +2,12 @@
 
 import argparse
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from smokelift.app.options import (
-    Command,
     add_run_options,
     named_path,
     require_file,
@@ -78,7 +76,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             seconds,
             lambda: forecast_of(shot, facts(shot, scene, estimate_cost(resolution, work)), work),
         )
-        report = _report(shot, options.thumbnail, say, new)
+
+        def report(frame: Frame) -> None:
+            new.add(frame.number)
+            if options.thumbnail:
+                _write_thumbnail(options.thumbnail, shot, frame)
+            say.frame(frame.number, frame.figures)
+
         sequence = reconstruction.write(
             options.out, npz=options.npz, resume=options.resume, start_number=options.start_number, on_frame=report
         )
@@ -106,18 +110,6 @@ def _finished(options: argparse.Namespace) -> int:
     return len(Sequence.open(options.out).frames)
 
 
-def _report(shot: Shot, thumbnail: Path | None, say: Reporter, new: set[int]) -> Callable[[Frame], None]:
-    """Return what is called with each written frame, whose number it adds to ``new``."""
-
-    def report(frame: Frame) -> None:
-        new.add(frame.number)
-        if thumbnail:
-            _write_thumbnail(thumbnail, shot, frame)
-        say.frame(frame.number, frame.figures)
-
-    return report
-
-
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse what cannot be written to."""
     out, thumbnail = options.out, options.thumbnail
@@ -140,6 +132,3 @@ def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:
     both = np.concatenate([seen.image, found], 0 if columns > rows else 1)
     with atomic_path(path) as aside:
         Image.fromarray(eight_bit(both)).save(aside, format="PNG")
-
-
-COMMANDS = {"reconstruct": Command("turn a clip or scene file into a VDB sequence", add_options, run)}

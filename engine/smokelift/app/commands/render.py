@@ -3,7 +3,7 @@
 import argparse
 import math
 
-from smokelift.app.options import Command, named_path, require_file
+from smokelift.app.options import named_path, require_file
 from smokelift.app.progress import Reporter
 from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.output.sequence import Sequence
@@ -68,6 +68,3 @@ def _camera(name: str, scene: CompleteScene) -> Camera:
             f"--camera {name}: expected front, side, two angles YAW,PITCH in degrees, or a camera.toml."
         ) from None
     return orbit(scene.camera, scene.domain, yaw, pitch)
-
-
-COMMANDS = {"render": Command("make an image or video of a sequence", add_options, run)}

@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import replace
 
-from smokelift.app.options import Command, named_path, require_file
+from smokelift.app.options import named_path, require_file
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import Finding, counted
 from smokelift.checks.whole_files import write_text
@@ -16,7 +16,6 @@ from smokelift.output.export import write_proxies
 from smokelift.output.files import PICTURES
 from smokelift.output.preview import write_previews
 from smokelift.output.sequence import Sequence
-from smokelift.output.vdb import PROXY_TIMES
 from smokelift.render import device
 from smokelift.report.result import count_empty, shortcomings
 
@@ -115,13 +114,3 @@ def compare(options: argparse.Namespace, say: Reporter) -> None:
         write_text(options.json, text + "\n")
         text = f"{options.json} written."
     say.finish(text, found.figures)
-
-
-COMMANDS = {
-    "check": Command("check that a sequence is complete and undamaged", add_sequence, check),
-    "preview": Command("make pictures and a video that show the smoke from all sides", add_preview_options, preview),
-    "proxy": Command(f"write copies for viewports, with voxels {PROXY_TIMES} times as large", add_sequence, proxy),
-    "evaluate": Command(
-        "compare the smoke with its front, known volumes and other cameras", add_evaluate_options, compare
-    ),
-}
