@@ -10,8 +10,9 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
   wall of its own brightness changes the wall's hue alone.
 
 A pixel that only drifts is clear as well if it differs from its surroundings by no more than a codec's drift, or by so
-much that smoke would change it more. Its clearest moment may still hold some smoke, so before a smooth wall it counts
-less than what is continued from pixels that never change. All else is continued smoothly from around it; its detail is
+much that smoke would change it more. Its clearest moment may still hold some smoke, and so may a pixel beside smoke
+that never changes. So before a smooth wall both count less than what is continued from steady pixels, which are away
+from all smoke. All else is continued smoothly from around it; its detail is
 that of the frames' mean, and the contrast that smoke takes from that is restored. The error is measured where the
 background is known.
 
@@ -39,7 +40,7 @@ from smokelift.footage.images import (
     srgb_to_linear,
 )
 from smokelift.footage.inpainting import ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
-from smokelift.footage.noise import Noise, at_rank, count_of_seen, median_of_seen, peak_spread
+from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
 """Width of the window of a pixel's clear values, in standard deviations of noise: three to either side."""
@@ -87,6 +88,14 @@ it passes: noise and codecs change a mean by a code or two."""
 
 MIN_STANDING = 0.05
 """Weight, in the smoothed value of a pixel, of painted smoke that never changes, above which that hides the pixel."""
+
+SMOKE_LEFT = 1.7
+"""Smoke that a pixel's clear values may hold, over their window and the fraction of the frames that are not clear: 1 to
+1.7 in twelve composed clips (docs/experiments/hidden-plate.md)."""
+
+SEEN_WIDTH = 0.06
+"""Distance, over the longer side of the picture, over which smoke thins out from where it is seen to where it changes
+nothing: half of that over which opacity has its range (docs/experiments/hidden-plate.md)."""
 
 MAX_CORRECTION = 3.0
 """Difference of a clear moment from what is continued there, in standard deviations, beyond which it is an object's."""
@@ -158,8 +167,12 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float, painted: Mask | Non
         known &= ~never
         mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
-    smoke = window * (1 - (clear & seen).sum(0) / np.maximum(seen.sum(0), 1))
-    correction = _correction(image, known, in_one_piece(known & (change <= window)), weights, smoke)
+    # smoke thins out beside where it is seen
+    hidden = np.asarray(1 - (clear & seen).sum(0) / np.maximum(seen.sum(0), 1), np.float32)
+    hidden = np.maximum(hidden, blurred(hidden, SEEN_WIDTH * max(hidden.shape)))
+    smoke = SMOKE_LEFT * window * hidden
+    steady = in_one_piece(known & (change <= window) & (smoke < EIGHT_BIT_STEP / 2))
+    correction = _correction(image, known, steady, weights, smoke)
     whole, contrast = _completed(image + correction, known, mean, brightness, brightens, detail, weights)
     return ClearPicture(whole, known, clear, contrast, correction)
 
