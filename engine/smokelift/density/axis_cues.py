@@ -158,26 +158,19 @@ def estimate_axis(
 
 @dataclass(frozen=True, eq=False)
 class _Column:
-    """Smoke that rises from a base.
-
-    Attributes
-    ----------
-    base
-        Depth (m) of its base.
-    begins
-        Height (m above the domain's center) of its base.
-    middles, widths, drifts : (n,)
-        By height: lateral place (m) of its axis, its lateral standard deviation, distance of its axis from its base.
-    trust
-        Weight of what shows the base.
-    """
+    """Smoke that rises from a base."""
 
     base: float
+    """Depth (m) of its base."""
     begins: float
+    """Height (m above the domain's center) of its base."""
     middles: Doubles
     widths: Doubles
     drifts: Doubles
+    """(n,): by height: lateral place (m) of its axis, its lateral standard deviation, distance of its axis from its
+    base."""
     trust: float = 1.0
+    """Weight of what shows the base."""
 
 
 def _floor_column(

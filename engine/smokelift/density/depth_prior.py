@@ -54,24 +54,16 @@ class Detail(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class DepthEstimate:
-    """What a prior says of one moment.
-
-    Attributes
-    ----------
-    density : (nx, ny, nz) float32
-        A plausible density that shows about what the pictures do; where a fit starts.
-    inside : tuple of (rows, columns)
-        For each view, the fraction of every ray's smoke that lies inside the domain.
-    views
-        The pictures to fit, against the voxels where the prior expects smoke.
-    detail
-        None if the prior makes nothing up.
-    """
+    """What a prior says of one moment."""
 
     density: Volume
+    """(nx, ny, nz) float32: a plausible density that shows about what the pictures do; where a fit starts."""
     inside: tuple[NDArray[np.float32], ...]
+    """tuple of (rows, columns): for each view, the fraction of every ray's smoke that lies inside the domain."""
     views: ViewSet
+    """The pictures to fit, against the voxels where the prior expects smoke."""
     detail: Detail | None = None
+    """None if the prior makes nothing up."""
 
 
 class DepthPrior(Protocol):

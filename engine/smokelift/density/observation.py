@@ -146,38 +146,28 @@ class ObservedView:
 
     A picture that tells its own transmittance has three channels. An element has a fourth, in which smoke is black: it
     is shown over one color, so that nothing of the plate's detail is left in it, and over a white of its own.
-
-    Attributes
-    ----------
-    image : (rows, columns, channels)
-        The observation's, faded to the background by `probability`: so a faint rim ends where its light does, not at
-        the mask.
-    background : (rows, columns, channels)
-        What the picture shows without smoke.
-    noise : (rows, columns, channels)
-        Standard deviation of the observation's noise.
-    probability : (rows, columns)
-        Probability that a pixel shows smoke; what is left of the observation and of its noise.
-    mask : (rows, columns) bool
-        Pixels that may show smoke: where `probability` is not 0.
-    optical_depth : (rows, columns)
-        Of smoke without shadows that explains the picture; 0 outside the mask.
-    influenced : (rows, columns) bool
-        Pixels that the voxels behind the mask can change: a fit is judged by them.
-    left_out : (rows, columns, 3)
-        What an element leaves of the observation since it is neither smoke nor its plate; faded like the image.
     """
 
     camera: Camera
     image: Image
+    """(rows, columns, channels): the observation's, faded to the background by `probability`: so a faint rim ends where
+    its light does, not at the mask."""
     background: Image
+    """(rows, columns, channels): what the picture shows without smoke."""
     noise: Image
+    """(rows, columns, channels): standard deviation of the observation's noise."""
     left_out: Image
+    """(rows, columns, 3): what an element leaves of the observation since it is neither smoke nor its plate; faded like
+    the image."""
     probability: NDArray[np.float32]
+    """(rows, columns): probability that a pixel shows smoke; what is left of the observation and of its noise."""
     mask: NDArray[np.bool_]
+    """(rows, columns) bool: pixels that may show smoke: where `probability` is not 0."""
     optical_depth: NDArray[np.float32]
+    """(rows, columns): of smoke without shadows that explains the picture; 0 outside the mask."""
     projection: Projection
     influenced: NDArray[np.bool_]
+    """(rows, columns) bool: pixels that the voxels behind the mask can change: a fit is judged by them."""
 
     @staticmethod
     def of(observation: Observation, optics: Optics) -> ObservedView:

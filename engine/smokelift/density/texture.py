@@ -219,27 +219,18 @@ def _unit_energy(blur: float, width: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Exemplar:
-    """The distribution of the patches of some pictures at one scale.
-
-    Attributes
-    ----------
-    scale
-        Pixels of the pictures along one pixel of a patch, which is their mean.
-    unit
-        tau0.
-    height
-        What the whole height of the smoke counts as, in units of v.
-    directions : (bases, n, n)
-        Orthonormal; n is the number of a patch's pixels, and one for its height.
-    quantiles : (bases, n, knots)
-        Of the patches along each direction, ascending.
-    """
+    """The distribution of the patches of some pictures at one scale."""
 
     scale: int
+    """Pixels of the pictures along one pixel of a patch, which is their mean."""
     unit: float
+    """tau0."""
     height: float
+    """What the whole height of the smoke counts as, in units of v."""
     directions: NDArray[np.float32]
+    """(bases, n, n): orthonormal; n is the number of a patch's pixels, and one for its height."""
     quantiles: NDArray[np.float32]
+    """(bases, n, knots): of the patches along each direction, ascending."""
 
     @staticmethod
     def of(pictures: Sequence[Picture], scale: int) -> Exemplar:

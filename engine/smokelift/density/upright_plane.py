@@ -151,27 +151,18 @@ def seen_at(points: Doubles, picture: NDArray[np.float32], camera: Camera) -> Do
 
 @dataclass(frozen=True, eq=False)
 class SmokeAxis:
-    """How far behind the domain's center the middle of the smoke is, on the upright plane through the center.
-
-    Attributes
-    ----------
-    heights : (n,)
-        Meters above the center, ascending, along `view_frame`'s height.
-    laterals : (m,)
-        Meters from the center, ascending, along its lateral direction; one where there is one column.
-    depths : (n, m)
-        Meters away from the camera, along its depth direction.
-    spreads : (n, m)
-        Standard deviation (m) of the depth over the columns that stand behind one another.
-    widths : (n, m)
-        Lateral standard deviation (m) of the column that shows there, if there are several; else zero.
-    """
+    """How far behind the domain's center the middle of the smoke is, on the upright plane through the center."""
 
     heights: Doubles
+    """(n,): meters above the center, ascending, along `view_frame`'s height."""
     laterals: Doubles
+    """(m,): meters from the center, ascending, along its lateral direction; one where there is one column."""
     depths: Doubles
+    """(n, m): meters away from the camera, along its depth direction."""
     spreads: Doubles
+    """(n, m): standard deviation (m) of the depth over the columns that stand behind one another."""
     widths: Doubles
+    """(n, m): lateral standard deviation (m) of the column that shows there, if there are several; else zero."""
 
     @staticmethod
     def by_height(heights: Doubles, depths: Doubles) -> SmokeAxis:

@@ -64,41 +64,28 @@ Source = Literal["alpha", "given", "color", "color around one frame", "black for
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """What stands behind the smoke of a clip.
-
-    Attributes
-    ----------
-    source
-        Where it comes from.
-    clip
-        The footage at its plate's exposure, without the light that noise adds, with the plate in place of what a mask
-        hides and of what is painted as no smoke.
-    plate
-        What is behind it, at full size.
-    background
-        The background as a scene gives it, with its strokes; None where it was estimated from the clip alone, unless
-        the camera is known to move.
-    frames
-        Number of the file's frames, up to the next cut, that it was estimated from.
-    shot
-        First and last of these in the file; None where it was not estimated from frames.
-    cut
-        Frames of the file before and after a cut within the clip, if there is one.
-    strokes
-        What was painted over a frame, if that was used.
-    motion
-        The motion of the camera by which the clip's frames are registered, if it moves.
-    """
+    """What stands behind the smoke of a clip."""
 
     source: Source
+    """Where it comes from."""
     clip: Clip
+    """The footage at its plate's exposure, without the light that noise adds, with the plate in place of what a mask
+    hides and of what is painted as no smoke."""
     plate: Plate
+    """What is behind it, at full size."""
     background: Background | None = None
+    """The background as a scene gives it, with its strokes; None where it was estimated from the clip alone, unless the
+    camera is known to move."""
     frames: int = 0
+    """Number of the file's frames, up to the next cut, that it was estimated from."""
     shot: tuple[int, int] | None = None
+    """First and last of these in the file; None where it was not estimated from frames."""
     cut: tuple[int, int] | None = None
+    """Frames of the file before and after a cut within the clip, if there is one."""
     strokes: Strokes | None = None
+    """What was painted over a frame, if that was used."""
     motion: CameraMotion | None = None
+    """The motion of the camera by which the clip's frames are registered, if it moves."""
 
     def shot_of(self, clip: Clip) -> Clip:
         """Return the part of a clip's file that the background was estimated from."""

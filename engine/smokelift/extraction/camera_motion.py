@@ -84,26 +84,18 @@ ROUNDS = 2
 
 @dataclass(frozen=True)
 class Match:
-    """How a frame lies on a reference.
-
-    Attributes
-    ----------
-    motion
-        The motion that most cells fit.
-    found, placed, fitting
-        Numbers of cells with texture that the frame shows again, that are in place, and that fit the motion.
-    certain
-        Number of those that fit it and have clear texture: drawn fog that drifts as one has hardly any.
-    full
-        Whether the reference is full of clear texture, and the frame shows most of it again.
-    """
+    """How a frame lies on a reference."""
 
     motion: Similarity
+    """The motion that most cells fit."""
     found: int
     placed: int
     fitting: int
+    """Numbers of cells with texture that the frame shows again, that are in place, and that fit the motion."""
     certain: int
+    """Number of those that fit it and have clear texture: drawn fog that drifts as one has hardly any."""
     full: bool
+    """Whether the reference is full of clear texture, and the frame shows most of it again."""
 
     @property
     def fits(self) -> bool:
@@ -267,21 +259,14 @@ def _least_squares(points: Complex, shifts: Complex, tensors: Doubles) -> tuple[
 
 @dataclass(frozen=True, eq=False)
 class CameraMotion:
-    """The motion of a camera that a similarity explains in every frame.
-
-    Attributes
-    ----------
-    texture
-        What the frames are registered to.
-    measured
-        The motion in some frames, by their numbers in the file.
-    reference
-        Number in the file of the frame that the others are registered to; None if they are to a given picture.
-    """
+    """The motion of a camera that a similarity explains in every frame."""
 
     texture: Texture
+    """What the frames are registered to."""
     measured: Mapping[int, Similarity]
+    """The motion in some frames, by their numbers in the file."""
     reference: int | None
+    """Number in the file of the frame that the others are registered to; None if they are to a given picture."""
 
     def at(self, number: int, small: Callable[[], Picture]) -> Similarity:
         """Return the motion in a frame, by its number in the file and what makes its linear picture in small."""

@@ -56,34 +56,23 @@ NO_NOISE = lasting_noise(0.0)
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """What the camera sees without smoke: one picture, or one for each frame of a clip.
-
-    Attributes
-    ----------
-    image : (rows, columns, 3)
-        Linear; that of the first frame if it changes.
-    confidence : (rows, columns)
-        From 0 (filled from neighbors) to 1 (seen clear in many frames).
-    noise
-        Noise of the clip's pictures.
-    errors : (3, 3)
-        Covariance of the linear color errors where it is filled in; 0 if they are unknown.
-    images
-        What makes the image of a frame, counted from 0, behind a camera that moves or before a scene that changes; it
-        raises ClipError if it cannot. None if the background stands still.
-    files
-        What such images are read from.
-    finest
-        Pixels along the finest detail of it that the clip keeps behind smoke; see `finest_detail`.
-    """
+    """What the camera sees without smoke: one picture, or one for each frame of a clip."""
 
     image: Picture
+    """(rows, columns, 3): linear; that of the first frame if it changes."""
     confidence: Picture
+    """(rows, columns): from 0 (filled from neighbors) to 1 (seen clear in many frames)."""
     noise: Noise
+    """Noise of the clip's pictures."""
     errors: Picture = field(default_factory=lambda: np.zeros((3, 3), np.float32))
+    """(3, 3): covariance of the linear color errors where it is filled in; 0 if they are unknown."""
     images: Callable[[int], Picture] | None = None
+    """What makes the image of a frame, counted from 0, behind a camera that moves or before a scene that changes; it
+    raises ClipError if it cannot. None if the background stands still."""
     files: tuple[Path, ...] = ()
+    """What such images are read from."""
     finest: float = FINEST
+    """Pixels along the finest detail of it that the clip keeps behind smoke; see `finest_detail`."""
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame, counted from 0, which has one image."""

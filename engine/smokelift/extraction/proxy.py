@@ -42,37 +42,25 @@ it: if the camera moves or smoke fills the picture, fewer do all the time."""
 
 @dataclass(frozen=True, eq=False)
 class Proxy:
-    """Small frames of a clip's file.
-
-    Attributes
-    ----------
-    numbers
-        The frames' numbers in the file, ascending.
-    clip
-        First and last frame of the file that the clip uses.
-    pictures : (frames, rows, columns, 3)
-        Linear; what a mask hides is continued from around it.
-    filmed : (frames, rows, columns, 3)
-        The same with what a mask hides.
-    seen : (frames, rows, columns) bool
-        Pixels that no mask hides.
-    gains : (frames, 3)
-        Exposure of the file's frames over that of the pictures: 1, unless they are `evened`.
-    blocks
-        For `NOISE_FRAMES` of the clip's frames, `some_blocks` of the full picture, and where no mask hides them (None
-        without one).
-    scale
-        Pixels of the file along one pixel here.
-    """
+    """Small frames of a clip's file."""
 
     numbers: tuple[int, ...]
+    """The frames' numbers in the file, ascending."""
     clip: tuple[int, int]
+    """First and last frame of the file that the clip uses."""
     pictures: Picture
+    """(frames, rows, columns, 3): linear; what a mask hides is continued from around it."""
     filmed: Picture
+    """(frames, rows, columns, 3): the same with what a mask hides."""
     seen: NDArray[np.bool_]
+    """(frames, rows, columns) bool: pixels that no mask hides."""
     gains: Picture
+    """(frames, 3): exposure of the file's frames over that of the pictures: 1, unless they are `evened`."""
     blocks: Mapping[int, tuple[StoredPicture, Seen | None]]
+    """For `NOISE_FRAMES` of the clip's frames, `some_blocks` of the full picture, and where no mask hides them (None
+    without one)."""
     scale: float
+    """Pixels of the file along one pixel here."""
 
     @staticmethod
     def of(clip: Clip, beyond: bool = True) -> Proxy:

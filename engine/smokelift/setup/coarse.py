@@ -138,19 +138,13 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """How densities compare with the half of the pixels that they were not fitted to.
-
-    Attributes
-    ----------
-    error
-        Root mean square difference, as a fraction of what the smoke changes there; of several cameras that of theirs.
-    gains : (cameras, 3)
-        Strength of the light, in multiples of the scene's, that fits best with the same densities, by camera and
-        channel: more than 1 where they are too dark. 1 without scattered light.
-    """
+    """How densities compare with the half of the pixels that they were not fitted to."""
 
     error: float
+    """Root mean square difference, as a fraction of what the smoke changes there; of several cameras that of theirs."""
     gains: Doubles = field(default_factory=lambda: np.ones((1, 3)))
+    """(cameras, 3): strength of the light, in multiples of the scene's, that fits best with the same densities, by
+    camera and channel: more than 1 where they are too dark. 1 without scattered light."""
 
 
 def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:

@@ -31,35 +31,24 @@ much less smoke than most. Before an unknown background a frame without smoke di
 
 @dataclass(frozen=True, eq=False)
 class SmokeSamples:
-    """Where and how bright smoke is in some frames, at reduced size.
-
-    Attributes
-    ----------
-    scale
-        Full pixels along a reduced one.
-    covered, unknown : (rows, columns) bool
-        Pixels with smoke, and pixels with an unknown background, in at least one sample.
-    colors, behind : (n, 3)
-        Radiance of all smoke pixels, and of their background.
-    smoky
-        Numbers of the frames with smoke, those with the most first.
-    counts
-        Numbers of smoke pixels of the samples with smoke, in the order of ``colors``.
-    over_known
-        Numbers of smoke pixels before a known background in each sample, by frame number.
-    exposure
-        Largest fraction by which the exposure of a sample was changed.
-    """
+    """Where and how bright smoke is in some frames, at reduced size."""
 
     scale: float
+    """Full pixels along a reduced one."""
     covered: NDArray[np.bool_]
     unknown: NDArray[np.bool_]
+    """(rows, columns) bool: pixels with smoke, and pixels with an unknown background, in at least one sample."""
     colors: NDArray[np.float32]
     behind: NDArray[np.float32]
+    """(n, 3): radiance of all smoke pixels, and of their background."""
     smoky: tuple[int, ...]
+    """Numbers of the frames with smoke, those with the most first."""
     counts: tuple[int, ...] = ()
+    """Numbers of smoke pixels of the samples with smoke, in the order of ``colors``."""
     over_known: Mapping[int, int] = field(default_factory=dict)
+    """Numbers of smoke pixels before a known background in each sample, by frame number."""
     exposure: float = 0.0
+    """Largest fraction by which the exposure of a sample was changed."""
 
     @property
     def typical(self) -> tuple[int, ...]:

@@ -14,30 +14,20 @@ SMOKE_THRESHOLD = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """The change between two densities around a velocity u_k: r + g . (u - u_k) = offset + direction . u.
-
-    Attributes
-    ----------
-    direction
-        g at voxel centers, one array (nx, ny, nz) for each component.
-    offset : (nx, ny, nz) float32
-        r - g . u_k.
-    carried : (nx, ny, nz) float32
-        The density before, carried along by u_k, in the unit of `offset`.
-    weight : (nx, ny, nz) float32
-        How far the change is taken for motion, 0 to 1.
-    smoke : (nx, ny, nz) bool
-        Where there is smoke.
-    scale
-        Density gradient that divides all of it: the root mean square in the smoke.
-    """
+    """The change between two densities around a velocity u_k: r + g . (u - u_k) = offset + direction . u."""
 
     direction: Faces
+    """g at voxel centers, one array (nx, ny, nz) for each component."""
     offset: Array
+    """(nx, ny, nz) float32: r - g . u_k."""
     carried: Array
+    """(nx, ny, nz) float32: the density before, carried along by u_k, in the unit of `offset`."""
     weight: Array
+    """(nx, ny, nz) float32: how far the change is taken for motion, 0 to 1."""
     smoke: npt.NDArray[np.bool_]
+    """(nx, ny, nz) bool: where there is smoke."""
     scale: float
+    """Density gradient that divides all of it: the root mean square in the smoke."""
 
     def with_dissipation(self, fraction: float) -> "Linearization":
         """The change that is left where a fraction of the smoke dissolves."""

@@ -118,28 +118,20 @@ def _correction(
 
 @dataclass(frozen=True, eq=False)
 class _ImageGrid:
-    """Cells of a picture, about as wide as voxels of a grid are in it.
-
-    Attributes
-    ----------
-    shape
-        Of the grid.
-    pixels, voxels
-        Bilinear weights of the cells at every pixel and at every voxel's center.
-    moved : (voxels, 2, 3)
-        Columns and rows that a voxel moves by in the picture for each voxel that it moves in the grid.
-    least : (voxels, 3, 2)
-        The least motion in the grid for each column and row.
-    stiffness
-        What a correction costs beside what it explains.
-    """
+    """Cells of a picture, about as wide as voxels of a grid are in it."""
 
     shape: tuple[int, int, int]
+    """Of the grid."""
     pixels: sparse.csr_matrix
     voxels: sparse.csr_matrix
+    """Bilinear weights of the cells at every pixel and at every voxel's center."""
     moved: NDArray[np.float64]
+    """(voxels, 2, 3): columns and rows that a voxel moves by in the picture for each voxel that it moves in the
+    grid."""
     least: NDArray[np.float64]
+    """(voxels, 3, 2): the least motion in the grid for each column and row."""
     stiffness: sparse.csr_matrix
+    """What a correction costs beside what it explains."""
 
     @staticmethod
     @lru_cache(maxsize=2)

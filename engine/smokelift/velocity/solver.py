@@ -50,30 +50,22 @@ class ProjectedCG:
 
 @dataclass(frozen=True)
 class PrimalDual:
-    """Chambolle and Pock's splitting, as in algorithm 5 of Cen, Zhang and Liang (2023).
-
-    Attributes
-    ----------
-    sigma, tau, theta
-        Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1, or `solve` raises ValueError.
-        The paper gives no values: docs/experiments/velocity-solver.md has the sweep.
-    absolute_tolerance, relative_tolerance
-        Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels per frame.
-    iterations
-        Limit of its steps. A few tens are usual; the paper gives none.
-    inner_tolerance, inner_iterations
-        By how much, and in how many steps at most, the conjugate gradients in each proximal operator reduce their
-        residual.
-    """
+    """Chambolle and Pock's splitting, as in algorithm 5 of Cen, Zhang and Liang (2023)."""
 
     sigma: float = 0.1
     tau: float = 10.0
     theta: float = 1.0
+    """Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1, or `solve` raises ValueError.
+    The paper gives no values: docs/experiments/velocity-solver.md has the sweep."""
     absolute_tolerance: float = 1e-4
     relative_tolerance: float = 1e-3
+    """Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels per frame."""
     iterations: int = 100
+    """Limit of its steps. A few tens are usual; the paper gives none."""
     inner_tolerance: float = 0.3
     inner_iterations: int = 50
+    """By how much, and in how many steps at most, the conjugate gradients in each proximal operator reduce their
+    residual."""
 
     def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
         """See `Solver`."""
