@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.extraction.clear_picture import _correction
+from smokelift.extraction.clear_picture import _correction, clear_picture
 from smokelift.extraction.matte import matte
+from smokelift.extraction.proxy import Proxy
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import lasting_noise
 from smokelift.setup.first_estimate import first_estimate
 from tests.engine.films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
@@ -137,6 +139,18 @@ def test_the_last_smoke_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
 
     plate = plate_of(film(tmp_path, truth, opacity, 0.8, 0.5))
     assert codes_apart(plate.image, truth)[plume > 0.7].mean() < 5
+
+
+def test_haze_that_stands_beside_smoke_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
+    """It never changes, and is up to three codes brighter than the wall, which goes on beside it."""
+    away = np.abs(np.mgrid[:HEIGHT, :WIDTH][1] - WIDTH / 2)
+    haze = 0.02 * np.exp(-0.5 * ((away - 5) / 3) ** 2)
+    flat = np.full((HEIGHT, WIDTH, 3), 0.2, np.float32)
+    clip = film(tmp_path, flat, lambda n: np.where(away < 5, np.random.default_rng(n).uniform(0.3, 0.9), haze), 0.8)
+    found = clear_picture(Proxy.of(clip), lasting_noise(1 / 255), 4.0)
+    beside = (away > 5) & (away < 10)
+    assert found.known[beside].all()
+    assert codes_apart(found.image, flat)[beside].mean() < 1
 
 
 def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_path: Path) -> None:
