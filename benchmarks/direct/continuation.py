@@ -19,10 +19,10 @@ import numpy.typing as npt
 
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
 from benchmarks.tables import markdown
-from smokelift.direct import SmokeState, coarsen_state, complete_velocity, fit_simulation, spin_up
 from smokelift.direct.continuation import FITTED_FRAMES
-from smokelift.direct.fitting import BUOYANCY_FRAMES
+from smokelift.direct.fitting import BUOYANCY_FRAMES, coarsen_state, fit_simulation, spin_up
 from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.state import SmokeState, complete_velocity
 from smokelift.evaluation import metrics
 from smokelift.evaluation.truth import Truth, resampled
 from smokelift.output.images import eight_bit, write_sheet

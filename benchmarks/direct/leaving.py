@@ -15,18 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.tables import markdown
-from smokelift.direct import (
-    DISSOLVED,
-    ROOM,
-    Ball,
-    Continuation,
-    Fan,
-    continue_sequence,
-    default_overlap,
-    loop_sequence,
-    open_source,
-    steady_part,
-)
+from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
+from smokelift.direct.looping import default_overlap, loop_sequence, steady_part
+from smokelift.direct.new_sequence import open_source
+from smokelift.direct.surroundings import Ball, Fan
 from smokelift.evaluation.orbit import Orbit
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence, box_around_all

@@ -22,9 +22,8 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks import Mask
-from smokelift.direct.burning import fit_fire
 from smokelift.direct.inflow import Inflow, find_inflow
-from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.simulation import Combustion, Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.direct.turbulence import small_eddy_speed, with_small_eddies
@@ -98,6 +97,31 @@ def fit_simulation(
         physics = Physics(buoyancy, dissipation)
     around = surroundings or Surroundings()
     return Simulation(physics, inflow.cropped(), around, dt, fit_fire(states, dt), small_eddy_speed(states))
+
+
+def fit_fire(states: Sequence[SmokeState], dt: float) -> Combustion | None:
+    """Fit the fire of consecutive states of a clip, `dt` seconds apart; None where they show none.
+
+    Where they have less fire on the mean than was carried there nothing feeds it, and what they have of it is left in a
+    step. What the rest has more than that is the feed. Figures: docs/experiments/fire.md.
+    """
+    burning = [(state.flame, state.velocity) for state in states if state.flame is not None]
+    if len(burning) < len(states):
+        return None
+    advected = np.zeros(states[0].density.shape, np.float32)
+    found = advected.copy()
+    for (flame, _), (following, velocity) in pairwise(burning):
+        advected += advect(flame, velocity, dt, conserve=True)
+        found += following
+    unfed = found < advected
+    remaining = 1.0
+    if unfed.any():
+        remaining = float(found[unfed].sum(dtype=np.float64) / advected[unfed].sum(dtype=np.float64))
+    feed = np.maximum(found - np.float32(remaining) * advected, 0)
+    # The feed is clipped at zero. Scaled to the sum before the clipping it does not make the fire grow.
+    net = found.sum(dtype=np.float64) - remaining * advected.sum(dtype=np.float64)
+    scale = net / max(feed.sum(dtype=np.float64), 1e-30)
+    return Combustion(remaining, feed * np.float32(scale / (len(states) - 1)))
 
 
 def coarsen_state(state: SmokeState) -> SmokeState:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import Mask, counted
-from smokelift.direct.state import SmokeState
+from smokelift.direct.state import SmokeState, largest_divergence
 from smokelift.output.files import INDEX, checksum
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
-from smokelift.transport import Velocity, divergence, faces_in
+from smokelift.transport import faces_in
 
 MIN_FRAMES = 4
 """Frames that a sequence needs to be continued, retimed or looped."""
@@ -97,22 +97,13 @@ def write_simulated(
     figures = {
         "origin": origin,
         "mass": float(smoke.density.sum(dtype=np.float64)) * smoke.velocity.voxel_size**3,
-        "divergence": _largest_divergence(smoke.velocity, solid),
+        "divergence": largest_divergence(smoke.velocity, solid),
         **further,
         "seconds_density": 0.0,
         "seconds_velocity": time.perf_counter() - started,
     }
     writer.write(number, smoke.density, smoke.velocity.faces, figures, flame=smoke.flame, **options)
     return number, figures
-
-
-def _largest_divergence(velocity: Velocity, solid: Mask | None) -> float:
-    """The largest |div u| outside obstacles times voxel size over the largest |u|."""
-    largest = max(float(np.abs(component).max()) for component in velocity.faces)
-    left = np.abs(divergence(velocity))
-    if solid is not None:
-        left = left[~solid]
-    return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
 
 
 def _camera_at(camera: Camera, frames: list[float]) -> Camera:

@@ -5,12 +5,15 @@ the frame before to this one:
 
     u'   = Project(advect(u - a, u) + e + dt (b rho up) + a'), in inlets and fans with their own velocity
     rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
+    f'   = k advect(f, u') + s
 
 where a is the ambient velocity: wind and turbulence, which all air has in addition to the flow. Outside the box there
 is nothing else.
 
-Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as are what enters
-(`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.burning`), which lifts nothing beside what b has.
+Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as is what enters
+(`smokelift.direct.inflow`). Fire f is carried by the velocity of the smoke, burns out and is fed: one fraction k is
+left of it in a step, and the feed s >= 0 stands still, since what burns does. So a fire whose smoke moves as in the
+clip keeps its mean, and one that is blown away from its fuel burns out. It lifts nothing beside what b has.
 Advection keeps the mass, and MacCormack's correction the eddies that the grid shows; e are small ones in place of what
 interpolation takes (`smokelift.direct.turbulence`).
 """
@@ -21,7 +24,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smokelift.checks import Mask
-from smokelift.direct.burning import Combustion
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Solid, Surroundings
@@ -42,6 +44,21 @@ class Physics:
     """Rate at which smoke dissolves, in 1/s, at least 0."""
     contradicted_buoyancy: float = 0.0
     """One that was fitted and is not taken, because the clip's smoke moves the other way; 0 if there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Combustion:
+    """How fire goes on."""
+
+    remaining: float
+    """Fraction of the emission that is left of it after a step, 0 to 1."""
+    feed: Array
+    """(nx, ny, nz): emission that a step adds."""
+
+    def after(self, advected: Array, solid: Mask | None) -> Array:
+        """The emission (nx, ny, nz) after a step, from the advected one; zero in obstacles."""
+        emission = np.float32(self.remaining) * advected + self.feed
+        return emission if solid is None else np.where(solid, np.float32(0), emission)
 
 
 @dataclass(frozen=True, eq=False)

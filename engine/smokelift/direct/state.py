@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from smokelift.checks import Mask
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array, Velocity, advect, divergence, on_faces, project
 from smokelift.transport.constraint import FaceMasks, project_with_given_faces
@@ -53,11 +54,19 @@ def complete_velocity(velocity: Velocity) -> Velocity:
     Files keep the velocity near smoke. Cut off there it has divergence, and projecting that would slow the smoke down;
     so the air around is set in motion instead. A velocity without divergence stays as it is.
     """
-    largest = max(float(np.abs(component).max()) for component in velocity.faces)
-    if float(np.abs(divergence(velocity)).max()) * velocity.voxel_size <= DIVERGENCE_TOLERANCE * largest:
+    if largest_divergence(velocity) <= DIVERGENCE_TOLERANCE:
         return velocity
     found = project_with_given_faces(velocity, _known(velocity), velocity.faces, limit=COMPLETION_ITERATIONS)
     return velocity.with_faces(found.faces)
+
+
+def largest_divergence(velocity: Velocity, solid: Mask | None = None) -> float:
+    """The largest |div u| outside obstacles (nx, ny, nz) times voxel size over the largest |u|."""
+    largest = max(float(np.abs(component).max()) for component in velocity.faces)
+    left = np.abs(divergence(velocity))
+    if solid is not None:
+        left = left[~solid]
+    return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
 
 
 def _known(velocity: Velocity) -> FaceMasks:

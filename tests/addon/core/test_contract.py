@@ -18,7 +18,8 @@ from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.cli import command_parser
 from smokelift.app.commands import directed
 from smokelift.checks import Source
-from smokelift.direct import new_sequence, playback
+from smokelift.direct import new_sequence
+from smokelift.direct.retiming import playback
 from smokelift.extraction.backdrop import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import numbered_files

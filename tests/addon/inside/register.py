@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 import addon
-from smokelift.direct import ROOM
+from smokelift.direct.continuation import ROOM
 from smokelift.footage.images import Transfer
 from smokelift.render.device import DeviceName
 from smokelift.scene import Medium

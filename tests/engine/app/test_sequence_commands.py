@@ -6,8 +6,9 @@ import shutil
 import pytest
 from command_line import command, events, names, refused
 
-import smokelift.direct as direct
-from smokelift.direct import CONTRADICTED, Continuation, continue_sequence, open_source
+from smokelift.app.commands import directed
+from smokelift.direct.continuation import CONTRADICTED, ROOM, Continuation, continue_sequence
+from smokelift.direct.new_sequence import open_source
 from smokelift.report import cost
 from tests.engine.output.small_sequence import needs_vdb
 
@@ -92,7 +93,7 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
 def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys) -> None:
     """A run that ended after its first simulated frame goes on: the time of that counts, not of those it copied."""
     out, source = tmp_path / "out", open_source(finished)
-    for number, _ in continue_sequence(source, out, Continuation(3, room=direct.ROOM), npz=True):
+    for number, _ in continue_sequence(source, out, Continuation(3, room=ROOM), npz=True):
         if number == source.frames[-1] + 1:
             break
     index = json.loads((out / "sequence.json").read_text())
@@ -118,7 +119,7 @@ def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys,
     assert said("--room", 1, "--resume") == []
     shutil.rmtree(tmp_path / "out")
     figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
-    monkeypatch.setattr(direct, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
+    monkeypatch.setattr(directed, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
     monkeypatch.setattr(cost, "memory_free", lambda: 0)
     memory, buoyancy = said()
     assert "grows to 1 times" in memory

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from smokelift import _core
-from smokelift.direct import open_source
+from smokelift.direct.new_sequence import open_source
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import write_plume
 

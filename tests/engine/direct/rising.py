@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.direct import Ball, Continuation, Simulation, SmokeState, continue_sequence
-from smokelift.direct.burning import Combustion
+from smokelift.direct.continuation import Continuation, continue_sequence
 from smokelift.direct.inflow import Inflow
-from smokelift.direct.simulation import Physics
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.simulation import Combustion, Physics, Simulation
+from smokelift.direct.state import SmokeState
+from smokelift.direct.surroundings import Ball, Surroundings
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Domain

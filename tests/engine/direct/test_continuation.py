@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Continuation, Fan, loop_sequence, open_source, retime_sequence
+from smokelift.direct.continuation import Continuation
+from smokelift.direct.looping import loop_sequence
+from smokelift.direct.new_sequence import open_source
+from smokelift.direct.retiming import retime_sequence
+from smokelift.direct.surroundings import Ball, Fan
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import plume, run, run_twice, write_plume

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, fit_simulation
-from smokelift.direct.burning import Combustion, fit_fire
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.fitting import fit_fire, fit_simulation
+from smokelift.direct.simulation import Combustion
+from smokelift.direct.surroundings import Ball, Surroundings
 from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume
 
 

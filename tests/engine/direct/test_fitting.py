@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, SmokeState, coarsen_state, fit_simulation, spin_up
+from smokelift.direct.fitting import coarsen_state, fit_simulation, spin_up
 from smokelift.direct.simulation import Physics
+from smokelift.direct.state import SmokeState
+from smokelift.direct.surroundings import Ball
 from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import DISSOLVED, Continuation, SmokeState, Turbulence, open_source
+from smokelift.direct.continuation import DISSOLVED, Continuation
 from smokelift.direct.growth import (
     BLOCK,
     MARGIN_VOXELS,
@@ -15,7 +15,10 @@ from smokelift.direct.growth import (
     in_larger_box,
     moves,
 )
+from smokelift.direct.new_sequence import open_source
+from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import PointLight
 from smokelift.transport import advect
 from tests.engine.direct.rising import DOMAIN, DT, SCENE, along_x, at_rest, blob, run, run_twice

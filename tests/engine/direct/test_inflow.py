@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.direct import Ball, SmokeState
 from smokelift.direct.inflow import Inflow, find_inflow, inlet_score
+from smokelift.direct.state import SmokeState
+from smokelift.direct.surroundings import Ball
 from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free, plume
 

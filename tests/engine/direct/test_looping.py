@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import SmokeState, loop_sequence
-from smokelift.direct.looping import mix_by_edges, seam
+from smokelift.direct.looping import loop_sequence, mix_by_edges, seam
+from smokelift.direct.state import SmokeState
 from smokelift.output.sequence import Sequence
 from smokelift.scene import SIDES, Domain
 from smokelift.transport import Velocity

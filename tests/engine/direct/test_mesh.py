@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from smokelift.direct import BoxObstacle, Continuation, Mesh, continue_sequence
-from smokelift.direct.mesh import HEADER, RECORD
+from smokelift.direct.continuation import Continuation, continue_sequence
+from smokelift.direct.mesh import HEADER, RECORD, Mesh
 from smokelift.direct.simulation import Physics
-from smokelift.direct.surroundings import Surroundings, require_place
+from smokelift.direct.surroundings import BoxObstacle, Surroundings, require_place
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.transport import divergence

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import playback, retime_sequence
+from smokelift.direct.retiming import playback, retime_sequence
 from smokelift.output.sequence import Sequence
 
 

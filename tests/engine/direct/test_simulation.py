@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Simulation, SmokeState, fit_simulation
+from smokelift.direct.fitting import fit_simulation
 from smokelift.direct.inflow import Inflow
-from smokelift.direct.simulation import Physics
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.state import SmokeState
+from smokelift.direct.surroundings import Ball, Surroundings
 from smokelift.transport import divergence
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, SmokeState, complete_velocity
-from smokelift.direct.state import interpolate
+from smokelift.direct.state import SmokeState, complete_velocity, interpolate
+from smokelift.direct.surroundings import Ball
 from smokelift.transport import Velocity, divergence, project
 from smokelift.transport.constraint import faces_of
 from tests.engine.direct.rising import DOMAIN, DT, along_x, at_rest, blob

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import Simulation, SmokeState, Turbulence
 from smokelift.direct.inflow import Inflow
-from smokelift.direct.simulation import Physics
+from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import INTENSITY, small_eddy_speed, with_small_eddies
+from smokelift.direct.turbulence import INTENSITY, Turbulence, small_eddy_speed, with_small_eddies
 from smokelift.transport import Velocity, at_centres, divergence, project
 from tests.engine.direct.rising import DT, course
 

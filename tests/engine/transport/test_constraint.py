@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from smokelift.direct import Ball
-from smokelift.direct.surroundings import Solid
+from smokelift.direct.surroundings import Ball, Solid
 from smokelift.transport import Velocity, divergence, project
 from smokelift.transport.constraint import faces_between, faces_of, project_with_given_faces
 from tests.engine.direct.rising import DOMAIN, along_x

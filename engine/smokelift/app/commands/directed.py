@@ -5,11 +5,16 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-import smokelift.direct as direct
 from smokelift.app.options import add_directed_options, finite_number, frame_range, named_path, require_new
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
-from smokelift.direct.new_sequence import Written
+from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
+from smokelift.direct.looping import default_overlap, loop_length, loop_sequence, steady_part
+from smokelift.direct.mesh import Mesh
+from smokelift.direct.new_sequence import Written, open_source
+from smokelift.direct.retiming import playback, retime_sequence
+from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
+from smokelift.direct.turbulence import Turbulence
 from smokelift.output.files import INDEX
 from smokelift.output.index import Index
 from smokelift.output.sequence import Sequence
@@ -71,7 +76,7 @@ def add_continue_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--room",
         type=finite_number,
-        default=direct.ROOM,
+        default=ROOM,
         metavar="TIMES",
         help="let the box grow with the smoke to at most so many times the clip's size; 1 keeps it",
     )
@@ -105,11 +110,11 @@ def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[
 def continue_(options: argparse.Namespace, say: Reporter) -> None:
     """Continue the sequence, and say every frame."""
     continuation = _continuation(options)
-    sequence = direct.open_source(options.directory)
+    sequence = open_source(options.directory)
     require_new(options)
     continuation = replace(continuation, room=_room(options, sequence, say))
     start = sequence.frames[-1] if continuation.start is None else continuation.start
-    written = direct.continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
+    written = continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
     written = _with_note(written, continuation.room, say)
     total = start - sequence.frames[0] + 1 + continuation.frames
     first, simulated = sequence.frames[0], continuation.frames
@@ -136,16 +141,16 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
     said = contradicted = False
     for number, figures in written:
         yield number, figures
-        if not contradicted and (buoyancy := figures.get(direct.CONTRADICTED, 0.0)):
+        if not contradicted and (buoyancy := figures.get(CONTRADICTED, 0.0)):
             contradicted = True
             motion = "rises" if buoyancy < 0 else "sinks"
             say.note(Finding("contradicted buoyancy", {"buoyancy": buoyancy, "motion": motion}, doubt=True))
-        if not said and figures.get(direct.DISSOLVED, 0.0) > MIN_DISSOLVED_FRACTION:
+        if not said and figures.get(DISSOLVED, 0.0) > MIN_DISSOLVED_FRACTION:
             said = True
             say.note(Finding("dissolving smoke", {"frame": number, "room": room}, doubt=True))
 
 
-def _continuation(options: argparse.Namespace) -> direct.Continuation:
+def _continuation(options: argparse.Namespace) -> Continuation:
     """The continuation that the options say; ValueError for wrong values."""
     if options.frames < 1:
         raise ValueError(f"--frames {options.frames}: expected 1 or more.")
@@ -157,15 +162,15 @@ def _continuation(options: argparse.Namespace) -> direct.Continuation:
         raise ValueError(f"--room {options.room:g}: expected 1 or more, in boxes of the clip.")
     balls = [_ball("--ball", values) for values in options.ball]
     corners = [zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True) for v in options.box]
-    boxes = [direct.BoxObstacle(low, high) for low, high in corners]
-    return direct.Continuation(
+    boxes = [BoxObstacle(low, high) for low, high in corners]
+    return Continuation(
         frames=options.frames,
         start=options.start,
         fade=options.fade,
         wind=tuple(options.wind),
         turbulences=tuple(_turbulence(*values) for values in options.turbulence),
-        fans=tuple(direct.Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
-        obstacles=(*balls, *boxes, *map(direct.Mesh.read, options.mesh)),
+        fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
+        obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
         closed=tuple(side for side in SIDES if side in options.closed),
         room=options.room,
         buoyancy=options.buoyancy,
@@ -173,20 +178,20 @@ def _continuation(options: argparse.Namespace) -> direct.Continuation:
     )
 
 
-def _turbulence(speed: float, size: float, seed: float) -> direct.Turbulence:
+def _turbulence(speed: float, size: float, seed: float) -> Turbulence:
     if speed < 0 or size <= 0 or seed < 0 or seed != int(seed):
         raise ValueError(
             f"--turbulence {speed:g} {size:g} {seed:g}: expected a speed of 0 m/s or more, a size above 0 m, and "
             "a whole number from 0."
         )
-    return direct.Turbulence(speed, size, int(seed))
+    return Turbulence(speed, size, int(seed))
 
 
-def _ball(option: str, values: list[float]) -> direct.Ball:
+def _ball(option: str, values: list[float]) -> Ball:
     x, y, z, radius = values
     if radius <= 0:
         raise ValueError(f"{option}: the radius must be above 0 m, not {radius:g}.")
-    return direct.Ball((x, y, z), radius)
+    return Ball((x, y, z), radius)
 
 
 def add_retime_options(parser: argparse.ArgumentParser) -> None:
@@ -207,11 +212,11 @@ def retime(options: argparse.Namespace, say: Reporter) -> None:
     for speed in options.speed:
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
             raise ValueError(f"--speed {speed:g}: expected a number from {SPEEDS[0]:g} to {SPEEDS[1]:g}.")
-    sequence = direct.open_source(options.directory)
+    sequence = open_source(options.directory)
     require_new(options)
     speeds = tuple(options.speed)
-    total = len(direct.playback(len(sequence.frames), speeds)[0])
-    written = direct.retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume)
+    total = len(playback(len(sequence.frames), speeds)[0])
+    written = retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume)
     say_sequence(say, written, kind="written", directory=options.out, total=total)
 
 
@@ -234,10 +239,10 @@ def add_loop_options(parser: argparse.ArgumentParser) -> None:
 
 def loop(options: argparse.Namespace, say: Reporter) -> None:
     """Loop the sequence, and say every frame."""
-    sequence = direct.open_source(options.directory)
-    first, last = options.frames or direct.steady_part(sequence, options.overlap)
-    overlap = direct.default_overlap(last - first + 1) if options.overlap is None else options.overlap
-    total = direct.loop_length(sequence, first, last, overlap)
+    sequence = open_source(options.directory)
+    first, last = options.frames or steady_part(sequence, options.overlap)
+    overlap = default_overlap(last - first + 1) if options.overlap is None else options.overlap
+    total = loop_length(sequence, first, last, overlap)
     require_new(options)
-    written = direct.loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)
+    written = loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)
     say_sequence(say, written, kind="looped", directory=options.out, total=total, first=first, last=last)

@@ -15,7 +15,8 @@ from addon.scene import volume
 from addon.scene.box import new_box
 from addon.scene.smoke import activate, smokes
 from conftest import changed, known_run
-from smokelift.direct import BoxObstacle, Mesh
+from smokelift.direct.mesh import Mesh
+from smokelift.direct.surroundings import BoxObstacle
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import DOMAIN, write_plume
 from tests.example_shot import smoke
