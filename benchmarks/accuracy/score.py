@@ -19,8 +19,7 @@ from benchmarks.process import apart
 from smokelift import Scene
 from smokelift.evaluation import metrics
 from smokelift.evaluation.frame_means import VolumeMeans, eight_bit_values, finite_mean, means, picture_figures
-from smokelift.evaluation.orbit_scores import orbit_scores
-from smokelift.evaluation.orbit_shapes import SHAPES
+from smokelift.evaluation.orbit_scores import SHAPES, orbit_scores
 from smokelift.evaluation.truth import Truth, on_grid, resampled
 from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed

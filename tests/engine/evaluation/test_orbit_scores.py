@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.evaluation.orbit_scores import AZIMUTHS, orbit_scores
-from smokelift.evaluation.orbit_shapes import BANDS, SHAPES
+from smokelift.evaluation.orbit_scores import AZIMUTHS, BANDS, SHAPES, orbit_scores
 from smokelift.scene import CompleteScene, completed
 
 FRAMES = 3

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
 from smokelift.checks import Doubles
-from smokelift.evaluation.metrics.volumes import finite_array, relative
+from smokelift.evaluation.metrics.errors import finite_array, relative
 from smokelift.transport import block_means
 
 PATCH = 7
@@ -49,13 +49,7 @@ class PatchStatistics:
 
     @staticmethod
     def of(picture: npt.ArrayLike) -> "PatchStatistics":
-        """Return the statistics of a picture (rows, columns) of smoke before black.
-
-        Raises
-        ------
-        ValueError
-            If a value is not finite or the picture has not two axes.
-        """
+        """Return the statistics of a picture (rows, columns) of smoke before black."""
         values = finite_array(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
@@ -93,10 +87,7 @@ class PatchStatistics:
 def mean_gradient(picture: npt.ArrayLike) -> float:
     """Return the sum of a picture's gradients over that of its values: how sharp it is; 0 for a black one.
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite or the picture has not two axes of two pixels at least.
+    The picture (rows, columns) has two of both at least.
     """
     values = finite_array(picture)
     down, right = np.gradient(values)

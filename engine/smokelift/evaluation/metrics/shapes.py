@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import Doubles
-from smokelift.evaluation.metrics.volumes import finite_array
+from smokelift.evaluation.metrics.errors import finite_array
 
 PART_FRACTION = 0.2
 """Fraction of a ray's largest density from which on its smoke is in a part of it."""
@@ -53,13 +53,7 @@ class RayShapes:
 
     @staticmethod
     def of(smoke: npt.ArrayLike) -> "RayShapes | None":
-        """Measure smoke (columns, voxels along the rays, rows); None where there is none.
-
-        Raises
-        ------
-        ValueError
-            If a value is not finite.
-        """
+        """Measure smoke (columns, voxels along the rays, rows); None where there is none."""
         values = np.maximum(finite_array(smoke), 0)
         amount = values.sum(1)
         if not amount.any():
