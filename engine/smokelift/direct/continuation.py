@@ -18,7 +18,7 @@ from smokelift.direct.turbulence import Turbulence
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import SIDES, Box, Camera, CompleteScene, Domain, Side
+from smokelift.scene import SIDES, Box, Domain, Side
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity
 
@@ -86,7 +86,10 @@ def continue_sequence(
             f"{sequence.directory}: cannot go on from frame {start}; choose one from "
             f"{sequence.frames[MIN_FRAMES - 1]} to {sequence.frames[-1]}."
         )
-    growth = _growth(continuation, sequence.scene)
+    scene = sequence.scene
+    closed = tuple(side for side in SIDES if side in (*scene.closed, *continuation.closed))
+    voxels = int(continuation.room * math.prod(scene.domain.resolution))
+    growth = Growth(scene.domain, closed, voxels, camera_and_lamp_places(scene))
     box = _start_box(continuation, growth)
     for obstacle in continuation.obstacles:
         require_place("obstacle", obstacle, box, growth.reach())
@@ -127,13 +130,14 @@ def _simulated(
     numbers = copied[1:]
     earlier = numbers[-BUOYANCY_FRAMES:-FITTED_FRAMES] if continuation.buoyancy is None else ()
     states = [read_state(sequence, number) for number in numbers[-FITTED_FRAMES:]]
+    line_of_sight = [abs(row[2]) for row in sequence.scene.camera.matrix[:2]]
     simulation = fit_simulation(
         states,
         dt,
         sequence.scene.inflow(),
         _surroundings(continuation, clip, clip),
         earlier=[coarsen_state(read_state(sequence, number)) for number in earlier],
-        depth_axis=_depth_axis(sequence.scene.camera),
+        depth_axis=int(np.argmax(line_of_sight)),
         buoyancy=continuation.buoyancy,
         dissipation=continuation.dissipation,
     )
@@ -175,18 +179,6 @@ def _simulated(
             writer, number, faded, "simulated", further, started=started, solid=obstacles, box=box, state=saved
         )
         larger = growth.after(box, state, dt)
-
-
-def _depth_axis(camera: Camera) -> int:
-    """The axis, x or y, that is nearest to the line of sight of a camera."""
-    along = [abs(row[2]) for row in camera.matrix[:2]]
-    return along.index(max(along))
-
-
-def _growth(continuation: Continuation, scene: CompleteScene) -> Growth:
-    closed = tuple(side for side in SIDES if side in (*scene.closed, *continuation.closed))
-    voxels = int(continuation.room * math.prod(scene.domain.resolution))
-    return Growth(scene.domain, closed, voxels, camera_and_lamp_places(scene))
 
 
 def _start_box(continuation: Continuation, growth: Growth) -> Domain:

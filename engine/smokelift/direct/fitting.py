@@ -90,7 +90,7 @@ def fit_simulation(
     if dissipation is None:
         dissipation = _dissipation(states, dt, inflow.voxels)
     if buoyancy is None:
-        fitted, rise = _buoyancy([*earlier, *map(coarsen_state, states)], dt, _coarse_mask(inflow.voxels), depth_axis)
+        fitted, rise = _buoyancy([*earlier, *map(coarsen_state, states)], dt, inflow.voxels, depth_axis)
         contradicted = fitted * rise < 0
         physics = Physics(0.0 if contradicted else fitted, dissipation, fitted if contradicted else 0.0)
     else:
@@ -131,12 +131,6 @@ def coarsen_state(state: SmokeState) -> SmokeState:
     return SmokeState(state.density, state.velocity)
 
 
-def _coarse_mask(voxels: Mask) -> Mask:
-    while max(voxels.shape) > COARSE_SIDE_VOXELS:
-        voxels = coarsen_density(voxels.astype(np.float32)) > 0
-    return voxels
-
-
 def spin_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
     """The last of some consecutive states, with the velocity that the forces have made since the first, and its eddies.
 
@@ -165,8 +159,11 @@ def _replayed(simulation: Simulation) -> Simulation:
 def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:
     """The buoyancy whose velocity moves the smoke up as the clip does, and how fast the clip says that it rises (m/s).
 
-    The velocity spins up along all states, with their densities; the second half of them is compared.
+    The velocity spins up along all states, with their densities; the second half of them is compared. The inlets are
+    marked on the states' grid, or on one that it was halved from.
     """
+    while inlets.shape != states[0].density.shape:
+        inlets = coarsen_density(inlets.astype(np.float32)) > 0
     states = states[-BUOYANCY_FRAMES:]
     if len(states) < MIN_BUOYANCY_FRAMES or not all(state.density.any() for state in states):
         return 0.0, 0.0

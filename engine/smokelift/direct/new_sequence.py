@@ -13,7 +13,6 @@ from smokelift.direct.state import SmokeState, largest_divergence
 from smokelift.output.files import INDEX, checksum
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Camera
 from smokelift.transport import faces_in
 
 MIN_FRAMES = 4
@@ -47,13 +46,17 @@ def directed_writer(
 
     The job and its settings are kept in the settings under ``direct``, and ``how`` says the same as a sentence for
     the provenance. Every frame that is written has the camera of a frame of `sequence`: ``camera_frames`` are their
-    numbers, between frames the nearest, beyond them the last. ``npz`` and ``resume`` are those of `SequenceWriter`.
-    Jobs yield the number and the figures of every frame, which is written already.
+    numbers, from 1, between frames the nearest, beyond them the last. ``npz`` and ``resume`` are those of
+    `SequenceWriter`. Jobs yield the number and the figures of every frame, which is written already.
     """
-    scene = replace(sequence.scene, camera=_camera_at(sequence.scene.camera, camera_frames))
+    camera = sequence.scene.camera
+    if camera.moves:
+        last = len(camera.matrices) - 1
+        matrices = tuple(camera.matrices[min(max(round(frame) - 1, 0), last)] for frame in camera_frames)
+        camera = replace(camera, matrix=matrices[0], matrices=matrices)
     return SequenceWriter(
         out,
-        scene,
+        replace(sequence.scene, camera=camera),
         {**sequence.settings, "direct": {"job": job, **settings}},
         npz=npz,
         resume=resume,
@@ -104,12 +107,3 @@ def write_simulated(
     }
     writer.write(number, smoke.density, smoke.velocity.faces, figures, flame=smoke.flame, **options)
     return number, figures
-
-
-def _camera_at(camera: Camera, frames: list[float]) -> Camera:
-    """A camera with a matrix for each of some frames, counted from 1; one that stands still stays as it is."""
-    if not camera.moves:
-        return camera
-    last = len(camera.matrices) - 1
-    matrices = tuple(camera.matrices[min(max(round(frame) - 1, 0), last)] for frame in frames)
-    return replace(camera, matrix=matrices[0], matrices=matrices)

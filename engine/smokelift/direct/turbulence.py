@@ -14,7 +14,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -31,15 +30,6 @@ OCTAVES = 1.0
 itself."""
 
 
-class _Modes(NamedTuple):
-    """Waves ``across cos(number . x + phase + rate t)``: vectors (MODES, 3) in 1/m and 1, and (MODES,) in 1/s."""
-
-    number: Doubles
-    across: Doubles
-    phase: Doubles
-    rate: Doubles
-
-
 @dataclass(frozen=True)
 class Turbulence:
     """Eddies everywhere, which change in the time that air takes to cross them."""
@@ -53,45 +43,36 @@ class Turbulence:
 
     def velocity(self, like: Velocity, time: float, first: tuple[int, ...] = (0, 0, 0)) -> list[Array]:
         """The velocity in m/s on the faces of a grid that begins at a voxel, at a time in seconds."""
-        modes = self._modes
-        turned = self.speed * np.sqrt(2 / MODES) * np.exp(1j * (modes.phase + modes.rate * time))
+        numbers, across, phase, rate = self._modes
+        turned = self.speed * np.sqrt(2 / MODES) * np.exp(1j * (phase + rate * time))
         faces = []
         for axis, component in enumerate(like.faces):
             places = (first[d] + np.arange(n) + (0.0 if d == axis else 0.5) for d, n in enumerate(component.shape))
             x, y, z = (
                 np.exp(1j * np.outer(along, like.voxel_size * place))
-                for along, place in zip(modes.number.T, places, strict=True)
+                for along, place in zip(numbers.T, places, strict=True)
             )
-            layers = (modes.across[:, axis] * turned)[:, None, None] * x[:, :, None] * y[:, None, :]
+            layers = (across[:, axis] * turned)[:, None, None] * x[:, :, None] * y[:, None, :]
             waves = np.tensordot(layers.astype(np.complex64), z.astype(np.complex64), axes=(0, 0))
             faces.append(np.ascontiguousarray(waves.real))
         return faces
 
     @cached_property
-    def _modes(self) -> _Modes:
+    def _modes(self) -> tuple[Doubles, Doubles, Doubles, Doubles]:
+        """Waves across cos(number . x + phase + rate t): numbers (MODES, 3) in 1/m, across (MODES, 3), phase, rate."""
         random = np.random.default_rng(self.seed)
         along, other = (random.standard_normal((MODES, 3)) for _ in range(2))
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         across = np.cross(along, other)
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         halves = 2 ** (OCTAVES * (random.random(MODES) - 0.5))  # a wave holds two eddies
-        return _Modes(
-            along * (np.pi / self.size * halves)[:, None],
-            across,
-            2 * np.pi * random.random(MODES),
-            self.speed / self.size * random.standard_normal(MODES),
-        )
+        numbers, phase = along * (np.pi / self.size * halves)[:, None], 2 * np.pi * random.random(MODES)
+        return numbers, across, phase, self.speed / self.size * random.standard_normal(MODES)
 
 
-class _Octave(NamedTuple):
-    """Motion that an average over some voxels leaves out and a narrower one does not, and eddies of its size."""
-
-    average: int
-    eddy: float
-
-
-SIZES = (_Octave(3, 2.2), _Octave(7, 4.0), _Octave(13, 8.0), _Octave(27, 16.0))
-"""Voxels of each average and of its eddies, from the finest on; what is larger the estimate shows."""
+SIZES = ((3, 2.2), (7, 4.0), (13, 8.0), (27, 16.0))
+"""Octaves of motion, from the finest on; what is larger the estimate shows. Voxels of an average that leaves an octave
+out, while the narrower one before does not, and of eddies of its size."""
 
 INTENSITY = 0.23
 """Speed of an octave's eddies, of each component, over that of a clip's smoke: .14 of the true one, of which estimates
@@ -118,22 +99,22 @@ def with_small_eddies(velocity: Velocity, density: Array, speed: float, step: in
     """
     faces = list(velocity.faces)
     smoke, near = _on_faces(density)
-    for number, (octave, found) in enumerate(_octaves(velocity)):
+    for number, (size, found) in enumerate(_octaves(velocity)):
         missing = 3 * speed**2 - sum(_mean_squares(found, smoke))
         if missing > 0:
-            eddies = Turbulence(missing**0.5, octave.eddy * velocity.voxel_size, step * len(SIZES) + number)
+            eddies = Turbulence(missing**0.5, size * velocity.voxel_size, step * len(SIZES) + number)
             added = eddies.velocity(velocity, 0.0)
             faces = [u + weight * eddy for u, weight, eddy in zip(faces, near, added, strict=True)]
     return velocity.with_faces(faces)
 
 
-def _octaves(velocity: Velocity) -> Iterator[tuple[_Octave, list[Array]]]:
-    """The octaves that a box holds, and a velocity's motion in them on faces."""
+def _octaves(velocity: Velocity) -> Iterator[tuple[float, list[Array]]]:
+    """Voxels of the eddies of each octave that a box holds, and a velocity's motion in it on faces."""
     wider = list(velocity.faces)
-    for octave in SIZES:
-        if octave.average < min(velocity.shape):
-            averaged = [ndimage.uniform_filter(component, octave.average) for component in wider]
-            yield octave, [u - mean for u, mean in zip(wider, averaged, strict=True)]
+    for average, eddy in SIZES:
+        if average < min(velocity.shape):
+            averaged = [ndimage.uniform_filter(component, average) for component in wider]
+            yield eddy, [u - mean for u, mean in zip(wider, averaged, strict=True)]
             wider = averaged
 
 
