@@ -73,16 +73,11 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
             try:
                 OpenEXR.File(header, {"RGBA"[: values.shape[2]]: np.ascontiguousarray(pixels)}).write(str(aside))
             except RuntimeError as error:
-                raise _of_system(error) from error
+                # OpenEXR tells of the system's errors in words only
+                number = next((each for each in DISK_FULL if os.strerror(each) in str(error)), errno.EIO)
+                raise OSError(number, os.strerror(number)) from error
     else:
         raise ImageError(f"{path}: can only write .exr and .png")
-
-
-def _of_system(error: RuntimeError) -> OSError:
-    """The error of the system that OpenEXR tells of in words only."""
-    known = (number for number in DISK_FULL if os.strerror(number) in str(error))
-    number = next(known, errno.EIO)
-    return OSError(number, os.strerror(number))
 
 
 def write_sheet(path: Path, rows: Sequence[Sequence[Tile]], titles: Sequence[str], labels: Sequence[str]) -> None:

@@ -58,8 +58,7 @@ class Sequence:
     provenance: tuple[Mapping[str, Any], ...]
     start_number: int
     _boxes: Mapping[int, Domain]
-    _figures: Mapping[str, Mapping[str, Any]]
-    _checksums: Mapping[str, str]
+    _index: Index
 
     @classmethod
     def open(cls, directory: str | Path) -> "Sequence":
@@ -90,8 +89,7 @@ class Sequence:
             tuple(index.provenance),
             index.start_number,
             boxes,
-            index.frames,
-            index.checksums,
+            index,
         )
 
     @property
@@ -102,7 +100,7 @@ class Sequence:
 
     def file_number(self, number: int) -> int:
         """Return the number in the names of a frame's files."""
-        return number + self.start_number - 1
+        return self._index.file_number(number)
 
     def box(self, number: int) -> Domain:
         """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing."""
@@ -186,7 +184,7 @@ class Sequence:
     def figures(self, number: int) -> Mapping[str, Any]:
         """Return what was noted about a frame."""
         self._check(number)
-        return self._figures[str(number)]
+        return dict(self._index.frames[str(number)])
 
     def _check(self, number: int) -> None:
         if number not in self.frames or not isinstance(number, int | np.integer):
@@ -194,7 +192,7 @@ class Sequence:
             raise SequenceError(f"{self.directory}: there is no frame {shown(number)}; {span}")
 
     def _check_sum(self, path: Path) -> None:
-        written = self._checksums.get(path.name)
+        written = self._index.checksums.get(path.name)
         if written is not None and checksum([path]) != written:
             raise SequenceError(
                 f"{path}: is not the file that was written: it is damaged, or was changed since; copy or make it again"

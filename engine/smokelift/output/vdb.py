@@ -13,7 +13,7 @@ import importlib
 import importlib.util
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -127,10 +127,8 @@ def write_vdb(
     vdb = vdb_module()
     rho = checked_volume(density, domain.shape, "density")
     box = _around(rho > 0.0, VELOCITY_MARGIN)
-    if velocity is not None and not isinstance(velocity, StaggeredGrid):
-        velocity = np.ascontiguousarray(velocity, np.float32)
     if velocity is not None:
-        _check_velocity(velocity, domain)
+        velocity = _checked_velocity(velocity, domain.shape)
     lattice = lattice or domain
     first = domain.first_in(lattice)
     rho_box, corner = rho[box], _index(box, first)
@@ -207,18 +205,16 @@ def _fog(vdb: ModuleType, values: Array, corner: tuple[int, ...]) -> Any:
     return grid
 
 
-def _check_velocity(velocity: Array | StaggeredGrid, domain: Domain) -> None:
-    """Refuse a velocity that does not fit the domain, or is not finite."""
-    parts: Sequence[Array]
-    shape: tuple[int, ...]
-    if isinstance(velocity, StaggeredGrid):
-        parts, shape = velocity.faces, (*velocity.shape, 3)
-    else:
-        parts, shape = [velocity], velocity.shape
-    if shape != (*domain.shape, 3):
-        raise ValueError(f"velocity {shape} does not fit the domain's {domain.shape} voxels; resample it")
+def _checked_velocity(velocity: npt.ArrayLike | StaggeredGrid, voxels: tuple[int, ...]) -> Array | StaggeredGrid:
+    """A velocity on faces, or at centers as float32; ValueError if it does not fit the voxels, or is not finite."""
+    velocity = velocity if isinstance(velocity, StaggeredGrid) else np.ascontiguousarray(velocity, np.float32)
+    parts: tuple[Array, ...] = velocity.faces if isinstance(velocity, StaggeredGrid) else (velocity,)
+    shape = (*velocity.shape, 3) if len(parts) == 3 else velocity.shape
+    if shape != (*voxels, 3):
+        raise ValueError(f"velocity {shape} does not fit the domain's {voxels} voxels; resample it")
     if not all(map(finite, parts)):
         raise ValueError("velocity must be finite; set other values to 0")
+    return velocity
 
 
 def _near(

@@ -164,16 +164,14 @@ class SequenceWriter:
                 if ready is not None and kind in ready:
                     with atomic_path(path) as aside:
                         shutil.copyfile(ready[kind], aside)
+                elif kind == "vdb":
+                    write_vdb(path, rho, velocity, box, self._index.settings, fire, lattice=self._domain)
                 else:
-                    self._write_arrays(path, rho, velocity, fire, box)
+                    arrays = {"density": rho, **dict(zip(VELOCITY, velocity.faces, strict=True))}
+                    write_arrays(path, arrays if fire is None else {**arrays, FLAME: fire})
             if "vdb" in self._kinds and math.prod(self._domain.shape) >= MIN_PROXY_VOXELS:  # of all frames or of none
-                write_proxy(
-                    files.proxy_path(self.directory, self._index.file_number(number)),
-                    rho,
-                    box,
-                    flame=fire,
-                    lattice=self._domain,
-                )
+                proxy = files.proxy_path(self.directory, self._index.file_number(number))
+                write_proxy(proxy, rho, box, flame=fire, lattice=self._domain)
             frames = {**self._index.frames, str(number): json_value({**(figures or {}), **own_box})}
             checksums = {**self._index.checksums, **{path.name: files.checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
@@ -187,13 +185,6 @@ class SequenceWriter:
     def _path(self, number: int, kind: str) -> Path:
         """The file of a frame."""
         return files.frame_path(self.directory, self._index.file_number(number), kind)
-
-    def _write_arrays(self, path: Path, density: Array, velocity: Velocity, flame: Array | None, box: Domain) -> None:
-        if path.suffix == ".npz":
-            fire = {} if flame is None else {FLAME: flame}
-            write_arrays(path, {"density": density, **dict(zip(VELOCITY, velocity.faces, strict=True)), **fire})
-        else:
-            write_vdb(path, density, velocity, box, self._index.settings, flame, lattice=self._domain)
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""
