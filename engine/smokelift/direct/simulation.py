@@ -93,10 +93,25 @@ class Simulation:
 
     def velocity(self, state: SmokeState, step: int, solid: Solid | None = None) -> Velocity:
         """The velocity of the state one step later, around what is solid."""
-        moved = self._self_advected(state.velocity, step)
+        before = state.velocity
+        air = self.surroundings.air(before, (step - 1) * self.dt)
+        flow = before.with_faces(u - a for u, a in zip(before.faces, air, strict=True))
+        moved = advect(flow, before, self.dt)
+        # the air outside the box is at rest beside the wind
+        from_inside = advect(np.ones(before.shape, np.float32), before, self.dt, scheme="semi-lagrangian")
+        inside = on_faces(np.stack([from_inside] * 3, axis=-1))
+        moved = moved.with_faces(u * weight for u, weight in zip(moved.faces, inside, strict=True))
         if self.eddy_speed > 0:
             moved = with_small_eddies(moved, state.density, self.eddy_speed, step)
-        driven = moved.with_faces(self._with_forces(moved, state, step))
+        faces = [component.copy() for component in moved.faces]
+        lifted = 0.5 * (state.density[:, :, 1:] + state.density[:, :, :-1])
+        faces[2][:, :, 1:-1] += np.float32(self.dt * self.physics.buoyancy) * lifted
+        for fan_faces, fan_velocity in self.surroundings.fan_faces:
+            for component, blown, speed in zip(faces, fan_faces, fan_velocity, strict=True):
+                component[blown] = speed
+        self.inflow.velocity_into(faces, step)
+        air = self.surroundings.air(moved, step * self.dt)
+        driven = moved.with_faces(u + a for u, a in zip(faces, air, strict=True))
         return project(driven) if solid is None else solid.projected(driven)
 
     def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> "Simulation":
@@ -110,34 +125,11 @@ class Simulation:
         return replace(self, inflow=inflow, surroundings=surroundings, fire=fire)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
-        return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
-
-    def _self_advected(self, velocity: Velocity, step: int) -> Velocity:
-        """The velocity after it was advected by itself, without the ambient velocity."""
-        air = self.surroundings.air(velocity, (step - 1) * self.dt)
-        flow = velocity.with_faces(u - a for u, a in zip(velocity.faces, air, strict=True))
-        moved = advect(flow, velocity, self.dt)
-        from_inside = advect(np.ones(velocity.shape, np.float32), velocity, self.dt, scheme="semi-lagrangian")
-        inside = on_faces(np.stack([from_inside] * 3, axis=-1))
-        return moved.with_faces(u * weight for u, weight in zip(moved.faces, inside, strict=True))
-
-    def _with_forces(self, moved: Velocity, state: SmokeState, step: int) -> list[Array]:
-        """The velocity on faces after forces, inlets and fans, before the projection."""
-        faces = [component.copy() for component in moved.faces]
-        lifted = 0.5 * (state.density[:, :, 1:] + state.density[:, :, :-1])
-        faces[2][:, :, 1:-1] += np.float32(self.dt * self.physics.buoyancy) * lifted
-        for fan_faces, fan_velocity in self.surroundings.fan_faces:
-            for component, inside, speed in zip(faces, fan_faces, fan_velocity, strict=True):
-                component[inside] = speed
-        self.inflow.velocity_into(faces, step)
-        return [u + a for u, a in zip(faces, self.surroundings.air(moved, step * self.dt), strict=True)]
-
-
-def _without_traces(density: Array, solid: Mask | None) -> Array:
-    """The density with zero for traces and in obstacles, where interpolation puts some, and with its mass restored."""
-    there = density > TRACE_FRACTION * density.max()
-    if solid is not None:
-        there &= ~solid
-    cleared = np.where(there, density, np.float32(0))
-    mass, mass_left = (float(values.sum(dtype=np.float64)) for values in (density, cleared))
-    return cleared * np.float32(mass / mass_left) if mass_left > 0 else cleared
+        """The values with zero for traces and in obstacles, where interpolation puts some, and with their sum kept."""
+        moved = advect(values, velocity, self.dt, conserve=True)
+        there = moved > TRACE_FRACTION * moved.max()
+        if solid is not None:
+            there &= ~solid
+        cleared = np.where(there, moved, np.float32(0))
+        mass, mass_left = (float(amount.sum(dtype=np.float64)) for amount in (moved, cleared))
+        return cleared * np.float32(mass / mass_left) if mass_left > 0 else cleared

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, VolumeMeans, means, picture_figures
@@ -108,8 +107,9 @@ def _load_truth(sequence: Sequence, path: Path) -> Truth:
     box = np.array(domain.max) - np.array(domain.min)
     wanted = np.array(truth.shape) * truth.voxel_size
     if not np.allclose(box, wanted, rtol=0.01):
+        its, own = (" x ".join(f"{length:.3g}" for length in size) for size in (wanted, box))
         raise ValueError(
-            f"{path}: is a box of {_meters(wanted)}, but the sequence's is {_meters(box)}; reconstruct with the "
+            f"{path}: is a box of {its} m, but the sequence's is {own} m; reconstruct with the "
             "truth's box as [domain] in the scene file."
         )
     fps = sequence.scene.clip.fps if sequence.scene.clip else None
@@ -137,10 +137,6 @@ def _against_truth(sequence: Sequence, truth: Truth) -> Figures:
         velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None
         volumes.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
     return volumes.figures()
-
-
-def _meters(size: npt.NDArray[np.float64]) -> str:
-    return " x ".join(f"{length:.3g}" for length in size) + " m"
 
 
 def _against_view(sequence: Sequence, view: ReferenceView) -> Figures:

@@ -24,7 +24,11 @@ SURROUNDING_VOXELS = 2
 
 def picture_figures(image: Image, truth: Image) -> Figures:
     """Metrics of a picture beside the true one, both linear radiance (rows, columns, 3), in their 8-bit sRGB values."""
-    found, true = (eight_bit_values(picture) for picture in _without_copies(image, truth))
+    pictures = image, truth
+    if all(np.array_equal(picture[..., :-1], picture[..., 1:]) for picture in pictures):
+        # every figure is a mean over channels, so that one is enough where all are gray
+        pictures = image[..., :1], truth[..., :1]
+    found, true = map(eight_bit_values, pictures)
     return {"psnr": metrics.psnr(found, true), "ssim": metrics.ssim(found, true)}
 
 
@@ -101,9 +105,3 @@ def finite_mean(values: Iterable[float | None]) -> float | None:
 def eight_bit_values(image: npt.ArrayLike) -> Array:
     """Linear radiance as the sRGB values (1 is white) that an 8-bit picture holds."""
     return eight_bit(image) / np.float32(255)
-
-
-def _without_copies(*pictures: Image) -> tuple[Image, ...]:
-    """Pictures (..., 3) with one channel in place of three where all are gray: every figure is a mean over channels."""
-    gray = all(np.array_equal(picture[..., :-1], picture[..., 1:]) for picture in pictures)
-    return tuple(picture[..., :1] for picture in pictures) if gray else pictures

@@ -71,7 +71,9 @@ def orbit_scores(
     None where there is nothing to say.
     """
     orbit = Orbit(scene, lights_turn=truth is None)
-    frames = _scored_frames(count)
+    first = FIRST_FRAMES if count > 2 * FIRST_FRAMES else 0
+    spread = np.linspace(first, count - 1, min(SCORED_FRAMES, count - first))
+    frames = sorted({round(float(frame)) for frame in spread})
     found: dict[str, list[list[float | None]]] = {name: [] for name in ("patches", "texture", "edges", "halo")}
     own: dict[str, list[list[float | None]]] = {"patches": [], "texture": []}
     fronts: list[PatchStatistics] = []
@@ -124,12 +126,6 @@ def _add_distances(
     pairs = list(zip(found, references, strict=True))
     figures["patches"].append([one.distance(reference) for one, reference in pairs])
     figures["texture"].append([one.texture_distance(reference) for one, reference in pairs])
-
-
-def _scored_frames(count: int) -> list[int]:
-    first = FIRST_FRAMES if count > 2 * FIRST_FRAMES else 0
-    spread = np.linspace(first, count - 1, min(SCORED_FRAMES, count - first))
-    return sorted({round(float(frame)) for frame in spread})
 
 
 def _relative_flicker(

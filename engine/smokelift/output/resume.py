@@ -64,7 +64,10 @@ class ResumeState:
             raise OSError(f"{path}: cannot be read: what it says of its voxels does not fit") from error
         if number.dtype.kind != "i" or number < 0 or density.min() < 0:
             raise OSError(f"{path}: cannot be read: its number or density is not one that a run writes")
-        if (x.shape, y.shape, z.shape) not in _grids(shape):
+        grids = [shape]  # that of the density, and those that are each half as fine
+        while max(grids[-1]) > 1:
+            grids.append(halved(grids[-1]))
+        if all(face_shapes(grid) != (x.shape, y.shape, z.shape) for grid in grids):
             raise OSError(
                 f"{path}: cannot be read: the grid of its velocity does not fit its density; choose another directory"
             )
@@ -78,11 +81,3 @@ def _dense(arrays: Mapping[str, npt.NDArray[Any]], name: str, shape: Shape) -> n
     filled = np.zeros(shape, arrays[name].dtype)
     filled[there] = arrays[name]
     return filled
-
-
-def _grids(shape: tuple[int, int, int]) -> list[tuple[tuple[int, int, int], ...]]:
-    """Shapes of a velocity on the grid of a density, and on those that are each half as fine."""
-    shapes = [shape]
-    while max(shapes[-1]) > 1:
-        shapes.append(halved(shapes[-1]))
-    return [face_shapes(coarser) for coarser in shapes]

@@ -237,8 +237,12 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
     surroundings, a plume then came within 0.2 to 1.3 % of its picture with 512 lights
     (docs/experiments/renderer-agreement.md).
     """
-    small = _coarse(domain)
-    view = _coarse_camera(camera, small)
+    voxel = max(domain.size) / REFERENCE_VOXELS
+    x, y, z = (max(round(edge / voxel), 1) for edge in domain.size)
+    small, (width, height) = domain.about_center((x, y, z), voxel), camera.size
+    # pixels about as wide as voxels at the domain's center
+    shrink = max(1.0, voxel_width(camera, small), max(width, height) / REFERENCE_PIXELS)
+    view = camera.resized(max(1, round(width / shrink)), max(1, round(height / shrink)))
     ball = _reference_density(small, medium)
     cells = EnvironmentCells(light)
 
@@ -252,20 +256,6 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
             break
         count, image = 2 * count, finer
     return count
-
-
-def _coarse(domain: Domain) -> Domain:
-    """The domain in few cubic voxels; where they do not fit its edges, to the nearest."""
-    voxel = max(domain.size) / REFERENCE_VOXELS
-    x, y, z = (max(round(edge / voxel), 1) for edge in domain.size)
-    return domain.about_center((x, y, z), voxel)
-
-
-def _coarse_camera(camera: Camera, domain: Domain) -> Camera:
-    """The camera with pixels about as wide as voxels at the domain's center."""
-    width, height = camera.size
-    shrink = max(1.0, voxel_width(camera, domain), max(width, height) / REFERENCE_PIXELS)
-    return camera.resized(max(1, round(width / shrink)), max(1, round(height / shrink)))
 
 
 def _reference_density(domain: Domain, medium: Medium) -> Volume:

@@ -178,7 +178,14 @@ def _box_around_smoke(camera: Camera, samples: SmokeSamples, meters: float) -> t
     distance = camera.fy * meters
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]
-    left, right, top, bottom = _smoke_bounds(samples, *camera.size)
+    # a hundredth of the smoke's pixels at each side may be noise or the last wisps; without smoke any box will do
+    rows, columns = np.nonzero(samples.covered if samples.covered.any() else ~samples.covered)
+    (left, right), (top, bottom) = (
+        (np.percentile(places, [1, 99]) + np.array([0, 1])) * samples.scale for places in (columns, rows)
+    )
+    margin = BOX_MARGIN * max(right - left, bottom - top)
+    left, right = max(left - margin, 0), min(right + margin, camera.size[0])
+    top, bottom = max(top - margin, 0), min(bottom + margin, camera.size[1])
     directions = _directions(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
     directions *= meters * (camera.fy / (directions @ along))[:, None]
     sideways, height = directions @ lateral, directions[:, 2]
@@ -209,16 +216,6 @@ def _domain_above(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     size = np.array(resolution) * voxel
     low = floor - size * (0.5, 0.5, 0)
     return Domain(low.tolist(), (low + size).tolist(), resolution)
-
-
-def _smoke_bounds(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
-    """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
-    # a hundredth of the smoke's pixels at each side may be noise or the last wisps; without smoke any box will do
-    rows, columns = np.nonzero(samples.covered if samples.covered.any() else ~samples.covered)
-    left, right = (float(v) * samples.scale for v in np.percentile(columns, [1, 99]) + np.array([0, 1]))
-    top, bottom = (float(v) * samples.scale for v in np.percentile(rows, [1, 99]) + np.array([0, 1]))
-    margin = BOX_MARGIN * max(right - left, bottom - top)
-    return max(left - margin, 0), min(right + margin, width), max(top - margin, 0), min(bottom + margin, height)
 
 
 def _smoke_detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> DetailSpectrum | None:

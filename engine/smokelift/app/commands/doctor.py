@@ -18,24 +18,20 @@ LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Say what is there, line by line."""
-    for line in _report():
-        say.note(line)
-
-
-def _report() -> list[str]:
     lines = [
         f"smokelift {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}",
         "libraries: " + ", ".join(f"{name} {_version(name)}" for name in LIBRARIES),
         f"core: {_core.__file__}, {counted(os.cpu_count() or 1, 'processor core')}, "
         f"{psutil.virtual_memory().available / 2**30:.1f} of {psutil.virtual_memory().total / 2**30:.1f} GiB free",
+        f"GPU: {_gpu(device.start())}",
     ]
-    lines.append(f"GPU: {_gpu(device.start())}")
     try:
         module = vdb_module()
         lines.append(f"OpenVDB: {module.__name__} {'.'.join(map(str, module.LIBRARY_VERSION))}")
     except VdbUnavailable as missing:
         lines.append(f"OpenVDB: missing. {missing}")
-    return lines
+    for line in lines:
+        say.note(line)
 
 
 def _version(name: str) -> str:

@@ -68,7 +68,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         require_memory(resolution, work, given=isinstance(scene.domain, Domain))
         for finding in (*shot.findings, *expected_shortcomings(shot), *made_up(shot)):
             say.note(finding)
-        finished, new = _finished(options), set[int]()
+        goes_on, new = options.resume and (options.out / INDEX).is_file(), set[int]()
+        finished = len(Sequence.open(options.out).frames) if goes_on else 0
         seconds = frames_seconds(resolution, work) * (1 - finished / shot.length)
         say.start(
             shot.length,
@@ -101,13 +102,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
     done = Finding("written", result) if fit is None else Finding("reconstructed", {**result, "psnr": fit})
     say.finish(done, {**result, "psnr": fit})
-
-
-def _finished(options: argparse.Namespace) -> int:
-    """Number of frames that the run goes on after."""
-    if not options.resume or not (options.out / INDEX).is_file():
-        return 0
-    return len(Sequence.open(options.out).frames)
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
