@@ -94,7 +94,9 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
     require_export(sequence, out)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _clear(out)
+        for path in out.iterdir():  # of an earlier export
+            if _OWN.fullmatch(path.name) or path.name == USD:
+                path.unlink()
         export = _Export(sequence, settings, _peak(sequence, sequence.frames, settings))
         note = {**export.note(), "complete": False}
         write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
@@ -268,10 +270,3 @@ def _rounded(values: Array, step: float) -> Array:
 
 def _power_of_two(value: float) -> float:
     return 2.0 ** math.floor(math.log2(value))
-
-
-def _clear(out: Path) -> None:
-    """Delete the frames of an earlier export."""
-    for path in out.iterdir():
-        if _OWN.fullmatch(path.name) or path.name == USD:
-            path.unlink()

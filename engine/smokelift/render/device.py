@@ -101,7 +101,5 @@ def products_on_one_thread() -> AbstractContextManager[Any]:
     return limit
 
 
-@lru_cache(maxsize=1)
-def _libraries() -> ThreadpoolController:
-    """Return the libraries that are loaded; to find them takes as long as a picture."""
-    return ThreadpoolController()
+_libraries = lru_cache(maxsize=1)(ThreadpoolController)
+"""The libraries that are loaded; to find them takes as long as a picture."""

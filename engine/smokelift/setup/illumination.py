@@ -62,17 +62,12 @@ def first_light(
         )
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
-        still, domain = geometry.camera.at(0), geometry.domain
-        return (
-            tuple(
-                replace(each, directions=environment_count(each, still, domain, medium))
-                if isinstance(each, EnvironmentLight) and each.directions is None
-                else each
-                for each in lights
-            ),
-            richest,
-            [],
-        )
+        still, whole = geometry.camera.at(0), list(lights)
+        for number, each in enumerate(lights):
+            if isinstance(each, EnvironmentLight) and each.directions is None:
+                count = environment_count(each, still, geometry.domain, medium)
+                whole[number] = replace(each, directions=count)
+        return tuple(whole), richest, []
     found, about = estimate.source, "source radiance"
     if found is None:
         source = source_radiance(estimate.samples)

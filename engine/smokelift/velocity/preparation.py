@@ -88,11 +88,8 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
     """Standard deviation of white noise in a density, from its finest scale inside the smoke."""
     finest, inside = density, smoke
     for axis in range(3):
-        low, high = (
-            tuple(part if d == axis else slice(None) for d in range(3)) for part in (slice(1, None), slice(-1))
-        )
-        finest = (finest[low] - finest[high]) / np.float32(np.sqrt(2.0))
-        inside = inside[low] & inside[high]
+        finest = np.diff(finest, axis=axis) / np.float32(np.sqrt(2.0))
+        inside = np.delete(inside, 0, axis) & np.delete(inside, -1, axis)
     if not inside.any():
         return 0.0
     return float(np.median(np.abs(finest[inside]))) / MAD
