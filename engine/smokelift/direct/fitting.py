@@ -153,7 +153,8 @@ def _first_typical(states: Sequence[SmokeState]) -> int:
 
 def _replayed(simulation: Simulation) -> Simulation:
     """The simulation of the clip itself: step n goes to state n, and what entered then enters."""
-    return Simulation(simulation.physics, simulation.inflow.forwards(), Surroundings(), simulation.dt)
+    inflow = replace(simulation.inflow, states=simulation.inflow.states[::-1])
+    return Simulation(simulation.physics, inflow, Surroundings(), simulation.dt)
 
 
 def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:

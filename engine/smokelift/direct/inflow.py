@@ -9,7 +9,7 @@ smoke that is faster than the velocity looks like a wide, weak one.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -71,10 +71,6 @@ class Inflow:
         """The state that is replayed so many steps after the last one."""
         last = len(self.states) - 1
         return self.states[abs(last - step % (2 * last))] if last else self.states[0]
-
-    def forwards(self) -> "Inflow":
-        """The inflow from the first state on, so that step n replays state n."""
-        return replace(self, states=self.states[::-1])
 
     @property
     def box(self) -> tuple[slice, ...]:

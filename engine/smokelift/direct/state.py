@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from smokelift.output.sequence import Sequence
 from smokelift.transport import Array, Velocity, advect, divergence, on_faces, project
 from smokelift.transport.constraint import FaceMasks, project_with_given_faces
 
-Carried = TypeVar("Carried", Array, Velocity)
 Mix = Callable[[Array, Array, float], Array]
 """Mixes two densities or emissions by a fraction: 0 gives the first."""
 
@@ -97,23 +95,15 @@ def interpolate(
         return before
     if fraction > 1 - RESOLVED:
         return after
-    midway = advect_back(motion, motion, (1 - fraction) * dt)
+    done, rest = fraction * dt, (1 - fraction) * dt
+    midway = advect(motion, motion.with_faces(-component for component in motion.faces), rest)
+    back = midway.with_faces(-component for component in midway.faces)
 
     def blended(first: Array, second: Array) -> Array:
-        forwards = advect(first, midway, fraction * dt, conserve=True)
-        return mix(forwards, advect_back(second, midway, (1 - fraction) * dt), fraction)
+        return mix(advect(first, midway, done, conserve=True), advect(second, back, rest, conserve=True), fraction)
 
     density = blended(before.density, after.density)
     flame = None if before.flame is None or after.flame is None else blended(before.flame, after.flame)
-    velocities = (
-        advect(before.velocity, midway, fraction * dt),
-        advect_back(after.velocity, midway, (1 - fraction) * dt),
-    )
+    velocities = advect(before.velocity, midway, done), advect(after.velocity, back, rest)
     faces = (blend(a, b, fraction) for a, b in zip(velocities[0].faces, velocities[1].faces, strict=True))
     return SmokeState(density, project(before.velocity.with_faces(faces)), flame)
-
-
-def advect_back(field: Carried, velocity: Velocity, dt: float) -> Carried:
-    """Advect a density or a velocity against a velocity (m/s): to where it was `dt` seconds ago."""
-    backwards = velocity.with_faces(-component for component in velocity.faces)
-    return advect(field, backwards, dt, conserve=not isinstance(field, Velocity))

@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from smokelift.checks import Doubles
 from smokelift.direct.state import SmokeState
-from smokelift.transport import Array, Faces, Velocity, at_centres, on_faces
+from smokelift.transport import Array, Velocity, at_centres, on_faces
 
 MODES = 64
 """Waves in the sum: enough that it shows no pattern."""
@@ -98,9 +98,11 @@ def with_small_eddies(velocity: Velocity, density: Array, speed: float, step: in
     energy adds to its own.
     """
     faces = list(velocity.faces)
-    smoke, near = _on_faces(density)
+    smoke = _in_smoke(density)
+    soft = ndimage.uniform_filter(smoke, EDGE_VOXELS)
+    inside, near = (on_faces(np.stack([each] * 3, -1)) for each in (smoke, soft))
     for number, (size, found) in enumerate(_octaves(velocity)):
-        missing = 3 * speed**2 - sum(_mean_squares(found, smoke))
+        missing = 3 * speed**2 - sum(_mean_squares(found, inside))
         if missing > 0:
             eddies = Turbulence(missing**0.5, size * velocity.voxel_size, step * len(SIZES) + number)
             added = eddies.velocity(velocity, 0.0)
@@ -121,13 +123,6 @@ def _octaves(velocity: Velocity) -> Iterator[tuple[float, list[Array]]]:
 def _in_smoke(density: Array) -> Array:
     """1 in the smoke, 0 elsewhere."""
     return np.asarray((density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32))
-
-
-def _on_faces(density: Array) -> tuple[Faces, Faces]:
-    """1 on faces in the smoke, 0 elsewhere; and the same, with soft edges."""
-    smoke = _in_smoke(density)
-    inside, near = (on_faces(np.stack([each] * 3, -1)) for each in (smoke, ndimage.uniform_filter(smoke, EDGE_VOXELS)))
-    return inside, near
 
 
 def _mean_squares(components: Sequence[Array], weights: Sequence[Array]) -> list[float]:
