@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.density.turntable import Turntable
@@ -93,7 +92,9 @@ def orbit_scores(
             true = _pictures(orbit, true_smoke, AZIMUTHS)
             references, sharp = [PatchStatistics.of(picture) for picture in true], list(map(mean_gradient, true))
             _add_distances(own, [*references[OWN_STEP:], *references[:OWN_STEP]], references)
-            outline = _outline(true)
+            brightest = np.max(true, axis=0)  # wherever the smoke is seen from
+            shown = brightest > OUTLINE_FRACTION * brightest.max()
+            outline = np.asarray(ndimage.binary_dilation(shown, iterations=OUTLINE_MARGIN))
             beyond = ((float(picture[~outline].sum()), float(picture.sum())) for picture in pictures)
             found["halo"].append([_ratio(*sums) for sums in beyond])
         _add_distances(found, [PatchStatistics.of(picture) for picture in pictures], references)
@@ -154,14 +155,6 @@ def _flicker(orbit: Orbit, densities: list[Volume], azimuths: tuple[int, ...]) -
 
 def _pictures(orbit: Orbit, density: Volume, azimuths: tuple[int, ...]) -> list[Array]:
     return [orbit.picture(density, degrees) for degrees in azimuths]
-
-
-def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
-    """Pixels (rows, columns) of the turntable's screen that show smoke at any azimuth, with a margin."""
-    brightest = np.max(pictures, axis=0)
-    return np.asarray(
-        ndimage.binary_dilation(brightest > OUTLINE_FRACTION * brightest.max(), iterations=OUTLINE_MARGIN)
-    )
 
 
 def _ratio(value: float, reference: float) -> float | None:
