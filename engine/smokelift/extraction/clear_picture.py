@@ -39,7 +39,7 @@ from smokelift.footage.images import (
     linear_to_srgb,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
+from smokelift.footage.inpainting import DETAIL, ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
 from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
@@ -123,13 +123,12 @@ class ClearPicture:
     correction: Picture
 
 
-def clear_picture(proxy: Proxy, noise: Noise, detail: float, painted: Mask | None = None) -> ClearPicture:
-    """Return the background of pictures of one exposure.
+def clear_picture(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> ClearPicture:
+    """Return the background of pictures of one exposure, whose file has a ``noise``.
 
-    ``detail`` is `DETAIL` at their size: the standard deviation of that Gaussian in their pixels. Where smoke is
-    ``painted`` (rows, columns), what never changes is smoke, and no frame shows what is behind it.
+    Where smoke is ``painted`` (rows, columns), what never changes is smoke, and no frame shows what is behind it.
     """
-    width = smoothing(noise)
+    width = smoothing(noise.averaged(proxy.scale**2))
     pictures, seen = proxy.pictures, proxy.seen
     weights = _most_changed(proxy.encoded[:, ::STRIDE, ::STRIDE], seen[:, ::STRIDE, ::STRIDE])
     values = np.stack([blurred(encoded @ weights, width) for encoded in proxy.encoded])
@@ -154,26 +153,24 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float, painted: Mask | Non
         # beside it the smoothed values change as well
         never |= painted & (blurred((painted & calm).astype(np.float32), width) > MIN_STANDING)
     known, calm = in_one_piece(known & ~never), calm & ~never
-    if not known.all():
-        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
-        unlike = np.abs(_unlike(image, known).mean(-1))
-        known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * unlike >= window + DRIFT)))
-        # or if no channel differs from them by more than a drift: smoke hardly changes a background of its own color
-        unlike = brightest_channel(np.abs(_unlike(image, known)))
-        known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known)
+    # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
+    unlike = np.abs(_unlike(image, known).mean(-1))
+    known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * unlike >= window + DRIFT)))
+    # or if no channel differs from them by more than a drift: smoke hardly changes a background of its own color
+    unlike = brightest_channel(np.abs(_unlike(image, known)))
+    known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known) & ~never
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
-    if never.any():
-        known &= ~never
-        mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
-        image[never] = srgb_to_linear(mean[never])
+    mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
+    image[never] = srgb_to_linear(mean[never])
     # smoke thins out beside where it is seen
     hidden = np.asarray(1 - (clear & seen).sum(0) / np.maximum(seen.sum(0), 1), np.float32)
     hidden = np.maximum(hidden, blurred(hidden, SEEN_WIDTH * max(hidden.shape)))
     smoke = SMOKE_LEFT * window * hidden
     steady = in_one_piece(known & (change <= window) & (smoke < EIGHT_BIT_STEP / 2))
     correction = _correction(image, known, steady, weights, smoke)
-    whole, contrast = _completed(image + correction, known, mean, brightness, brightens, detail, weights)
+    finer_than = DETAIL / proxy.scale
+    whole, contrast = _completed(image + correction, known, mean, brightness, brightens, finer_than, weights)
     return ClearPicture(whole, known, clear, contrast, correction)
 
 
@@ -316,8 +313,6 @@ def _completed(
     J + T (B - J) of a background B. The mean's coarse part, compared with the continued surroundings, gives T; its
     detail divided by T is the background's.
     """
-    if known.all():
-        return image, np.ones(known.shape, np.float32)
     smooth = push_pull(linear_to_srgb(image), known.astype(np.float32))
     coarse = blurred(mean, finer_than)
     contrast = smooth @ weights - brightness

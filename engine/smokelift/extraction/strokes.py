@@ -59,17 +59,17 @@ class Strokes:
 def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> Plate:
     """Return a plate with what strokes say of it; behind smoke before ``one_color`` is that color for certain.
 
-    The clip is at the plate's exposure.
-    ClipError is raised if a frame cannot be read, or if nothing is left that is not smoke.
+    The clip is at the plate's exposure. ClipError is raised if a frame cannot be read, or if nothing is left that is
+    not smoke.
     """
     image, confidence, seen = plate.image.copy(), plate.confidence.copy(), strokes.other | strokes.behind
     if seen.any():
         shown = [clip.frame(number)[seen] for number in clip.spread(MEDIAN_FRAMES)]
         image[seen], confidence[seen] = np.median(shown, axis=0), 1
     if one_color:
-        image[strokes.smoke] = np.median(plate.image.reshape(-1, 3), axis=0)
-        return replace(plate, image=image, confidence=confidence)
-    confidence[strokes.smoke] = 0
+        image[strokes.smoke] = np.median(plate.image, axis=(0, 1))
+    else:
+        confidence[strokes.smoke] = 0
     if not confidence.any():
         raise ClipError("The strokes leave nothing that is not smoke; leave free, or paint blue, what is behind it.")
     # a stroke says nothing of what is unknown elsewhere, which may have detail of its own
