@@ -87,10 +87,6 @@ MAX_CELLS = 192
 SOURCE_FRAMES, SOURCE_SIDE = 4, 64
 """Frames, and cells along their longer side, from which the source radiance is found."""
 
-LIT_PERCENTILE = 90
-"""Percentile of what thick smoke sends that an assumed light has to reach: with 99 T of three composed clips is off by
-.02 to .04 more, with 75 the picture of a real one loses 2 dB (measured)."""
-
 HUE = 2 * MODEL_ERROR
 """Smallest difference of two colors over their brightness, root mean square, from which on they differ: both may be
 off by the model's error. Skies differ from white by .2 to .3, a gray wall by .01."""
@@ -258,18 +254,6 @@ def _nearest_to_white(source: Picture, behind: Picture) -> Picture:
     cost = np.log1p(np.square(hue / HUE)) + np.square(np.log(times) / np.log(SOURCE_FACTOR))
     cost[(line < MIN_CHROMA * brightness[:, None]).any(-1)] = np.inf
     return np.asarray(line[cost.argmin()], np.float32)
-
-
-def brightest_smoke(clip: Clip, plate: Plate, frame: int, source: Picture) -> float:
-    """Return the radiance that the brightest thick smoke of a frame sends, S of its element; 0 without any.
-
-    ``source`` (3,) is the usual one. Smoke sends no more than its source radiance, so a light has to make that at least
-    as bright.
-    """
-    picture = clip.stored(frame).linear()
-    element = extract_element(picture, plate.at(frame), source, reduced_size(*clip.size, SOURCE_SIDE))
-    sent = channel_mean(element.radiance)[element.transmittance < 0.5]
-    return float(np.percentile(sent, LIT_PERCENTILE)) if sent.size else 0.0
 
 
 def shows_transmittance(plate: Picture, source: Picture) -> bool:
