@@ -22,16 +22,16 @@ from smokelift.checks import Mask
 from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,
+    MAX_CELLS,
     MIN_VARIANCE,
     OUTLIER_FREEDOM,
+    SOURCE_SIDE,
     Cells,
     compared_size,
     extracted,
     first_source,
-    source_cells,
     source_in,
     source_of,
-    source_size,
 )
 from smokelift.extraction.plate import Plate, resized
 from smokelift.footage.clip import Clip
@@ -41,6 +41,9 @@ from smokelift.footage.noise import EIGHT_BIT_STEP
 FRAMES, SIDE, TURNS = 8, 96, 4
 """Frames that are extracted, cells along their longer side, and turns. More frames and turns change T rms by .001,
 twice the cells by .004 and .01, for four times the time (docs/experiments/hidden-plate.md)."""
+
+SOURCE_FRAMES = 4
+"""Frames from which the source radiance is found."""
 
 SOURCES, MAX_LOSS_RATIO = 6, 0.99
 """Most J that are found in turn, each from the plate of the one before, and the loss of the next over the one before
@@ -80,14 +83,15 @@ def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int])
 
     Both clips are at the plate's exposure; ``smoky`` are frames of the clip, those with the most smoke first.
     """
+    thickest = SomeFrames.of(clip, plate, sorted(smoky[:SOURCE_FRAMES]), SOURCE_SIDE, MAX_CELLS)
+    seen = thickest.before(thickest.plate)
     if plate.images is not None or is_known(plate):
-        return plate, source_in(source_cells(clip, plate, smoky))
-    frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip, plate.finest))
-    seen = source_cells(clip, small, smoky)
+        return plate, source_in(seen)
+    frames = SomeFrames.of(shot, plate, shot.spread(FRAMES), SIDE)
     starts = [likeliest(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):
-        start = likeliest(frames, source_in(source_cells(clip, frames.with_plate(small, turned), smoky)))
+        start = likeliest(frames, source_in(thickest.before(frames.with_plate(thickest.plate, turned))))
         if start.loss > MAX_LOSS_RATIO * turned.loss:
             break
         turned = in_turn(frames, start)
@@ -128,12 +132,17 @@ class SomeFrames:
     cells: tuple[int, int]
 
     @staticmethod
-    def of(clip: Clip, plate: Plate) -> "SomeFrames":
-        """Read the frames of a clip at its plate's exposure."""
-        cells, numbers = reduced_size(*clip.size, SIDE), clip.spread(FRAMES)
-        columns, rows = compared_size(cells, clip.size, plate.finest)
-        pictures = [clip.stored(frame).averaged(columns, rows) for frame in numbers]
-        return SomeFrames(clip, numbers, pictures, resized(plate, (columns, rows)), cells)
+    def of(clip: Clip, plate: Plate, numbers: Sequence[int], side: int, as_of: int = 0) -> "SomeFrames":
+        """Read frames of a clip at its plate's exposure, for cells along the longer ``side``; see `compared_size`."""
+        cells = reduced_size(*clip.size, side)
+        size = compared_size(cells, clip.size, plate.finest, as_of)
+        pictures = [clip.stored(frame).averaged(*size) for frame in numbers]
+        return SomeFrames(clip, numbers, pictures, resized(plate, size), cells)
+
+    def before(self, plate: Plate) -> list[Cells]:
+        """Return the cells of the frames before a plate of their size."""
+        shown = zip(self.numbers, self.pictures, strict=True)
+        return [Cells.of(picture, plate.at(number), self.cells) for number, picture in shown]
 
     def with_plate(self, plate: Plate, found: HiddenPlate) -> Plate:
         """Return a plate of any size as it is after the turns: better known where its confidence is less than 1."""
@@ -155,8 +164,8 @@ def in_turn(frames: SomeFrames, start: HiddenPlate) -> HiddenPlate:
     for _ in range(TURNS):
         found = replace(plate, image=_changed(plate, turned.image - behind))
         best, clearest = np.zeros_like(start.left), start.image
-        for picture in frames.pictures:
-            shown, weight = _shown(Cells.of(picture, found, frames.cells), start.source)
+        for cells in frames.before(found):
+            shown, weight = _shown(cells, start.source)
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
         left = 1 / (1 + variance * best)
@@ -181,7 +190,7 @@ def likeliest(frames: SomeFrames, source: Picture) -> HiddenPlate:
     there as well, so neighbors decide together.
     """
     pictures, plate, size = frames.pictures, frames.plate, frames.cells
-    shown = [Cells.of(picture, plate, size) for picture in pictures]
+    shown = frames.before(plate)
     start = shown[0].behind
     where = shown[0].unknown > MIN_UNKNOWN
     continued = _continuations(start, ~where)
