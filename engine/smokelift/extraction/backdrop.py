@@ -19,7 +19,7 @@ from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spre
 from smokelift.extraction.given_background import mean_of_frames, read_background
 from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plate, uncovered, without_noise_light
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
-from smokelift.extraction.strokes import PAINTED, Strokes, stroked_plate, without_others
+from smokelift.extraction.strokes import PAINTED, Strokes, stroked
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
 from smokelift.footage.inpainting import continuation_errors
@@ -124,8 +124,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     one_color = said.color is not None or (said.estimated and found.source != "picture")
     # a picture was found with what is painted as smoke
     left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if found.source == "picture" else strokes
-    plate = stroked_plate(left, plate, found.clip, one_color)
-    clip = without_others(strokes, found.clip, plate)
+    plate, clip = stroked(left, plate, found.clip, one_color)
     return replace(found, clip=clip, plate=plate, background=said, strokes=strokes)
 
 
@@ -141,13 +140,7 @@ def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMot
             "zoom mends that. Give a plate that the clip's camera filmed from the same place, or frames of the clip "
             "without smoke."
         )
-    return (clip, None) if motion is None else (_registered(clip, motion), motion)
-
-
-def _registered(clip: Clip, motion: CameraMotion) -> Clip:
-    """A clip whose frames are registered as they lie on a reference."""
-    size = reduced_size(*clip.size, PROXY_SIDE)
-    return clip.registered(lambda number, frame: motion.at(number, lambda: frame.averaged(*size)))
+    return (clip, None) if motion is None else (clip.registered(motion.at), motion)
 
 
 def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion | None = None) -> Backdrop:
@@ -183,23 +176,19 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
         if shaken == "other":
             raise ValueError(MOVING_CAMERA)
         if shaken is not None:
-            return _estimated(_registered(filmed, shaken), moves, smoke, shaken)
-    shot = part.numbers[0], part.numbers[-1]
-
-    def made(source: Source, plate: Plate) -> Backdrop:
-        exposed = clip.exposed(plate.gain)
-        return Backdrop(source, exposed, plate, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
-
+            return _estimated(filmed.registered(shaken.at), moves, smoke, shaken)
     source: Source = "color"
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
-        shown = part.with_still()
+        shown, source = part.with_still(), "picture"
         plate = _picture(clip, shown, white, smoke)
-        if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
-            return made("picture", plate)
-        # fog drifts over all of the file: treat it as filmed before black
-        color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    return made(source, _of_one_color(clip, part, color, objects, white))
+        if plate.confidence.mean() < MIN_KNOWN * shown.seen.any(0).mean():
+            # fog drifts over all of the file: treat it as filmed before black
+            color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
+    if color is not None:
+        plate = _of_one_color(clip, part, color, objects, white)
+    shot = part.numbers[0], part.numbers[-1]
+    return Backdrop(source, clip.exposed(plate.gain), plate, None, len(part.numbers), shot, cut, motion=motion)
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Plate:

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.checks import Mask
 from smokelift.extraction.matte import smoothing
@@ -343,17 +344,20 @@ def whole_plate(clip: Clip, proxy: Proxy, found: ClearPicture) -> Picture:
         return found.image
     shown = (found.clear & found.known)[::STEP]
     known = shown.any(0)
-    whole = _mean(clip, proxy.numbers[::STEP], proxy.gains[::STEP], np.where(known, shown, True))
+    y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
+    file, whole = clip.whole(), np.zeros((*clip.size[::-1], 3), np.float32)
+    shown = np.where(known, shown, True)
+    times = shown.sum(0, dtype=np.float32)[..., None]
+    for number, gain, clear in zip(proxy.numbers[::STEP], proxy.gains[::STEP], shown, strict=True):
+        file.stored(number).add_weighted(clear[..., None] / (gain * times), (y, x), whole)
     whole += area_average(found.correction, *clip.size)
     if known.all():
         return whole
-    rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))
     (top, down), (left, right) = (
-        (max(0, int(lines[0]) - DETAIL_MARGIN), min(n, int(lines[-1]) + 1 + DETAIL_MARGIN))
-        for lines, n in ((rows, known.shape[0]), (columns, known.shape[1]))
+        (max(0, lines.start - DETAIL_MARGIN), min(n, lines.stop + DETAIL_MARGIN))
+        for lines, n in zip(ndimage.find_objects((~known).astype(np.uint8))[0], known.shape, strict=True)
     )
     small = np.s_[top:down, left:right]
-    y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
     part = np.s_[y[top] : y[down], x[left] : x[right]]
     size = x[right] - x[left], y[down] - y[top]
     mean = linear_to_srgb(whole[part])
@@ -370,17 +374,6 @@ def spread_out(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """Return values (rows, columns) of small pixels, repeated over a picture of a size (width, height)."""
     rows, columns = (np.diff(_edges(*sizes)) for sizes in zip(values.shape, size[::-1], strict=True))
     return np.repeat(np.repeat(values, rows, axis=0), columns, axis=1)
-
-
-def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[np.bool_]) -> Picture:
-    """The linear mean of a file's full frames where they are ``shown`` (frames, rows, columns of the proxy)."""
-    file, width, height = clip.whole(), *clip.size
-    down, across = (_edges(*each) for each in zip(shown.shape[1:], (height, width), strict=True))
-    total = np.zeros((height, width, 3), np.float32)
-    times = shown.sum(0, dtype=np.float32)[..., None]
-    for number, gain, clear in zip(numbers, gains, shown, strict=True):
-        file.stored(number).add_weighted(clear[..., None] / (gain * times), (down, across), total)
-    return total
 
 
 def _edges(count: int, pixels: int) -> Edges:

@@ -56,11 +56,11 @@ class Strokes:
         return Strokes(green, red, blue)
 
 
-def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> Plate:
-    """Return a plate with what strokes say of it; behind smoke before ``one_color`` is that color for certain.
+def stroked(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> tuple[Plate, Clip]:
+    """Return a plate with what strokes say of it, and a clip at its exposure that shows it in place of other things.
 
-    The clip is at the plate's exposure. ClipError is raised if a frame cannot be read, or if nothing is left that is
-    not smoke.
+    Behind smoke before ``one_color`` is that color for certain. ClipError is raised if a frame cannot be read, or if
+    nothing is left that is not smoke.
     """
     image, confidence, seen = plate.image.copy(), plate.confidence.copy(), strokes.other | strokes.behind
     if seen.any():
@@ -77,12 +77,7 @@ def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -
     unknown = (confidence == 0) & np.isin(patches, patches[strokes.smoke | seen])
     image[unknown] = srgb_to_linear(push_pull(linear_to_srgb(image), confidence))[unknown]
     errors = plate.errors if plate.errors.any() else continuation_errors(image, confidence > 0)
-    return replace(plate, image=image, confidence=confidence, errors=errors)
-
-
-def without_others(strokes: Strokes, clip: Clip, plate: Plate) -> Clip:
-    """Return a clip at its plate's exposure that shows the plate where it is painted as no smoke."""
-    if not strokes.other.any():
-        return clip
-    other = strokes.other[..., None]
-    return shown_behind(clip, plate, lambda _, picture: np.where(other, np.float32(np.nan), picture))
+    plate, other = replace(plate, image=image, confidence=confidence, errors=errors), strokes.other[..., None]
+    if other.any():
+        clip = shown_behind(clip, plate, lambda _, picture: np.where(other, np.float32(np.nan), picture))
+    return plate, clip
