@@ -293,9 +293,8 @@ def find_motion(proxy: Proxy) -> CameraMotion | Literal["other"] | None:
     if not _some_move([match(n) for n in some]):
         return None
     found = _registered_to_median(proxy, [match(n) for n in range(count)])
-    if found is None:
-        black = (brightest_channel(proxy.encoded) <= BLACK).mean() >= MIN_BLACK
-        return None if black else "other"
+    if found is None and (brightest_channel(proxy.encoded) <= BLACK).mean() < MIN_BLACK:
+        return "other"
     return found
 
 

@@ -9,15 +9,10 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
   the background. The value is that of the channels' mean, with the weights that smoke changes most: gray smoke before a
   wall of its own brightness changes the wall's hue alone.
 
-A pixel that only drifts is clear as well if it differs from its surroundings by no more than a codec's drift, or by so
-much that smoke would change it more. Its clearest moment may still hold some smoke, and so may a pixel beside smoke
-that never changes. So before a smooth wall both count less than what is continued from steady pixels, which are away
-from all smoke. All else is continued smoothly from around it; its detail is
-that of the frames' mean, and the contrast that smoke takes from that is restored. The error is measured where the
-background is known.
-
-Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
-whole frames.
+A pixel that only drifts may be clear as well. Its clearest moment may still hold some smoke, and so may a pixel beside
+smoke that never changes: `_correction` takes that away before a smooth wall. All else is continued from around it, by
+`_completed`. Clear areas are as smooth as smoke, so a proxy is enough to find them; `whole_plate` takes the
+background's detail from whole frames.
 """
 
 from dataclasses import dataclass

@@ -172,12 +172,12 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
     return source_in([Cells.compared(picture, plate, size, MAX_CELLS) for picture, plate in pictures])
 
 
-def compared_size(cells: tuple[int, int], whole: tuple[int, int], finest: float, as_of: int = 0) -> tuple[int, int]:
+def compared_size(cells: tuple[int, int], whole: tuple[int, int], finest: float, detail_of: int = 0) -> tuple[int, int]:
     """Return the numbers of columns and rows of the pixels whose detail cells of a ``whole`` picture compare.
 
-    It is the detail of cells of which there are ``as_of`` along the longer side, if these are fewer.
+    They show as much detail as so many cells along the longer side do, ``detail_of``, if these are fewer.
     """
-    finer = FINER * max(1.0, as_of / max(cells))
+    finer = FINER * max(1.0, detail_of / max(cells))
     most = (max(1, round(count / finest)) for count in whole)
     columns, rows = (min(round(finer * count), of) for count, of in zip(cells, most, strict=True))
     return columns, rows
@@ -311,10 +311,10 @@ class Cells:
         return self.moments[..., 24]
 
     @staticmethod
-    def compared(picture: Picture, plate: Plate, size: tuple[int, int], as_of: int = 0) -> Cells:
+    def compared(picture: Picture, plate: Plate, size: tuple[int, int], detail_of: int = 0) -> Cells:
         """Average a whole picture and its plate down to what is compared, see `compared_size`, and to cells."""
         rows, columns = picture.shape[:2]
-        compared = compared_size(size, (columns, rows), plate.finest, as_of)
+        compared = compared_size(size, (columns, rows), plate.finest, detail_of)
         return Cells.of(area_average(picture, *compared), resized(plate, compared), size)
 
     @staticmethod

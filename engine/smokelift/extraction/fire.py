@@ -112,7 +112,7 @@ def fire_color(clip: Clip, light: Clip) -> Vector:
         whole += weighted.sum((0, 1), dtype=np.float64)
         certain += weighted[picture.max(-1) < CLIPPED_VALUE].sum(0, dtype=np.float64)
     total = certain if certain.any() else whole
-    red, green, blue = (float(value) for value in (total / total.max()).round(3))
+    red, green, blue = map(float, (total / total.max()).round(3))
     return red, green, blue
 
 

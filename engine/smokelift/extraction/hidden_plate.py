@@ -132,10 +132,10 @@ class SomeFrames:
     cells: tuple[int, int]
 
     @staticmethod
-    def of(clip: Clip, plate: Plate, numbers: Sequence[int], side: int, as_of: int = 0) -> "SomeFrames":
-        """Read frames of a clip at its plate's exposure, for cells along the longer ``side``; see `compared_size`."""
+    def of(clip: Clip, plate: Plate, numbers: Sequence[int], side: int, detail_of: int = 0) -> "SomeFrames":
+        """Read frames at their plate's exposure, for so many cells along the longer ``side``; see `compared_size`."""
         cells = reduced_size(*clip.size, side)
-        size = compared_size(cells, clip.size, plate.finest, as_of)
+        size = compared_size(cells, clip.size, plate.finest, detail_of)
         pictures = [clip.stored(frame).averaged(*size) for frame in numbers]
         return SomeFrames(clip, numbers, pictures, resized(plate, size), cells)
 
