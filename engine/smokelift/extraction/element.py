@@ -137,8 +137,7 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     rows), at most the picture's; its pixels are means.
     """
     columns, rows = size
-    shrink = max(1.0, max(size) / MAX_CELLS)
-    cells = Cells.compared(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
+    cells = Cells.compared(picture, plate, reduced_size(columns, rows, MAX_CELLS))
     fields, deviation, weight = extracted(cells, source)
     deviation = blurred(deviation, WINDOW_BLUR)
     lasting = plate.noise.shared * linear_per_srgb(linear_to_srgb(cells.seen))
@@ -270,9 +269,7 @@ def _strength(values: Picture) -> float:
 def extracted(cells: Cells, source: Picture) -> tuple[Picture, Picture, Picture]:
     """Return opacity and fields of J, deviation of T and weight of the data by cell; see `_core.extract`."""
     rows, columns = cells.moments.shape[:2]
-    deviations = scale_deviations((columns, rows))
-    errors = cells.errors[np.triu_indices(3)].tolist()
-    prior = (errors, deviations, OUTLIER_FREEDOM)
+    prior = cells.errors[np.triu_indices(3)].tolist(), scale_deviations((columns, rows)), OUTLIER_FREEDOM
     return _core.extract(cells.moments, source.tolist(), *prior, cells.pixels, ROUNDS, ITERATIONS)
 
 
