@@ -6,7 +6,7 @@ loop.
 
 from smokelift.density import reconstruct_density
 from smokelift.evaluation import metrics
-from smokelift.extraction import Element
+from smokelift.extraction.element import Element
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Extraction, Frame, Reconstruction, extract, reconstruct

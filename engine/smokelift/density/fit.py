@@ -21,7 +21,7 @@ from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
-from smokelift.extraction import extract_element, shows_transmittance, usual_source
+from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import backdrop_color, background_picture
 from smokelift.extraction.plate import Plate
 from smokelift.render import Image, Volume, scene_optics

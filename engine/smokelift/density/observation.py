@@ -15,7 +15,7 @@ import smokelift._core as _core
 from smokelift.checks import radiance, require_kind
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.density.upright_plane import AxisEstimate
-from smokelift.extraction import Element
+from smokelift.extraction.element import Element
 from smokelift.extraction.matte import certainty, matte
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import area_average, channel_mean

@@ -6,21 +6,3 @@ that show it clear; ``strokes`` correct it. ``camera_motion`` finds how the came
 and where smoke always covers it ``hidden_plate`` finds the likeliest one. ``matte`` finds the smoke: it differs from
 the plate by more than noise. ``element`` is the smoke of a frame, S and T, without its plate.
 """
-
-from smokelift.extraction.element import (
-    Element,
-    brightest_smoke,
-    extract_element,
-    shows_transmittance,
-    usual_source,
-)
-from smokelift.extraction.hidden_plate import plate_and_source
-
-__all__ = [
-    "Element",
-    "brightest_smoke",
-    "extract_element",
-    "plate_and_source",
-    "shows_transmittance",
-    "usual_source",
-]

@@ -19,10 +19,10 @@ from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spre
 from smokelift.extraction.given_background import mean_of_frames, read_background
 from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plate, uncovered, without_noise_light
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
-from smokelift.extraction.strokes import PAINTED, Strokes, stroked_plate, without_others
+from smokelift.extraction.strokes import PAINTED, Strokes, stroked
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
-from smokelift.footage.inpainting import DETAIL, continuation_errors
+from smokelift.footage.inpainting import continuation_errors
 from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, lasting_noise, median_of_seen, noise_of, spread_about
 from smokelift.scene import Background, Camera
 
@@ -46,18 +46,6 @@ MOVING_CAMERA = (
     "as background. If the camera stood still, give one clean plate, or a color."
 )
 """Message that refuses a clip."""
-
-PLATE_ELSEWHERE = (
-    "The clean plate does not lie on the clip: what both show is in other places, and no shift, rotation or zoom "
-    "mends that. Give a plate that the clip's camera filmed from the same place, or frames of the clip without smoke."
-)
-"""Message that refuses a clean plate."""
-
-STROKES_OVER_ONE_FRAME = (
-    "Strokes are painted over one frame, but what is behind the smoke changes from frame to frame. Leave them out, or "
-    "stabilize the clip and give one picture as background."
-)
-"""Message that refuses strokes."""
 
 Source = Literal["alpha", "given", "color", "color around one frame", "black for want of a picture", "picture"]
 
@@ -100,17 +88,12 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
     strokes are given.
     """
     gray = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
-    behind, moves = gray or background, camera is not None and camera.moves
-    if moves and behind is not None and behind.frame is not None:
+    said, moves = gray or background or Background(), camera is not None and camera.moves
+    frames = said.frame
+    if moves and frames:
         raise ValueError(MOVING_CAMERA)
-    strokes = None
-    if background is not None and background.strokes is not None and gray is None:
-        strokes = Strokes.read(background.strokes, clip.size)
-    frames = None if behind is None else behind.frame
-    if frames:
-        given: Picture | Clip | None = mean_of_frames(frames[:1], clip)
-    else:
-        given = None if behind is None else read_background(behind, camera)
+    strokes = None if said.strokes is None else Strokes.read(said.strokes, clip.size)
+    given = mean_of_frames(frames[:1], clip) if frames else read_background(said, camera)
     clip, motion = _on_plate(clip, given)
     if given is None:
         found = _estimated(clip, moves, None if strokes is None else strokes.smoke)
@@ -125,22 +108,24 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             noise, (plate, shown) = plate.noise, known(quiet)
             plate = replace(plate, noise=noise)
-        if behind is not None and behind.color is None:
+        if said.color is None:
             # one that many frames show has lost as much detail to the codec as they have; one color has none
             plate = replace(plate, finest=finest_detail(clip))
-        found = Backdrop("alpha" if gray else "given", shown, plate, behind, motion=motion)
+        found = Backdrop("alpha" if gray else "given", shown, plate, said, motion=motion)
     plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)
-    if background is None or strokes is None:
+    if strokes is None:
         return found
     if moves or plate.images is not None:
-        raise ValueError(STROKES_OVER_ONE_FRAME)
-    one_color = background.color is not None or (background.estimated and found.source != "picture")
+        raise ValueError(
+            "Strokes are painted over one frame, but what is behind the smoke changes from frame to frame. Leave them "
+            "out, or stabilize the clip and give one picture as background."
+        )
+    one_color = said.color is not None or (said.estimated and found.source != "picture")
     # a picture was found with what is painted as smoke
     left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if found.source == "picture" else strokes
-    plate = stroked_plate(left, plate, found.clip, one_color)
-    clip = without_others(strokes, found.clip, plate)
-    return replace(found, clip=clip, plate=plate, background=background, strokes=strokes)
+    plate, clip = stroked(left, plate, found.clip, one_color)
+    return replace(found, clip=clip, plate=plate, background=said, strokes=strokes)
 
 
 def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMotion | None]:
@@ -150,14 +135,12 @@ def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMot
     texture = Texture(area_average(plate, *reduced_size(*clip.size, PROXY_SIDE)))
     motion = motion_before(texture, Proxy.of(clip, beyond=False)) if texture.enough else None
     if motion == "other":
-        raise ValueError(PLATE_ELSEWHERE)
-    return (clip, None) if motion is None else (_registered(clip, motion), motion)
-
-
-def _registered(clip: Clip, motion: CameraMotion) -> Clip:
-    """A clip whose frames are registered as they lie on a reference."""
-    size = reduced_size(*clip.size, PROXY_SIDE)
-    return clip.registered(lambda number, frame: motion.at(number, lambda: frame.averaged(*size)))
+        raise ValueError(
+            "The clean plate does not lie on the clip: what both show is in other places, and no shift, rotation or "
+            "zoom mends that. Give a plate that the clip's camera filmed from the same place, or frames of the clip "
+            "without smoke."
+        )
+    return (clip, None) if motion is None else (clip.registered(motion.at), motion)
 
 
 def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion | None = None) -> Backdrop:
@@ -182,10 +165,9 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
         if color is None or objects.any() or passes_by:
             raise ValueError(MOVING_CAMERA)
-        red, green, blue = (float(v) for v in color)
-        behind = Background(color=(red, green, blue))
+        red, green, blue = map(float, color)
         plate, clip = known_plate(color, clip)
-        return Backdrop("color", clip, plate, behind, len(proxy.numbers))
+        return Backdrop("color", clip, plate, Background(color=(red, green, blue)), len(proxy.numbers))
     # black, or a color seen often, is the same wherever the camera points; any other may be texture that passes by
     often = found.clear > SEEN_OFTEN and white.max() <= TEXTURE
     plain = color is not None and (often or not color.any())
@@ -194,23 +176,19 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
         if shaken == "other":
             raise ValueError(MOVING_CAMERA)
         if shaken is not None:
-            return _estimated(_registered(filmed, shaken), moves, smoke, shaken)
-    shot = part.numbers[0], part.numbers[-1]
-
-    def made(source: Source, plate: Plate) -> Backdrop:
-        exposed = clip.exposed(plate.gain)
-        return Backdrop(source, exposed, plate, frames=len(part.numbers), shot=shot, cut=cut, motion=motion)
-
+            return _estimated(filmed.registered(shaken.at), moves, smoke, shaken)
     source: Source = "color"
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
-        shown = part.with_still()
+        shown, source = part.with_still(), "picture"
         plate = _picture(clip, shown, white, smoke)
-        if plate.confidence.mean() >= MIN_KNOWN * shown.seen.any(0).mean():
-            return made("picture", plate)
-        # fog drifts over all of the file: treat it as filmed before black
-        color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
-    return made(source, _of_one_color(clip, part, color, objects, white))
+        if plate.confidence.mean() < MIN_KNOWN * shown.seen.any(0).mean():
+            # fog drifts over all of the file: treat it as filmed before black
+            color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
+    if color is not None:
+        plate = _of_one_color(clip, part, color, objects, white)
+    shot = part.numbers[0], part.numbers[-1]
+    return Backdrop(source, clip.exposed(plate.gain), plate, None, len(part.numbers), shot, cut, motion=motion)
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Plate:
@@ -218,7 +196,7 @@ def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Pl
     rows, columns = proxy.seen.shape[1:]
     painted = None if smoke is None else area_average(smoke, columns, rows) >= PAINTED
     noise = proxy.noise_about(median_of_seen(proxy.pictures), white)
-    picture = clear_picture(proxy, noise.averaged(proxy.scale**2), DETAIL / proxy.scale, painted)
+    picture = clear_picture(proxy, noise, painted)
     known = spread_out(picture.known, clip.size).astype(np.float32)
     image, noise = whole_plate(clip, proxy, picture), proxy.noise_about(picture.image, white)
     return Plate(image, known, noise, continuation_errors(picture.image, picture.known))

@@ -92,11 +92,9 @@ class Hypothesis:
 
 def likeliest(proxy: Proxy, white: Picture) -> Hypothesis:
     """Return the likeliest background of frames of one exposure; ``white`` (3,) is their pixels' noise."""
-    every, shape = _blocks(proxy)
-    visible = _visible(proxy, shape)
-    values = every[:, visible]
-    (rows, columns), pixels = proxy.seen.shape[1:], np.prod(proxy.seen.shape[1:])
-    limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / pixels) / proxy.scale))
+    values, visible = _blocks(proxy)
+    rows, columns = proxy.seen.shape[1:]
+    limit = _limit(values, white * np.float32(np.sqrt(visible.size / (rows * columns)) / proxy.scale))
     jump = -float(np.log(2 * limit.mean()))
     goes_on = _goes_on(values, limit, jump)
     empty = within(values, limit)
@@ -121,11 +119,10 @@ def likeliest(proxy: Proxy, white: Picture) -> Hypothesis:
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         color = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
         color[linear_to_srgb(color) < EIGHT_BIT_STEP / 2] = 0
-        objects = np.zeros(len(visible), np.bool_)
+        objects = np.zeros_like(visible)
         objects[visible] = stands & still
-        before = spread_out(objects.reshape(shape), (columns, rows))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
-        table.append(Hypothesis(total, color, before, float(clear.mean())))
+        table.append(Hypothesis(total, color, spread_out(objects, (columns, rows)), float(clear.mean())))
     return min(table, key=lambda each: each.cost)
 
 
@@ -142,7 +139,7 @@ def color_around(picture: Picture) -> tuple[float, float, float] | None:
     alike = [(np.abs(side - color) <= MAX_SIDE_DIFFERENCE).all(-1) for side in sides[0]]
     if sum(side.mean() >= MIN_SIDE_FRACTION for side in alike) < 3:
         return None
-    red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
+    red, green, blue = map(float, np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
     return red, green, blue
 
 
@@ -170,12 +167,17 @@ def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
     return np.asarray(np.minimum(is_clear, is_smoke), np.float32)
 
 
-def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
-    """The colors of blocks (frames, blocks, 3), in sRGB values, and the numbers of rows and columns of blocks."""
+def _blocks(proxy: Proxy) -> tuple[Picture, Mask]:
+    """The colors (frames, n, 3) of blocks, in sRGB values, and which of all (rows, columns) those n are.
+
+    No mask hides them in any frame; if there are none, one frame at least shows them.
+    """
     rows, columns = proxy.seen.shape[1:]
-    wide, high = reduced_size(columns, rows, BLOCKS)
-    values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
-    return values.reshape(len(values), -1, 3), (high, wide)
+    size = reduced_size(columns, rows, BLOCKS)
+    seen = np.stack([area_average(shown, *size) > MIN_SEEN_FRACTION for shown in proxy.seen])
+    visible = seen.all(0) if seen.all(0).any() else seen.any(0)
+    values = [linear_to_srgb(area_average(picture, *size))[visible] for picture in proxy.pictures]
+    return np.stack(values), visible
 
 
 def _limit(values: Picture, white: Picture) -> Picture:
@@ -223,12 +225,3 @@ def within(deviations: Picture, limit: Picture) -> Mask:
     """Return where deviations (..., 3) are within a limit (3,)."""
     red, green, blue = (np.abs(deviations[..., channel]) <= limit[channel] for channel in range(3))
     return np.asarray(red & green & blue)
-
-
-def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:
-    """Blocks (n,) that no mask hides in any frame; if there are none, those that one frame at least shows."""
-    rows, columns = shape
-    shown = np.stack(
-        [area_average(seen.astype(np.float32), columns, rows).ravel() > MIN_SEEN_FRACTION for seen in proxy.seen]
-    )
-    return np.asarray(shown.all(0) if shown.all(0).any() else shown.any(0))

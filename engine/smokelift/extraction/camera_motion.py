@@ -6,7 +6,7 @@ where it is, each its own way. So the camera of a frame has moved if most of the
 similarity that moves them, and hardly any are in place (docs/experiments/turning-camera.md).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal
@@ -16,8 +16,9 @@ import numpy.typing as npt
 from scipy import fft
 
 from smokelift.checks import Doubles, Indices, Mask
-from smokelift.extraction.proxy import Proxy
-from smokelift.footage.images import Picture, blurred, brightest_channel, channel_mean, linear_to_srgb
+from smokelift.extraction.proxy import PROXY_SIDE, Proxy
+from smokelift.footage.frame_source import StoredPicture
+from smokelift.footage.images import Picture, blurred, brightest_channel, channel_mean, linear_to_srgb, reduced_size
 from smokelift.footage.noise import median_of_seen
 from smokelift.footage.registration import IDENTITY, Similarity, corners
 
@@ -268,11 +269,11 @@ class CameraMotion:
     reference: int | None
     """Number in the file of the frame that the others are registered to; None if they are to a given picture."""
 
-    def at(self, number: int, small: Callable[[], Picture]) -> Similarity:
-        """Return the motion in a frame, by its number in the file and what makes its linear picture in small."""
+    def at(self, number: int, frame: StoredPicture) -> Similarity:
+        """Return the motion in a frame, by its number in the file and what is stored of it."""
         if number in self.measured:
             return self.measured[number]
-        picture = small()
+        picture = frame.averaged(*reduced_size(*frame.size, PROXY_SIDE))
         match = self.texture.match(picture)
         if match.registers(picture.shape):
             return match.motion
@@ -292,9 +293,8 @@ def find_motion(proxy: Proxy) -> CameraMotion | Literal["other"] | None:
     if not _some_move([match(n) for n in some]):
         return None
     found = _registered_to_median(proxy, [match(n) for n in range(count)])
-    if found is None:
-        black = (brightest_channel(proxy.encoded) <= BLACK).mean() >= MIN_BLACK
-        return None if black else "other"
+    if found is None and (brightest_channel(proxy.encoded) <= BLACK).mean() < MIN_BLACK:
+        return "other"
     return found
 
 

@@ -9,15 +9,10 @@ A pixel is clear, and has one value within the noise, or it is smoke, and has an
   the background. The value is that of the channels' mean, with the weights that smoke changes most: gray smoke before a
   wall of its own brightness changes the wall's hue alone.
 
-A pixel that only drifts is clear as well if it differs from its surroundings by no more than a codec's drift, or by so
-much that smoke would change it more. Its clearest moment may still hold some smoke, and so may a pixel beside smoke
-that never changes. So before a smooth wall both count less than what is continued from steady pixels, which are away
-from all smoke. All else is continued smoothly from around it; its detail is
-that of the frames' mean, and the contrast that smoke takes from that is restored. The error is measured where the
-background is known.
-
-Clear areas are as smooth as smoke, so a proxy is enough to find them. `whole_plate` takes the background's detail from
-whole frames.
+A pixel that only drifts may be clear as well. Its clearest moment may still hold some smoke, and so may a pixel beside
+smoke that never changes: `_correction` takes that away before a smooth wall. All else is continued from around it, by
+`_completed`. Clear areas are as smooth as smoke, so a proxy is enough to find them; `whole_plate` takes the
+background's detail from whole frames.
 """
 
 from dataclasses import dataclass
@@ -25,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.checks import Mask
 from smokelift.extraction.matte import smoothing
@@ -39,7 +35,7 @@ from smokelift.footage.images import (
     linear_to_srgb,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
+from smokelift.footage.inpainting import DETAIL, ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
 from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0
@@ -123,13 +119,12 @@ class ClearPicture:
     correction: Picture
 
 
-def clear_picture(proxy: Proxy, noise: Noise, detail: float, painted: Mask | None = None) -> ClearPicture:
-    """Return the background of pictures of one exposure.
+def clear_picture(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> ClearPicture:
+    """Return the background of pictures of one exposure, whose file has a ``noise``.
 
-    ``detail`` is `DETAIL` at their size: the standard deviation of that Gaussian in their pixels. Where smoke is
-    ``painted`` (rows, columns), what never changes is smoke, and no frame shows what is behind it.
+    Where smoke is ``painted`` (rows, columns), what never changes is smoke, and no frame shows what is behind it.
     """
-    width = smoothing(noise)
+    width = smoothing(noise.averaged(proxy.scale**2))
     pictures, seen = proxy.pictures, proxy.seen
     weights = _most_changed(proxy.encoded[:, ::STRIDE, ::STRIDE], seen[:, ::STRIDE, ::STRIDE])
     values = np.stack([blurred(encoded @ weights, width) for encoded in proxy.encoded])
@@ -154,26 +149,24 @@ def clear_picture(proxy: Proxy, noise: Noise, detail: float, painted: Mask | Non
         # beside it the smoothed values change as well
         never |= painted & (blurred((painted & calm).astype(np.float32), width) > MIN_STANDING)
     known, calm = in_one_piece(known & ~never), calm & ~never
-    if not known.all():
-        # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
-        unlike = np.abs(_unlike(image, known).mean(-1))
-        known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * unlike >= window + DRIFT)))
-        # or if no channel differs from them by more than a drift: smoke hardly changes a background of its own color
-        unlike = brightest_channel(np.abs(_unlike(image, known)))
-        known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known)
+    # a pixel that only drifts is background if it is so unlike its surroundings that smoke would change it more,
+    unlike = np.abs(_unlike(image, known).mean(-1))
+    known = in_one_piece(known | (calm & (MIN_CHANGE_FRACTION * unlike >= window + DRIFT)))
+    # or if no channel differs from them by more than a drift: smoke hardly changes a background of its own color
+    unlike = brightest_channel(np.abs(_unlike(image, known)))
+    known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known) & ~never
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
-    if never.any():
-        known &= ~never
-        mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
-        image[never] = srgb_to_linear(mean[never])
+    mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
+    image[never] = srgb_to_linear(mean[never])
     # smoke thins out beside where it is seen
     hidden = np.asarray(1 - (clear & seen).sum(0) / np.maximum(seen.sum(0), 1), np.float32)
     hidden = np.maximum(hidden, blurred(hidden, SEEN_WIDTH * max(hidden.shape)))
     smoke = SMOKE_LEFT * window * hidden
     steady = in_one_piece(known & (change <= window) & (smoke < EIGHT_BIT_STEP / 2))
     correction = _correction(image, known, steady, weights, smoke)
-    whole, contrast = _completed(image + correction, known, mean, brightness, brightens, detail, weights)
+    finer_than = DETAIL / proxy.scale
+    whole, contrast = _completed(image + correction, known, mean, brightness, brightens, finer_than, weights)
     return ClearPicture(whole, known, clear, contrast, correction)
 
 
@@ -316,8 +309,6 @@ def _completed(
     J + T (B - J) of a background B. The mean's coarse part, compared with the continued surroundings, gives T; its
     detail divided by T is the background's.
     """
-    if known.all():
-        return image, np.ones(known.shape, np.float32)
     smooth = push_pull(linear_to_srgb(image), known.astype(np.float32))
     coarse = blurred(mean, finer_than)
     contrast = smooth @ weights - brightness
@@ -348,17 +339,20 @@ def whole_plate(clip: Clip, proxy: Proxy, found: ClearPicture) -> Picture:
         return found.image
     shown = (found.clear & found.known)[::STEP]
     known = shown.any(0)
-    whole = _mean(clip, proxy.numbers[::STEP], proxy.gains[::STEP], np.where(known, shown, True))
+    y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
+    file, whole = clip.whole(), np.zeros((*clip.size[::-1], 3), np.float32)
+    shown = np.where(known, shown, True)
+    times = shown.sum(0, dtype=np.float32)[..., None]
+    for number, gain, clear in zip(proxy.numbers[::STEP], proxy.gains[::STEP], shown, strict=True):
+        file.stored(number).add_weighted(clear[..., None] / (gain * times), (y, x), whole)
     whole += area_average(found.correction, *clip.size)
     if known.all():
         return whole
-    rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))
     (top, down), (left, right) = (
-        (max(0, int(lines[0]) - DETAIL_MARGIN), min(n, int(lines[-1]) + 1 + DETAIL_MARGIN))
-        for lines, n in ((rows, known.shape[0]), (columns, known.shape[1]))
+        (max(0, lines.start - DETAIL_MARGIN), min(n, lines.stop + DETAIL_MARGIN))
+        for lines, n in zip(ndimage.find_objects((~known).astype(np.uint8))[0], known.shape, strict=True)
     )
     small = np.s_[top:down, left:right]
-    y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
     part = np.s_[y[top] : y[down], x[left] : x[right]]
     size = x[right] - x[left], y[down] - y[top]
     mean = linear_to_srgb(whole[part])
@@ -375,17 +369,6 @@ def spread_out(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """Return values (rows, columns) of small pixels, repeated over a picture of a size (width, height)."""
     rows, columns = (np.diff(_edges(*sizes)) for sizes in zip(values.shape, size[::-1], strict=True))
     return np.repeat(np.repeat(values, rows, axis=0), columns, axis=1)
-
-
-def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[np.bool_]) -> Picture:
-    """The linear mean of a file's full frames where they are ``shown`` (frames, rows, columns of the proxy)."""
-    file, width, height = clip.whole(), *clip.size
-    down, across = (_edges(*each) for each in zip(shown.shape[1:], (height, width), strict=True))
-    total = np.zeros((height, width, 3), np.float32)
-    times = shown.sum(0, dtype=np.float32)[..., None]
-    for number, gain, clear in zip(numbers, gains, shown, strict=True):
-        file.stored(number).add_weighted(clear[..., None] / (gain * times), (down, across), total)
-    return total
 
 
 def _edges(count: int, pixels: int) -> Edges:

@@ -16,9 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks import Mask
 from smokelift.extraction.plate import Plate, noise_at, resized
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, reduced_size
 from smokelift.footage.noise import linear_per_srgb
 
@@ -84,12 +82,8 @@ MIN_VARIANCE = 1e-12
 MAX_CELLS = 192
 """Cells along the longer side: T and J have no finer detail that a plate could show."""
 
-SOURCE_FRAMES, SOURCE_SIDE = 4, 64
-"""Frames, and cells along their longer side, from which the source radiance is found."""
-
-LIT_PERCENTILE = 90
-"""Percentile of what thick smoke sends that an assumed light has to reach: with 99 T of three composed clips is off by
-.02 to .04 more, with 75 the picture of a real one loses 2 dB (measured)."""
+SOURCE_SIDE = 64
+"""Cells along the longer side of pictures from which the source radiance is found."""
 
 HUE = 2 * MODEL_ERROR
 """Smallest difference of two colors over their brightness, root mean square, from which on they differ: both may be
@@ -143,8 +137,7 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     rows), at most the picture's; its pixels are means.
     """
     columns, rows = size
-    shrink = max(1.0, max(size) / MAX_CELLS)
-    cells = Cells.compared(picture, plate, (max(1, round(columns / shrink)), max(1, round(rows / shrink))))
+    cells = Cells.compared(picture, plate, reduced_size(columns, rows, MAX_CELLS))
     fields, deviation, weight = extracted(cells, source)
     deviation = blurred(deviation, WINDOW_BLUR)
     lasting = plate.noise.shared * linear_per_srgb(linear_to_srgb(cells.seen))
@@ -175,31 +168,15 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
 
     The pictures are reduced to a ``size`` (columns, rows).
     """
-    finer = FINER * max(1.0, MAX_CELLS / max(size))  # detail shows as much as in an element, if it is in fewer cells
-    return source_in([Cells.compared(picture, plate, size, finer) for picture, plate in pictures])
+    return source_in([Cells.compared(picture, plate, size, MAX_CELLS) for picture, plate in pictures])
 
 
-def source_size(clip: Clip, finest: float) -> tuple[int, int]:
-    """Return the numbers of columns and rows of the pixels that `source_cells` are made of."""
-    cells = reduced_size(*clip.size, SOURCE_SIDE)
-    return compared_size(cells, clip.size, finest, FINER * MAX_CELLS / max(cells))
+def compared_size(cells: tuple[int, int], whole: tuple[int, int], finest: float, detail_of: int = 0) -> tuple[int, int]:
+    """Return the numbers of columns and rows of the pixels whose detail cells of a ``whole`` picture compare.
 
-
-def source_cells(clip: Clip, plate: Plate, frames: Sequence[int]) -> list[Cells]:
-    """Return cells of the first of some frames of a clip before its plate, of which `source_in` finds J.
-
-    ``frames`` (one at least) have those with the most smoke first. The plate may be `resized` to `source_size`.
+    They show as much detail as so many cells along the longer side do, ``detail_of``, if these are fewer.
     """
-    size, cells = source_size(clip, plate.finest), reduced_size(*clip.size, SOURCE_SIDE)
-    numbers = sorted(frames[:SOURCE_FRAMES])
-    shown = [(clip.stored(frame).averaged(*size), resized(plate.at(frame), size)) for frame in numbers]
-    return [Cells.of(picture, behind, cells) for picture, behind in shown]
-
-
-def compared_size(
-    cells: tuple[int, int], whole: tuple[int, int], finest: float, finer: float = FINER
-) -> tuple[int, int]:
-    """Return the numbers of columns and rows of the pixels whose detail cells of a ``whole`` picture compare."""
+    finer = FINER * max(1.0, detail_of / max(cells))
     most = (max(1, round(count / finest)) for count in whole)
     columns, rows = (min(round(finer * count), of) for count, of in zip(cells, most, strict=True))
     return columns, rows
@@ -209,11 +186,14 @@ def first_source(seen: Sequence[Cells]) -> Picture:
     """Return the J (3,) that the search starts from: that of what brightens the plates most.
 
     It is gray unless its hue is far from that: half of it may be what is behind the smoke. If nothing brightens the
-    plates, it is gray and as bright as the brightest pixels.
+    plates beyond the noise of a pixel, it is gray and as bright as the brightest pixels.
     """
-    lit = np.concatenate([cells.seen[cells.brightened] for cells in seen])
-    if len(lit):
-        first = np.percentile(lit, START_PERCENTILE, axis=0)
+    lit = []
+    for cells in seen:
+        variance = cells.noise.mean(-1) + cells.unknown * np.trace(cells.errors) / 3
+        lit.append(cells.seen[channel_mean(cells.seen - cells.behind) > 3 * np.sqrt(variance)])
+    if any(map(len, lit)):
+        first = np.percentile(np.concatenate(lit), START_PERCENTILE, axis=0)
     else:
         first = np.full(3, np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
     gray = np.full(3, first.mean())
@@ -260,18 +240,6 @@ def _nearest_to_white(source: Picture, behind: Picture) -> Picture:
     return np.asarray(line[cost.argmin()], np.float32)
 
 
-def brightest_smoke(clip: Clip, plate: Plate, frame: int, source: Picture) -> float:
-    """Return the radiance that the brightest thick smoke of a frame sends, S of its element; 0 without any.
-
-    ``source`` (3,) is the usual one. Smoke sends no more than its source radiance, so a light has to make that at least
-    as bright.
-    """
-    picture = clip.stored(frame).linear()
-    element = extract_element(picture, plate.at(frame), source, reduced_size(*clip.size, SOURCE_SIDE))
-    sent = channel_mean(element.radiance)[element.transmittance < 0.5]
-    return float(np.percentile(sent, LIT_PERCENTILE)) if sent.size else 0.0
-
-
 def shows_transmittance(plate: Picture, source: Picture) -> bool:
     """Whether a plate (rows, columns, 3) shows how much of it smoke of a source radiance (3,) lets through.
 
@@ -301,9 +269,7 @@ def _strength(values: Picture) -> float:
 def extracted(cells: Cells, source: Picture) -> tuple[Picture, Picture, Picture]:
     """Return opacity and fields of J, deviation of T and weight of the data by cell; see `_core.extract`."""
     rows, columns = cells.moments.shape[:2]
-    deviations = scale_deviations((columns, rows))
-    errors = cells.errors[np.triu_indices(3)].tolist()
-    prior = (errors, deviations, OUTLIER_FREEDOM)
+    prior = cells.errors[np.triu_indices(3)].tolist(), scale_deviations((columns, rows)), OUTLIER_FREEDOM
     return _core.extract(cells.moments, source.tolist(), *prior, cells.pixels, ROUNDS, ITERATIONS)
 
 
@@ -341,17 +307,11 @@ class Cells:
         """How much of the plate is not known, (rows, columns)."""
         return self.moments[..., 24]
 
-    @property
-    def brightened(self) -> Mask:
-        """Cells (rows, columns) that something makes brighter than the plate, beyond the noise of a pixel."""
-        change = channel_mean(self.seen - self.behind)
-        return np.asarray(change > 3 * np.sqrt(self.noise.mean(-1) + self.unknown * np.trace(self.errors) / 3))
-
     @staticmethod
-    def compared(picture: Picture, plate: Plate, size: tuple[int, int], finer: float = FINER) -> Cells:
-        """Average a whole picture and its plate down to what is compared, ``finer`` than a cell, and to cells."""
+    def compared(picture: Picture, plate: Plate, size: tuple[int, int], detail_of: int = 0) -> Cells:
+        """Average a whole picture and its plate down to what is compared, see `compared_size`, and to cells."""
         rows, columns = picture.shape[:2]
-        compared = compared_size(size, (columns, rows), plate.finest, finer)
+        compared = compared_size(size, (columns, rows), plate.finest, detail_of)
         return Cells.of(area_average(picture, *compared), resized(plate, compared), size)
 
     @staticmethod

@@ -76,12 +76,13 @@ def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
 
     ``colors`` and ``behind`` are the linear radiance (n, 3) of the smoke's pixels and of their background.
     """
-    fire, brightest = _hot(colors, behind), brightest_channel(colors)
+    warm, strong = _like_fire(colors, behind)
+    fire = warm & strong
     if not fire.any():
         return HotPixels(0.0, 0.0)
-    added = brightest_channel(colors - behind)
+    added, brightest = brightest_channel(colors - behind), brightest_channel(colors)
     # a core clipped to yellow or white does not show its color
-    other = ~_warm(colors) & (brightest > MIN_COLORED_VALUE) & (brightest < CLIPPED_VALUE)
+    other = ~warm & (brightest > MIN_COLORED_VALUE) & (brightest < CLIPPED_VALUE)
     bright = colors[..., 0] > WHITE_RED
     if other.mean() >= MIN_SMOKE_FRACTION:
         bright |= added > MIN_BRIGHTNESS_RATIO * np.percentile(added[other], 95)
@@ -111,16 +112,20 @@ def fire_color(clip: Clip, light: Clip) -> Vector:
         whole += weighted.sum((0, 1), dtype=np.float64)
         certain += weighted[picture.max(-1) < CLIPPED_VALUE].sum(0, dtype=np.float64)
     total = certain if certain.any() else whole
-    red, green, blue = (float(value) for value in (total / total.max()).round(3))
+    red, green, blue = map(float, (total / total.max()).round(3))
     return red, green, blue
 
 
 def _doused(picture: Picture, plate: Plate) -> Picture:
-    """A picture with the smoke beside fire continued over it, or itself if it shows no fire."""
+    """A picture with the smoke beside fire, its glow and its core continued over it, or itself if it shows no fire."""
     smoke = matte(picture, plate).mask
-    fire = _fire(picture, plate.image, smoke)
+    warm, strong = _like_fire(picture, plate.image)
+    # the core is clipped to yellow and white
+    fire = ndimage.binary_propagation(warm & strong & smoke, mask=(warm | strong) & smoke)
     if not fire.any():
         return picture
+    width = max(1, round(GLOW * max(picture.shape[:2])))
+    fire = ndimage.binary_dilation(ndimage.binary_fill_holes(fire), iterations=width)
     beside = smoke & ~fire
     if not beside.any():
         return np.where(fire[..., None], plate.image, picture)
@@ -128,19 +133,7 @@ def _doused(picture: Picture, plate: Plate) -> Picture:
     return np.where(fire[..., None], picture[rows, columns], picture)
 
 
-def _hot(colors: Picture, behind: Picture) -> Mask:
-    """Whether light of a fire's color and strength is added."""
-    return _warm(colors) & (colors[..., 0] - behind[..., 0] > MIN_FLAME_RED)
-
-
-def _warm(colors: Picture) -> Mask:
+def _like_fire(colors: Picture, behind: Picture) -> tuple[Mask, Mask]:
+    """Whether light is of a fire's color, and whether it adds as much to what is ``behind`` it."""
     red, green, blue = np.moveaxis(colors, -1, 0)
-    return np.asarray((green < WARM * red) & (blue < WARM * green))
-
-
-def _fire(picture: Picture, behind: Picture, smoke: Mask) -> Mask:
-    """Fire with its glow and its core, which is clipped to yellow and white."""
-    joined = smoke & (_warm(picture) | (picture[..., 0] - behind[..., 0] > MIN_FLAME_RED))
-    fire = ndimage.binary_propagation(_hot(picture, behind) & smoke, mask=joined)
-    width = max(1, round(GLOW * max(picture.shape[:2])))
-    return np.asarray(ndimage.binary_dilation(ndimage.binary_fill_holes(fire), iterations=width))
+    return (green < WARM * red) & (blue < WARM * green), red - behind[..., 0] > MIN_FLAME_RED

@@ -22,16 +22,16 @@ from smokelift.checks import Mask
 from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,
+    MAX_CELLS,
     MIN_VARIANCE,
     OUTLIER_FREEDOM,
+    SOURCE_SIDE,
     Cells,
     compared_size,
     extracted,
     first_source,
-    source_cells,
     source_in,
     source_of,
-    source_size,
 )
 from smokelift.extraction.plate import Plate, resized
 from smokelift.footage.clip import Clip
@@ -41,6 +41,9 @@ from smokelift.footage.noise import EIGHT_BIT_STEP
 FRAMES, SIDE, TURNS = 8, 96, 4
 """Frames that are extracted, cells along their longer side, and turns. More frames and turns change T rms by .001,
 twice the cells by .004 and .01, for four times the time (docs/experiments/hidden-plate.md)."""
+
+SOURCE_FRAMES = 4
+"""Frames from which the source radiance is found."""
 
 SOURCES, MAX_LOSS_RATIO = 6, 0.99
 """Most J that are found in turn, each from the plate of the one before, and the loss of the next over the one before
@@ -80,18 +83,19 @@ def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int])
 
     Both clips are at the plate's exposure; ``smoky`` are frames of the clip, those with the most smoke first.
     """
+    thickest = SomeFrames.of(clip, plate, sorted(smoky[:SOURCE_FRAMES]), SOURCE_SIDE, MAX_CELLS)
+    seen = thickest.before(thickest.plate)
     if plate.images is not None or is_known(plate):
-        return plate, source_in(source_cells(clip, plate, smoky))
-    frames, small = SomeFrames.of(shot, plate), resized(plate, source_size(clip, plate.finest))
-    seen = source_cells(clip, small, smoky)
+        return plate, source_in(seen)
+    frames = SomeFrames.of(shot, plate, shot.spread(FRAMES), SIDE)
     starts = [likeliest(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):
-        start = likeliest(frames, source_in(source_cells(clip, frames.with_plate(small, turned), smoky)))
-        if start.loss > MAX_LOSS_RATIO * turned.start.loss:
+        start = likeliest(frames, source_in(thickest.before(frames.with_plate(thickest.plate, turned))))
+        if start.loss > MAX_LOSS_RATIO * turned.loss:
             break
         turned = in_turn(frames, start)
-    return frames.with_plate(plate, turned), turned.start.source
+    return frames.with_plate(plate, turned), turned.source
 
 
 def is_known(plate: Plate) -> bool:
@@ -100,24 +104,17 @@ def is_known(plate: Plate) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
-    """The plate by cell (rows, columns, 3) that turns start from, with a source radiance (3,), and its mean loss.
+class HiddenPlate:
+    """The likeliest plate by cell (rows, columns, 3) before smoke of a source radiance (3,), and its mean loss.
 
     ``detail`` has a factor (rows, columns) for each frame: 1 / T where the plate has its detail, seen through smoke.
+    ``left`` (rows, columns, 1) is the part that turns leave unknown: 1 before them.
     """
 
     image: Picture
     source: Picture
     loss: float
     detail: list[Picture]
-
-
-@dataclass(frozen=True, eq=False)
-class Turned:
-    """What turns change of a plate by cell (rows, columns, 3), and the part (rows, columns, 1) ``left`` unknown."""
-
-    start: Start
-    change: Picture
     left: Picture
 
 
@@ -135,38 +132,45 @@ class SomeFrames:
     cells: tuple[int, int]
 
     @staticmethod
-    def of(clip: Clip, plate: Plate) -> "SomeFrames":
-        """Read the frames of a clip at its plate's exposure."""
-        cells, numbers = reduced_size(*clip.size, SIDE), clip.spread(FRAMES)
-        columns, rows = compared_size(cells, clip.size, plate.finest)
-        pictures = [clip.stored(frame).averaged(columns, rows) for frame in numbers]
-        return SomeFrames(clip, numbers, pictures, resized(plate, (columns, rows)), cells)
+    def of(clip: Clip, plate: Plate, numbers: Sequence[int], side: int, detail_of: int = 0) -> "SomeFrames":
+        """Read frames at their plate's exposure, for so many cells along the longer ``side``; see `compared_size`."""
+        cells = reduced_size(*clip.size, side)
+        size = compared_size(cells, clip.size, plate.finest, detail_of)
+        pictures = [clip.stored(frame).averaged(*size) for frame in numbers]
+        return SomeFrames(clip, numbers, pictures, resized(plate, size), cells)
 
-    def with_plate(self, plate: Plate, turned: Turned) -> Plate:
+    def before(self, plate: Plate) -> list[Cells]:
+        """Return the cells of the frames before a plate of their size."""
+        shown = zip(self.numbers, self.pictures, strict=True)
+        return [Cells.of(picture, plate.at(number), self.cells) for number, picture in shown]
+
+    def with_plate(self, plate: Plate, found: HiddenPlate) -> Plate:
         """Return a plate of any size as it is after the turns: better known where its confidence is less than 1."""
         size = plate.image.shape[1], plate.image.shape[0]
-        detail = turned.start.detail
-        plate = _with_detail(plate, detail, lambda each: self.clip.stored(self.numbers[each]).averaged(*size))
-        confidence = 1 - (1 - plate.confidence) * area_average(turned.left[..., 0], *size)
-        return replace(plate, image=_changed(plate, turned.change), confidence=confidence)
+        plate = _with_detail(plate, found.detail, lambda each: self.clip.stored(self.numbers[each]).averaged(*size))
+        confidence = 1 - (1 - plate.confidence) * area_average(found.left[..., 0], *size)
+        return replace(plate, image=_changed(plate, found.image - self.detailed(found)[1]), confidence=confidence)
+
+    def detailed(self, found: HiddenPlate) -> tuple[Plate, Picture]:
+        """Return the plate with the detail of what is ``found``, and that by cell, which the latter changes."""
+        plate = _with_detail(self.plate, found.detail, self.pictures.__getitem__)
+        return plate, area_average(plate.image, *self.cells)
 
 
-def in_turn(frames: SomeFrames, start: Start) -> Turned:
+def in_turn(frames: SomeFrames, start: HiddenPlate) -> HiddenPlate:
     """Change a plate and extract the smoke before it in turn."""
-    variance = float(np.trace(frames.plate.errors)) / 3
-    first = _with_detail(frames.plate, start.detail, frames.pictures.__getitem__)
-    behind = area_average(first.image, *frames.cells)
-    found = replace(first, image=_changed(first, start.image - behind))
+    variance, turned = float(np.trace(frames.plate.errors)) / 3, start
+    plate, behind = frames.detailed(start)
     for _ in range(TURNS):
-        best, clearest = np.zeros_like(behind[..., :1]), start.image
-        for picture in frames.pictures:
-            shown, weight = _shown(Cells.of(picture, found, frames.cells), start.source)
+        found = replace(plate, image=_changed(plate, turned.image - behind))
+        best, clearest = np.zeros_like(start.left), start.image
+        for cells in frames.before(found):
+            shown, weight = _shown(cells, start.source)
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
         left = 1 / (1 + variance * best)
-        change = start.image + (1 - left) * (clearest - start.image) - behind
-        found = replace(first, image=_changed(first, change))
-    return Turned(start, change, left)
+        turned = replace(start, image=start.image + (1 - left) * (clearest - start.image), left=left)
+    return turned
 
 
 class _Hypothesis(NamedTuple):
@@ -178,7 +182,7 @@ class _Hypothesis(NamedTuple):
     clear: float = 1.0
 
 
-def likeliest(frames: SomeFrames, source: Picture) -> Start:
+def likeliest(frames: SomeFrames, source: Picture) -> HiddenPlate:
     """Return the plate that best explains all frames as mixtures with smoke of a source radiance (3,).
 
     A frame's loss is that of the noise's Student t distribution at the likeliest T. The brightness of J varies by
@@ -186,7 +190,7 @@ def likeliest(frames: SomeFrames, source: Picture) -> Start:
     there as well, so neighbors decide together.
     """
     pictures, plate, size = frames.pictures, frames.plate, frames.cells
-    shown = [Cells.of(picture, plate, size) for picture in pictures]
+    shown = frames.before(plate)
     start = shown[0].behind
     where = shown[0].unknown > MIN_UNKNOWN
     continued = _continuations(start, ~where)
@@ -219,7 +223,8 @@ def likeliest(frames: SomeFrames, source: Picture) -> Start:
         for frame, (_, noise) in enumerate(seen):
             squares = np.full(len(nearby), np.inf)
             # I - (1 - T) J - T B = (I - J) - T (B - J), whose square and whose part along S are polynomials of T
-            terms = [_dot(one, other) for one, other in ((away[frame],) * 2, (away[frame], behind), (behind,) * 2)]
+            pairs = (away[frame],) * 2, (away[frame], behind), (behind,) * 2
+            terms = [np.einsum("nc,nc->n", *pair) for pair in pairs]
             along = away[frame] @ source, behind @ source
             for t in MIXTURES:
                 sent = (1 - t) * (along[0] - t * along[1])
@@ -240,7 +245,7 @@ def likeliest(frames: SomeFrames, source: Picture) -> Start:
         image[taken] = hypothesis.color[best == index]
         if hypothesis.frame >= 0:
             factors[hypothesis.frame][taken] = 1 / hypothesis.clear
-    return Start(image, source, float(least.mean()), list(factors))
+    return HiddenPlate(image, source, float(least.mean()), list(factors), np.ones_like(image[..., :1]))
 
 
 def _hypotheses(
@@ -308,11 +313,6 @@ def _prior_loss(plate: Picture, continued: NDArray[np.float64], errors: Picture,
     any_color = np.full((1, len(plate)), np.log(OBJECT) - np.log(np.maximum(extent, EIGHT_BIT_STEP)).sum() - peak)
     each = np.log((1 - OBJECT) / len(continued)) - 0.5 * squares
     return np.asarray(-np.logaddexp.reduce(np.concatenate([each, any_color]), axis=0))
-
-
-def _dot(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The products (n,) of colors (n, 3)."""
-    return np.asarray(np.einsum("nc,nc->n", one, other))
 
 
 def _shown(cells: Cells, source: Picture) -> tuple[Picture, Picture]:

@@ -90,22 +90,13 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
 def certainty(deviation: Picture, width: float, shared: Picture | float = 0.0) -> Picture:
     """Return the probability (rows, columns) that a pixel shows smoke, by its deviation in units of noise.
 
-    ``width`` is the standard deviation, in pixels, of the Gaussian that smoothed the deviation; ``shared`` is that of
-    noise that a patch of any size shares, in the deviation's units.
-    """
-    probability: Picture = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
-    probability[~_meaningful(deviation, 4 * np.pi * width**2, shared)] = 0
-    return probability
-
-
-def _meaningful(deviation: Picture, sample: float, shared: Picture | float) -> npt.NDArray[np.bool_]:
-    """Patches (rows, columns) of a deviation above `MIN_DEVIATION` that noise makes too rarely.
-
-    ``sample`` is the number of pixels that share all other noise. So the probability of a patch of noise is the product
-    of its samples' probabilities to deviate as far, and of that of the shift by ``shared`` noise that makes it largest.
+    It is 0 but in patches above `MIN_DEVIATION` that noise makes too rarely. ``width`` is the standard deviation, in
+    pixels, of the Gaussian that smoothed the deviation. ``shared`` is that of noise that a patch of any size shares, in
+    the deviation's units. The probability of a patch of noise is the product of its samples' probabilities to deviate
+    as far, and of that of the shift by shared noise that makes it largest.
     """
     patches, count = ndimage.label(deviation > MIN_DEVIATION, structure=np.ones((3, 3)))
-    inside = patches > 0
+    inside, sample = patches > 0, 4 * np.pi * width**2
     beyond, step = deviation[inside], np.broadcast_to(np.float32(shared), deviation.shape)[inside]
     rare = np.ones(count + 1, np.bool_)
     for shift in SHIFTS if np.any(step) else SHIFTS[:1]:
@@ -116,7 +107,8 @@ def _meaningful(deviation: Picture, sample: float, shared: Picture | float) -> n
         expected = np.log(max(deviation.size / sample, 1)) - surprise
         rare &= expected < np.log(FALSE_ALARMS)
     rare[0] = False
-    return np.asarray(rare[patches])
+    certain = np.clip((deviation - MIN_DEVIATION) / (FULL_DEVIATION - MIN_DEVIATION), 0, 1)
+    return np.where(rare[patches], certain, np.float32(0))
 
 
 def smoothing(noise: Noise) -> float:

@@ -50,9 +50,6 @@ number grows as the quantizer's step to the power of .6 (docs/experiments/extrac
 USUAL_QUANTIZER = 23.0
 """Quantizer of a video that does not say its own: x264's default, and the median of 28 public clips."""
 
-NO_NOISE = lasting_noise(0.0)
-"""Noise of a plate until it is measured (by definition)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Plate:
@@ -121,7 +118,7 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
     finite, or has too few frames.
     """
     (width, height), last = clip.size, clip.numbers[-1]
-    known = np.ones((height, width), np.float32)
+    known, unmeasured = np.ones((height, width), np.float32), lasting_noise(0.0)
     if isinstance(background, Clip):
         if last >= len(background):
             raise ValueError(
@@ -133,20 +130,21 @@ def known_plate(background: npt.ArrayLike | Clip, clip: Clip, *, filmed: bool = 
         def images(frame: int) -> Picture:
             return clip.as_held(area_average(background.frame(clip.numbers.start + frame), width, height))
 
-        plate = Plate(images(0), known, NO_NOISE, images=images, files=background.files)
-        return _measured(plate, np.zeros_like(plate.image), clip.exposed(plate.gain))
-    linear = np.asarray(background, np.float32)
-    color = linear.shape == (3,)
-    if not (color or (linear.ndim == 3 and linear.shape[2] == 3)) or not np.isfinite(linear).all():
-        raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
-    image = np.tile(linear, (height, width, 1)) if color else area_average(linear, width, height)
-    held = image if color or filmed else clip.as_held(image)
-    plate = Plate(held, known, NO_NOISE)
-    return _measured(plate, np.abs(held - image), clip.exposed(plate.gain))
+        image = images(0)
+        plate = Plate(image, known, unmeasured, images=images, files=background.files)
+    else:
+        linear = np.asarray(background, np.float32)
+        color = linear.shape == (3,)
+        if not (color or (linear.ndim == 3 and linear.shape[2] == 3)) or not np.isfinite(linear).all():
+            raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
+        image = np.tile(linear, (height, width, 1)) if color else area_average(linear, width, height)
+        plate = Plate(image if color or filmed else clip.as_held(image), known, unmeasured)
+    exposed = clip.exposed(plate.gain)
+    return _measured(plate, np.abs(plate.image - image), exposed), exposed
 
 
-def _measured(plate: Plate, reach: Picture, clip: Clip) -> tuple[Plate, Clip]:
-    """Return a plate as a clip at its exposure shows it, with the clip's noise; and the clip.
+def _measured(plate: Plate, reach: Picture, clip: Clip) -> Plate:
+    """Return a plate as a clip at its exposure shows it, with the clip's noise.
 
     Coarse colors have changed the plate by ``reach`` (rows, columns, 3). Beside a saturated edge a codec does not hold
     even these. There each pixel goes on towards the frame that is nearest to it, by that much at most.
@@ -167,7 +165,7 @@ def _measured(plate: Plate, reach: Picture, clip: Clip) -> tuple[Plate, Clip]:
         blocks.append(block_means(deviation[None])[0])
     samples = np.stack(single), np.stack(blocks)
     if plate.images is not None:
-        return replace(plate, noise=noise_about(*samples)), clip
+        return replace(plate, noise=noise_about(*samples))
     held = encoded(plate)
     image = plate.image.copy()
     image[edge] += np.clip(nearest, -reach[edge], reach[edge])
@@ -175,10 +173,10 @@ def _measured(plate: Plate, reach: Picture, clip: Clip) -> tuple[Plate, Clip]:
     samples = _less(samples, given - held)
     raised = np.maximum(given, clipped_black(*samples)) - given
     if not raised.any():
-        return replace(plate, image=image, noise=noise_about(*samples)), clip
+        return replace(plate, image=image, noise=noise_about(*samples))
     noise = noise_about(*_less(samples, raised))
     shared = np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white)
-    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, shared=shared)), clip
+    return replace(plate, image=srgb_to_linear(given + raised), noise=replace(noise, shared=shared))
 
 
 def _less(samples: tuple[Picture, Picture], change: Picture) -> tuple[Picture, Picture]:

@@ -172,7 +172,7 @@ class Proxy:
         part, blocks = self.only(np.flatnonzero([number in self.blocks for number in self.numbers])), []
         for number, gain in zip(part.numbers, part.evened.gains, strict=True):
             some, seen = self.blocks[number]
-            even = some.through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(some.linear() / gain)
+            even = linear_to_srgb(some.linear() / gain)
             blocks.append(even if seen is None else np.where(seen[..., None], even, np.float32(np.nan)))
         return white_noise(np.stack(blocks))
 

@@ -56,20 +56,20 @@ class Strokes:
         return Strokes(green, red, blue)
 
 
-def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> Plate:
-    """Return a plate with what strokes say of it; behind smoke before ``one_color`` is that color for certain.
+def stroked(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -> tuple[Plate, Clip]:
+    """Return a plate with what strokes say of it, and a clip at its exposure that shows it in place of other things.
 
-    The clip is at the plate's exposure.
-    ClipError is raised if a frame cannot be read, or if nothing is left that is not smoke.
+    Behind smoke before ``one_color`` is that color for certain. ClipError is raised if a frame cannot be read, or if
+    nothing is left that is not smoke.
     """
     image, confidence, seen = plate.image.copy(), plate.confidence.copy(), strokes.other | strokes.behind
     if seen.any():
         shown = [clip.frame(number)[seen] for number in clip.spread(MEDIAN_FRAMES)]
         image[seen], confidence[seen] = np.median(shown, axis=0), 1
     if one_color:
-        image[strokes.smoke] = np.median(plate.image.reshape(-1, 3), axis=0)
-        return replace(plate, image=image, confidence=confidence)
-    confidence[strokes.smoke] = 0
+        image[strokes.smoke] = np.median(plate.image, axis=(0, 1))
+    else:
+        confidence[strokes.smoke] = 0
     if not confidence.any():
         raise ClipError("The strokes leave nothing that is not smoke; leave free, or paint blue, what is behind it.")
     # a stroke says nothing of what is unknown elsewhere, which may have detail of its own
@@ -77,12 +77,7 @@ def stroked_plate(strokes: Strokes, plate: Plate, clip: Clip, one_color: bool) -
     unknown = (confidence == 0) & np.isin(patches, patches[strokes.smoke | seen])
     image[unknown] = srgb_to_linear(push_pull(linear_to_srgb(image), confidence))[unknown]
     errors = plate.errors if plate.errors.any() else continuation_errors(image, confidence > 0)
-    return replace(plate, image=image, confidence=confidence, errors=errors)
-
-
-def without_others(strokes: Strokes, clip: Clip, plate: Plate) -> Clip:
-    """Return a clip at its plate's exposure that shows the plate where it is painted as no smoke."""
-    if not strokes.other.any():
-        return clip
-    other = strokes.other[..., None]
-    return shown_behind(clip, plate, lambda _, picture: np.where(other, np.float32(np.nan), picture))
+    plate, other = replace(plate, image=image, confidence=confidence, errors=errors), strokes.other[..., None]
+    if other.any():
+        clip = shown_behind(clip, plate, lambda _, picture: np.where(other, np.float32(np.nan), picture))
+    return plate, clip

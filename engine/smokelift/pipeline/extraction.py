@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from smokelift.checks import require_kind
-from smokelift.extraction import Element, extract_element, plate_and_source
 from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.element import Element, extract_element
+from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern

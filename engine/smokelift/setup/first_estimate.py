@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.extraction import plate_and_source, shows_transmittance
 from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.element import shows_transmittance
 from smokelift.extraction.fire import HotPixels, fire_color, firelight, hot_pixels, without_fire
 from smokelift.extraction.given_background import backdrop_color
+from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip

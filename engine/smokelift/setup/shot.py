@@ -7,7 +7,7 @@ from functools import cached_property
 
 from smokelift.checks import Finding
 from smokelift.density import AxisEstimate, Observation
-from smokelift.extraction import Element, extract_element
+from smokelift.extraction.element import Element, extract_element
 from smokelift.extraction.plate import Plate, uncovered
 from smokelift.footage.clip import Clip
 from smokelift.render import Image, Optics

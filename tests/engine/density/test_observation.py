@@ -12,7 +12,7 @@ from smokelift import _core
 from smokelift.density import DensitySettings, Observation, RoundDepth, ViewSet, reconstruct_density
 from smokelift.density.fit import GradientFit
 from smokelift.density.observation import USEFUL_DEVIATION, WHITE, ObservedView, eight_bit_plate
-from smokelift.extraction import Element, extract_element
+from smokelift.extraction.element import Element, extract_element
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import Picture, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.render import render, scene_optics, scene_renderer

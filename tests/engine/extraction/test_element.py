@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smokelift.extraction import Element, extract_element
-from smokelift.extraction.element import MODEL_ERROR
+from smokelift.extraction.element import MODEL_ERROR, Element, extract_element
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise

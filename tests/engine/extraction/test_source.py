@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.extraction import shows_transmittance, usual_source
-from smokelift.extraction.element import Cells, first_source
+from smokelift.extraction.element import Cells, first_source, shows_transmittance, usual_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import lasting_noise
