@@ -13,8 +13,8 @@ fill the silhouette (inflated outlines: Igarashi, Matsuoka and Tanaka 1999). In 
 thin ones, by which a smooth answer gains nothing (docs/experiments/density-profile.md).
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
-density can have, so a ray's middle is moved along it until most of the profile is inside too
-(docs/experiments/density-profile.md).
+density can have, so a ray's middle is moved into it, and its profile is narrower by as much: it reaches no farther from
+the axis than other smoke (docs/experiments/density-profile.md).
 """
 
 import numpy as np
@@ -40,9 +40,9 @@ PROFILE_CUT = 0.0056
 is how far its width may be wrong: at 1.4 lobes end in flat walls, seen from the side
 (docs/experiments/density-profile.md)."""
 
-ROOM = 0.5
-"""Distance, in A, of a ray's middle from the ends of its way through the domain: about four fifths of the profile
-are inside then (docs/experiments/density-profile.md)."""
+ROOM = 0.3
+"""Distance, in A, of a ray's middle from the ends of its way through the domain, at least
+(docs/experiments/density-profile.md)."""
 
 SILHOUETTE = 0.05
 """Fraction of the smoke's usual amount from which a pixel belongs to the silhouette
@@ -170,11 +170,10 @@ class DepthProfile:
             weight = amount + 1e-6 * amount.max(initial=1e-30)
             deep = ndimage.gaussian_filter(weight * deviation, blur) / ndimage.gaussian_filter(weight, blur)
             narrowing, offset = float(np.sqrt(1 - scatter.deviation**2)), deep * scatter.offset
-        self._width = narrowing * SCALE * deviation
-        room = np.minimum(ROOM * self._width, (rays.far - rays.near) / 2)
-        self._middle = np.where(
-            rays.missed, middle + offset, np.clip(middle + offset, rays.near + room, rays.far - room)
-        )
+        width, middle = narrowing * SCALE * deviation, middle + offset
+        room = np.minimum(ROOM * width, (rays.far - rays.near) / 2)
+        self._middle = np.where(rays.missed, middle, np.clip(middle, rays.near + room, rays.far - room))
+        self._width = np.maximum(width - np.abs(self._middle - middle), ROOM * width)
 
     def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""

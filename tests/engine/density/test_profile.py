@@ -9,6 +9,7 @@ from smokelift.density.hull import project_voxels
 from smokelift.density.profile import DepthProfile, inflated
 from smokelift.density.upright_plane import SmokeAxis
 from smokelift.scene import Camera, Domain
+from smokelift.scene.projection import project_points
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
 BOX = Domain((-1.5, -1.5, 0), (1.5, 1.5, 3), (48, 48, 48))
@@ -84,6 +85,17 @@ def test_smoke_stands_where_its_ray_is_inside_the_domain(depth: float) -> None:
     assert np.count_nonzero((fraction > 0) & (fraction < 0.6)) <= 4
     np.testing.assert_allclose(mean[3:-3], depth, atol=0.01)
     assert max(mean[0], mean[-1]) < depth - 0.2
+
+
+def test_no_plate_sticks_out_from_the_base_of_a_column() -> None:
+    """The base of a column that stands on the floor is as deep as its stem, but for the voxels on the floor."""
+    amount = pillar(LEVEL, 24, 36)
+    base, _ = project_points(LEVEL, np.array([0.0, -0.3, 0.0]))
+    amount[int(base[1]) :] = 0
+    density = Profile.of(amount, LEVEL, SmokeAxis.upright()).density[16]
+    amounts, squares = density.sum(0), DEPTHS**2 @ density
+    depths = np.sqrt(squares / np.maximum(amounts, 1e-9) - (DEPTHS @ density / np.maximum(amounts, 1e-9)) ** 2)
+    assert depths[1:4].max() < 1.1 * depths[24]
 
 
 def test_columns_behind_one_another_make_it_deeper() -> None:
