@@ -41,8 +41,8 @@ is how far its width may be wrong: at 1.4 lobes end in flat walls, seen from the
 (docs/experiments/density-profile.md)."""
 
 ROOM = 0.3
-"""Distance, in A, of a ray's middle from the ends of its way through the domain, at least
-(docs/experiments/density-profile.md)."""
+"""Smallest distance, in A, of a ray's middle from the ends of its way through the domain, and smallest fraction of A
+that is left of the profile there (docs/experiments/density-profile.md)."""
 
 SILHOUETTE = 0.05
 """Fraction of the smoke's usual amount from which a pixel belongs to the silhouette

@@ -1,7 +1,7 @@
 """Whether smoke looks like smoke from every azimuth: beside the truth, or beside its own front.
 
 Patches are what the method itself matches, from azimuths all around. Shapes along rays are independent of that: they
-see one soft body a ray where true smoke has lobes behind one another (docs/experiments/orbit-shapes.md).
+see one soft body per ray where true smoke has lobes behind one another (docs/experiments/orbit-shapes.md).
 """
 
 from collections.abc import Callable, Iterable

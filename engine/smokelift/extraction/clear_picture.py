@@ -157,8 +157,9 @@ def clear_picture(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> Cl
     known = mostly_beside(in_one_piece(known | (calm & (unlike <= DRIFT))), known) & ~never
     mean = sum(encoded * shown[..., None] for encoded, shown in zip(proxy.encoded, seen, strict=True))
     mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
-    mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
-    image[never] = srgb_to_linear(mean[never])
+    if never.any():
+        mean[never] = push_pull(linear_to_srgb(image), known.astype(np.float32))[never]
+        image[never] = srgb_to_linear(mean[never])
     # smoke thins out beside where it is seen
     hidden = np.asarray(1 - (clear & seen).sum(0) / np.maximum(seen.sum(0), 1), np.float32)
     hidden = np.maximum(hidden, blurred(hidden, SEEN_WIDTH * max(hidden.shape)))

@@ -174,7 +174,7 @@ def usual_source(pictures: Sequence[tuple[Picture, Plate]], size: tuple[int, int
 def compared_size(cells: tuple[int, int], whole: tuple[int, int], finest: float, detail_of: int = 0) -> tuple[int, int]:
     """Return the numbers of columns and rows of the pixels whose detail cells of a ``whole`` picture compare.
 
-    They show as much detail as so many cells along the longer side do, ``detail_of``, if these are fewer.
+    Fewer cells than ``detail_of`` along the longer side are compared in as many pixels as that number would be.
     """
     finer = FINER * max(1.0, detail_of / max(cells))
     most = (max(1, round(count / finest)) for count in whole)

@@ -207,9 +207,13 @@ def _fog(vdb: ModuleType, values: Array, corner: tuple[int, ...]) -> Any:
 
 def _checked_velocity(velocity: npt.ArrayLike | StaggeredGrid, voxels: tuple[int, ...]) -> Array | StaggeredGrid:
     """A velocity on faces, or at centers as float32; ValueError if it does not fit the voxels, or is not finite."""
-    velocity = velocity if isinstance(velocity, StaggeredGrid) else np.ascontiguousarray(velocity, np.float32)
-    parts: tuple[Array, ...] = velocity.faces if isinstance(velocity, StaggeredGrid) else (velocity,)
-    shape = (*velocity.shape, 3) if len(parts) == 3 else velocity.shape
+    parts: tuple[Array, ...]
+    shape: tuple[int, ...]
+    if isinstance(velocity, StaggeredGrid):
+        parts, shape = velocity.faces, (*velocity.shape, 3)
+    else:
+        velocity = np.ascontiguousarray(velocity, np.float32)
+        parts, shape = (velocity,), velocity.shape
     if shape != (*voxels, 3):
         raise ValueError(f"velocity {shape} does not fit the domain's {voxels} voxels; resample it")
     if not all(map(finite, parts)):
